@@ -1,13 +1,9 @@
 """What the tests of odd inputs share: the real binary, and a body that each small input holds."""
-import json
-import os
-import pathlib
-import shutil
 import subprocess
-import tempfile
 import unittest
 
-COVOL = os.environ.get("COVOL", "build/bin/covol")
+import cli_test
+from cli_test import COVOL
 
 try:
     import numpy as np
@@ -35,21 +31,10 @@ def on_body(count=150):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(unittest.TestCase):
+class Case(cli_test.Case):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-cases-"))
-        self.addCleanup(shutil.rmtree, self.folder)
-
-    def run_covol(self, *args, code=0):
-        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
-        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
-        return done
-
-    def report(self, *args):
-        path = self.folder / "report.json"
-        path.unlink(missing_ok=True)
-        self.run_covol(*args, "--quiet", "--json", path)
-        return json.loads(path.read_text())
+        super().setUp()
+        self.folder = self.out
 
     def info(self, *args):
         return self.report("info", *args)["image"]

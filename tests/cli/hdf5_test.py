@@ -9,6 +9,7 @@ import subprocess
 import unittest
 
 import zarr_test
+from cli_test import COVOL
 from zarr_test import CHUNKS, SHAPE, ball, pixels, write_marks
 
 try:
@@ -259,7 +260,7 @@ class Plain(Case):
         header = [good[:p] + bytes([good[p] ^ 128]) + good[p + 1:] for p in range(800, 832)]
         for n, bad in enumerate(cuts + flips + header):
             self.path("bad.h5").write_bytes(bad)
-            done = subprocess.run([zarr_test.COVOL, "info", "bad.h5", "--quiet"], capture_output=True, text=True, cwd=self.folder, timeout=60)
+            done = subprocess.run([COVOL, "info", "bad.h5", "--quiet"], capture_output=True, text=True, cwd=self.folder, timeout=60)
             self.assertIn(done.returncode, (0, 3), f"{n}: {done.stderr}")
             self.assertEqual([line for line in done.stderr.splitlines() if not line.startswith("covol: ")], [], n)
             if n < len(cuts):

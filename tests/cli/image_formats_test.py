@@ -13,11 +13,11 @@ import re
 import shutil
 import struct
 import subprocess
-import tempfile
 import unittest
 import zlib
 
-COVOL = os.environ.get("COVOL", "build/bin/covol")
+import cli_test
+from cli_test import COVOL
 
 try:
     import nibabel
@@ -124,29 +124,18 @@ def ome_xml(files=None, order="XYZCT", channels=1, pages=None):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(unittest.TestCase):
+class Case(cli_test.Case):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-formats-"))
+        super().setUpClass()
+        cls.folder = cls.inputs
         cls.data = voxels()
         cls.world_marks, cls.shifted_marks = cls.folder / "marks.xyz", cls.folder / "shifted.xyz"
         cls.world_marks.write_text(marks(600))
         cls.shifted_marks.write_text(marks(600, ORIGIN))
 
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    def run_covol(self, *args, code=0):
-        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
-        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
-        return done
-
-    def report(self, *args):
-        path = self.folder / "report.json"
-        path.unlink(missing_ok=True)
-        self.run_covol(*args, "--quiet", "--json", path)
-        return json.loads(path.read_text())
+    def run_covol(self, *args, **keywords):
+        return super().run_covol(*args, cwd=self.folder, **keywords)
 
     def write_nrrd(self, name="ball.nrrd", data=None):
         path = self.folder / name

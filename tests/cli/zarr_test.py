@@ -5,16 +5,11 @@
 import itertools
 import json
 import math
-import os
-import pathlib
 import shutil
 import struct
-import subprocess
-import tempfile
 import unittest
 
-
-COVOL = os.environ.get("COVOL", "build/bin/covol")
+import cli_test
 
 try:
     import numcodecs
@@ -155,23 +150,10 @@ def write_marks(path, centre, radius, count=100):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(unittest.TestCase):
+class Case(cli_test.Case):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-zarr-"))
-
-    def tearDown(self):
-        shutil.rmtree(self.folder)
-
-    def run_covol(self, *args, code=0):
-        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
-        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
-        return done
-
-    def report(self, *args):
-        path = self.folder / "report.json"
-        path.unlink(missing_ok=True)
-        self.run_covol(*args, "--quiet", "--json", path)
-        return json.loads(path.read_text())
+        super().setUp()
+        self.folder = self.out
 
     def read(self, path, *options):
         """The voxels that covol reads, z, y, x."""

@@ -18,6 +18,7 @@
 #include "covol/image_files.h"
 #include "covol/image_stream.h"
 #include "covol/mesh_io.h"
+#include "covol/program_marks.h"
 
 namespace covol::tool {
 namespace fs = std::filesystem;
@@ -36,6 +37,13 @@ void check_extension(const std::string& path, const std::vector<std::string>& kn
     throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + list);
 }
 
+void check_marks_ending(const std::string& path) {
+    const std::string end = lower_extension(path);
+    const bool is_slicers = lower_extension(fs::path(path).stem().string()) == ".mrk" && end == ".json";
+    if (end != ".csv" && end != ".roi" && !is_slicers)
+        throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + kProgramMarks);
+}
+
 void check_ending(const std::string& path, OutputKind kind) {
     switch (kind) {
         case OutputKind::Vdb: return check_extension(path, {".vdb"});
@@ -47,6 +55,7 @@ void check_ending(const std::string& path, OutputKind kind) {
         case OutputKind::Page: return check_extension(path, {".html", ".htm"});
         case OutputKind::Scene: return check_extension(path, {".usda"});
         case OutputKind::Table: return check_extension(path, {".csv"});
+        case OutputKind::ProgramMarks: return check_marks_ending(path);
         case OutputKind::Text: return;
     }
 }

@@ -33,7 +33,7 @@ struct ReportPageJob {
     PointFlags points;
     ContourFlags contours;
     ImageFlags image;
-    int suggestions = kPageSuggestions;
+    int suggestions = kSuggestions;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Page);

@@ -29,17 +29,24 @@ void EvidenceFlags::bind(CLI::App& command) {
     command
         .add_option("--suggest", suggestions, "name the N slices where new marks would help most, and where in them")
         ->type_name("N");
+    command
+        .add_option("--suggestions", marks_path,
+                    "the suggested places (3, or as many as --suggest says), for the program that you mark in: napari, "
+                    "3D Slicer, Fiji")
+        ->type_name("OUT.csv|.mrk.json|.roi");
 }
 
-void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run) const {
-    outputs.check("--evidence", path_of_this_run, OutputKind::Table);
+void EvidenceFlags::check(Outputs& outputs, const std::function<std::string(const std::string&)>& tagged) const {
+    outputs.check("--evidence", tagged(path), OutputKind::Table);
+    outputs.check("--suggestions", tagged(marks_path), OutputKind::ProgramMarks);
     if (suggestions.value_or(0) < 0)
         throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(*suggestions));
 }
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                               const RunContext& run) const {
-    return assess_evidence(result, marks, image, suggestions.value_or(for_page ? kPageSuggestions : 0), run);
+    return assess_evidence(result, marks, image,
+                           suggestions.value_or(for_page || !marks_path.empty() ? kSuggestions : 0), run);
 }
 
 Json to_json(const Evidence& e) {
@@ -83,6 +90,14 @@ void tell(Session& session, const Evidence& e, const std::string& who) {
              << text_of(s.world, 3) << "): they would support an area of " << s.area;
         session.say(text.str());
     }
+}
+
+std::vector<NamedMark> suggested_marks(const std::vector<EvidenceOf>& surfaces) {
+    std::vector<NamedMark> marks;
+    for (const auto& [structure, evidence] : surfaces)
+        for (const Suggestion& s : evidence->suggestions)
+            marks.push_back({s.index, structure + ", slice " + std::to_string(s.slice)});
+    return marks;
 }
 
 std::string evidence_csv(const std::vector<EvidenceOf>& surfaces) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,21 +8,26 @@
 #include "covol/evidence.h"
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
+#include "covol/program_marks.h"
 
 namespace covol::tool {
 
-/// Slices that a report page names where the command line does not say how many.
-inline constexpr int kPageSuggestions = 3;
+/// Slices that are suggested where the command line does not say how many.
+inline constexpr int kSuggestions = 3;
 
 /// What the surface rests on: --evidence and --suggest; a report page has it, too.
 struct EvidenceFlags {
-    std::string path;  ///< a table of the slices, .csv
+    std::string path;        ///< a table of the slices, .csv
+    std::string marks_path;  ///< the suggestions, for write_program_marks()
     std::optional<int> suggestions;
     bool for_page = false;
 
     void bind(CLI::App& command);
-    void check(Outputs& outputs, const std::string& path_of_this_run) const;
-    [[nodiscard]] bool wanted() const { return !path.empty() || suggestions.value_or(0) > 0 || for_page; }
+    /// @param tagged  a path, as that of this run
+    void check(Outputs& outputs, const std::function<std::string(const std::string&)>& tagged) const;
+    [[nodiscard]] bool wanted() const {
+        return !path.empty() || !marks_path.empty() || suggestions.value_or(0) > 0 || for_page;
+    }
     /// assess_evidence(), of as many suggestions as were asked for.
     [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                                  const RunContext& run) const;
@@ -42,5 +48,7 @@ struct EvidenceOf {
     const Evidence* evidence;
 };
 [[nodiscard]] std::string evidence_csv(const std::vector<EvidenceOf>& surfaces);
+/// All suggestions, named by structure and slice.
+[[nodiscard]] std::vector<NamedMark> suggested_marks(const std::vector<EvidenceOf>& surfaces);
 
 }  // namespace covol::tool

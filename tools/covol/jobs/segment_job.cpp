@@ -180,6 +180,14 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                     "where a run fails after its start was made: that start, u, distance and edge as far as they came")
         ->type_name("OUT.vdb");
     contours.bind(command, with_image);
+    if (with_image) {
+        in_group(command, Group::ReadingMarks);
+        command
+            .add_option("--structure-column", points.options.structure_column,
+                        "what names each mark's structure, of one file with several: a column, group or counter of "
+                        "Fiji, label or node of 3D Slicer")
+            ->type_name("NAME");
+    }
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);
     if (with_image) guess.bind(command);

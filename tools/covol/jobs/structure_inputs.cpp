@@ -19,11 +19,19 @@ Marks& owner_of(std::vector<Marks>& structures, const std::string& flag, const s
     return *found;
 }
 
+/// A file whose marks name their structures belongs to each of them; read_marks() takes what is its own.
 void add_files(std::vector<Marks>& structures, const std::vector<std::string>& texts,
-               std::vector<std::string> MarkFiles::*kind) {
+               std::vector<std::string> MarkFiles::*kind, const ReadPointsOptions& reading) {
     for (const std::string& text : texts) {
         const Named file = split_name(text);
-        (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
+        if (reading.structure_column.empty()) {
+            (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
+            continue;
+        }
+        if (!file.name.empty() || file.value == "-" || file.value.find("{frame}") != std::string::npos)
+            throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
+        for (const std::string& name : read_points(file.value, reading).structures)
+            (find_or_add_structure(structures, name).files.*kind).push_back(file.value);
     }
 }
 
@@ -62,8 +70,8 @@ std::vector<Marks> structures_of(const SegmentJob& job,
     std::vector<Marks> structures;
     if (!job.study.empty())
         structures = marks_of(read_study(job.study), open_study_site(job.study, read_study_image(job.study).geometry));
-    add_files(structures, job.points.paths, &MarkFiles::points);
-    add_files(structures, job.contours.paths, &MarkFiles::contours);
+    add_files(structures, job.points.paths, &MarkFiles::points, job.points.options);
+    add_files(structures, job.contours.paths, &MarkFiles::contours, job.points.options);
     add_paint(structures, painted);
     for (const std::string& text : job.guess.paths) {
         const Named file = split_name(text);

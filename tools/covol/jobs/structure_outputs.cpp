@@ -8,6 +8,7 @@
 #include "cli/report.h"
 #include "covol/file_kind.h"
 #include "covol/mesh_stream.h"
+#include "covol/program_marks.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "jobs/page.h"
@@ -262,7 +263,7 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
     outputs.check("--report", tagged(job.page_path), OutputKind::Page);
     outputs.check("--keep-failed", tagged(job.failed_path), OutputKind::Vdb);
-    job.evidence.check(outputs, tagged(job.evidence.path));
+    job.evidence.check(outputs, tagged);
     const std::string mesh = tagged(job.mesh_path);
     if (structures.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
         return outputs.check("--mesh", mesh, OutputKind::Mesh);
@@ -291,11 +292,17 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
     hand_over_meshes(job, output, tagged(job.mesh_path), session, sink);
     hand_over_labels(output, tagged(job.mask_path), job.images.empty() ? "" : job.images.front(), session.run(), sink);
-    sink(tagged(job.evidence.path), [output, &session](const std::string& file) {
+    const auto evidence_of = [output] {
         std::vector<EvidenceOf> surfaces;
         for (const StructureOutput& s : output->structures)
             surfaces.push_back({s.name.empty() ? s.grid : s.name, &*s.evidence});
-        write_text(file, evidence_csv(surfaces), session.run());
+        return surfaces;
+    };
+    sink(tagged(job.evidence.path), [evidence_of, &session](const std::string& file) {
+        write_text(file, evidence_csv(evidence_of()), session.run());
+    });
+    sink(tagged(job.evidence.marks_path), [output, evidence_of](const std::string& file) {
+        write_program_marks(file, suggested_marks(evidence_of()), output->geometry);
     });
     // The last one, so that it tells of as much as there is to tell.
     ReportPage page;

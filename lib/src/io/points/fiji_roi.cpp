@@ -44,15 +44,28 @@ public:
 
     [[nodiscard]] const char* kind() const { return is_composite() ? "composite" : name_of(type_); }
 
+    /// The group that it belongs to in the ROI Manager, from 1; 0: none.
+    [[nodiscard]] int group() const {
+        return version_ >= 228 && second_ != 0 ? bytes_.at<std::uint8_t>(second_ + 30) : 0;
+    }
+
     /// Puts its points into the table; false when it has none to give (a text, a picture).
-    bool add_to(PointTable& table) const {
+    /// @param structures_by  "group", "counter" or empty
+    bool add_to(PointTable& table, const std::string& structures_by) const {
+        if (!add_marks(table, structures_by == "counter")) return false;
+        if (structures_by == "group") name_structure(table, "group " + std::to_string(group()));
+        return true;
+    }
+
+private:
+    bool add_marks(PointTable& table, bool by_counter) const {
         if (is_composite()) {
             add_composite(table);
             return true;
         }
         if (subtype_ == kText || subtype_ == kImage || type_ == kNothing) return false;
         switch (type_) {
-            case kPoint: add_points(table); break;
+            case kPoint: add_points(table, by_counter); break;
             case kRectangle: add_rectangle(table); break;
             case kOval: add_oval(table); break;
             case kLine: add_straight(table); break;
@@ -61,7 +74,6 @@ public:
         return true;
     }
 
-private:
     [[nodiscard]] bool is_composite() const { return bytes_.at<std::int32_t>(36) > 0; }
 
     void read_name() {
@@ -127,13 +139,14 @@ private:
         return result;
     }
 
-    void add_points(PointTable& table) const {
+    void add_points(PointTable& table, bool by_counter) const {
         const auto xy = vertices();
         std::uint64_t counters = 0;
         if (version_ >= 227 && second_ != 0) counters = bytes_.at<std::uint32_t>(second_ + 48);
         for (std::uint64_t i = 0; i < xy.size(); ++i) {
-            const int position = counters != 0 ? bytes_.at<std::int32_t>(counters + 4 * i) >> 8 : 0;
+            const int both = counters != 0 ? bytes_.at<std::int32_t>(counters + 4 * i) : 0, position = both >> 8;
             table.points.push_back({xy[i][0], xy[i][1], position > 0 ? position - 1 : required_slice()});
+            if (by_counter) name_structure(table, "counter " + std::to_string(both & 255));
         }
     }
 
@@ -225,10 +238,11 @@ private:
 /// Gathers ROIs, and says of which kinds they were.
 class RoiCollector {
 public:
-    explicit RoiCollector(const std::string& path) : path_(path) {}
+    RoiCollector(const std::string& path, const std::string& structures_by)
+        : path_(path), structures_by_(structures_by) {}
     void add(const std::string& name, std::string_view data) {
         const Roi roi(path_, name, data);
-        ++kinds_[roi.add_to(table_) ? roi.kind() : "without marks, passed over"];
+        ++kinds_[roi.add_to(table_, structures_by_) ? roi.kind() : "without marks, passed over"];
     }
     [[nodiscard]] PointTable finish() {
         table_.space = PointSpace::Index;
@@ -241,21 +255,22 @@ public:
     }
 
 private:
-    const std::string& path_;
+    const std::string &path_, &structures_by_;
     PointTable table_;
     std::map<std::string, int> kinds_;
 };
 
 }  // namespace
 
-PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name) {
-    RoiCollector rois(path);
+PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name,
+                     const std::string& structures_by) {
+    RoiCollector rois(path, structures_by);
     rois.add(name, bytes);
     return rois.finish();
 }
 
-PointTable parse_roi_zip(const std::string& path, const std::string& bytes) {
-    RoiCollector rois(path);
+PointTable parse_roi_zip(const std::string& path, const std::string& bytes, const std::string& structures_by) {
+    RoiCollector rois(path, structures_by);
     bool any = false;
     for_each_in_zip(
         path, bytes, [](const std::string& name) { return lower(name).ends_with(".roi"); },

@@ -24,6 +24,7 @@ struct Line {
     std::string shape;
     std::vector<Vec3> points;
     std::vector<double> places;  ///< vertex-index of each, where the file has one
+    std::string structure;       ///< where a column names it
 };
 
 /// The marks in the order of their places.
@@ -62,6 +63,7 @@ void append(PointTable& table, const std::string& path, Line& line, const Column
         closed = line.shape != "path" && line.shape != "line";
     }
     add_line(table, line.points, closed, line.name);
+    if (columns.structure) name_structure(table, line.structure);
 }
 
 /// Gathers the rows of each line, which need not follow each other.
@@ -71,8 +73,10 @@ public:
     void add(const std::string& path, std::size_t number, const std::vector<string_view>& fields, const Vec3& point) {
         std::string key;
         for (const std::size_t column : columns_.line) key.append(fields[column]) += '\n';
+        const std::string structure(columns_.structure ? fields[*columns_.structure] : string_view());
+        key += structure;
         const auto [place, is_new] = index_.try_emplace(key, lines_.size());
-        if (is_new) lines_.push_back({std::string(fields[columns_.line.back()]), {}, {}, {}});
+        if (is_new) lines_.push_back({std::string(fields[columns_.line.back()]), {}, {}, {}, structure});
         Line& line = lines_[place->second];
         if (columns_.shape && line.shape.empty()) line.shape = lower(fields[*columns_.shape]);
         if (columns_.vertex) line.places.push_back(to_coordinate(path, number, fields[*columns_.vertex]));
@@ -163,7 +167,8 @@ private:
 /// the first row of numbers.
 class TableBegin {
 public:
-    TableBegin(std::string path, bool counted) : path_(std::move(path)), counted_(counted) {}
+    TableBegin(std::string path, bool counted, std::string structures_by)
+        : path_(std::move(path)), structures_by_(std::move(structures_by)), counted_(counted) {}
 
     /// @returns whether the line is the header or the first row of numbers; the fields are then its own.
     bool take(std::size_t number, string_view line, std::vector<string_view>& fields) {
@@ -198,9 +203,24 @@ private:
         if (!found) return false;
         columns = *found;
         is_header = true;
+        find_structures(fields);
         needed = columns.count();
         tell_title();
         return true;
+    }
+    void find_structures(const std::vector<string_view>& fields) {
+        if (structures_by_.empty()) return;
+        std::string names;
+        for (std::size_t n = 0; n < fields.size(); ++n) {
+            if (lower(trim(fields[n])) == lower(structures_by_)) columns.structure = n;
+            names += (n == 0 ? "" : ", ") + std::string(trim(fields[n]));
+        }
+        if (!columns.structure)
+            throw Error(
+                Errc::InvalidInput,
+                path_ + ": `structure_column`: expected one of the columns " + names + ", got " + quote(structures_by_),
+                "structure_column");
+        columns.rule += ", structures by " + structures_by_;
     }
     void count_columns(const std::vector<string_view>& fields) {
         if (is_table_without_names_) fail(path_, line_, why_);
@@ -244,7 +264,7 @@ private:
         if (++title_ > kMostTitle) refuse();
     }
 
-    std::string path_, why_;
+    std::string path_, structures_by_, why_;
     bool counted_;  ///< the number of points may come first
     bool is_table_without_names_ = false, is_word_only_ = true;
     std::size_t line_ = 1, title_ = 0;
@@ -269,13 +289,14 @@ bool goes_on_with_header(const std::vector<string_view>& fields, Columns& column
 
 }  // namespace
 
-PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only) {
+PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only,
+                         const std::string& structures_by) {
     PointTable table;
     table.points.reserve(text.size() / 24);
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
-    TableBegin begin(path, blanks_only);
+    TableBegin begin(path, blanks_only, structures_by);
     Columns& columns = begin.columns;
     std::optional<LineCollector> collector;
     std::optional<RowUnits> units;
@@ -310,10 +331,15 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
             }
         }
         if (columns.normal) table.normals.push_back(read_normal(fields, *columns.normal));
-        if (columns.line.empty())
+        if (columns.structure && trim(fields[*columns.structure]).empty())
+            fail(path, lines.number(),
+                 "expected a structure's name in the column " + quote(structures_by) + ", got none");
+        if (columns.line.empty()) {
             table.points.push_back(point);
-        else
+            if (columns.structure) name_structure(table, std::string(fields[*columns.structure]));
+        } else {
             collector->add(path, lines.number(), fields, point);
+        }
     }
     if (begin.delimiter == 0 && begin.has_title()) begin.refuse();
     if (collector) collector->finish(path, table);

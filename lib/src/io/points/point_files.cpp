@@ -29,38 +29,56 @@ std::string read_text(const std::string& path) {
     return text;
 }
 
-using Parser = std::function<PointTable(const std::string& path, const std::string& content)>;
+using Parser = std::function<PointTable(const std::string& path, const std::string& content, const std::string& by)>;
 
 struct Format {
     const char* ending;
     Parser parse;
 };
 
-PointTable parse_table(const std::string& path, const std::string& text) {
-    return parse_columns(path, to_utf8(text), false);
+PointTable parse_table(const std::string& path, const std::string& text, const std::string& by) {
+    return parse_columns(path, to_utf8(text), false, by);
 }
-PointTable parse_blanks(const std::string& path, const std::string& bytes) {
+PointTable parse_blanks(const std::string& path, const std::string& bytes, const std::string& by) {
     const std::string text = to_utf8(bytes);
-    return is_ptx(text) ? parse_ptx(path, text) : parse_columns(path, text, true);
+    return is_ptx(text) ? parse_ptx(path, text) : parse_columns(path, text, true, by);
 }
 
-PointTable parse_one_roi(const std::string& path, const std::string& bytes) {
-    return parse_roi(path, bytes, fs::path(path).stem().string());
+PointTable parse_one_roi(const std::string& path, const std::string& bytes, const std::string& by) {
+    return parse_roi(path, bytes, fs::path(path).stem().string(), by);
 }
 
-PointTable refuse_laz(const std::string& path, const std::string&) {
+/// Of files that name no structures.
+template <PointTable (*parse)(const std::string&, const std::string&)>
+PointTable of_one(const std::string& path, const std::string& content, const std::string&) {
+    return parse(path, content);
+}
+
+PointTable refuse_laz(const std::string& path, const std::string&, const std::string&) {
     throw Error(Errc::Unsupported, path + ": LAZ is not read; unpack it to .las with laszip or pdal translate");
 }
 
 const std::vector<Format>& formats() {
-    static const std::vector<Format> list{
-        {".xyz", parse_blanks},    {".txt", parse_blanks},        {".pts", parse_blanks},
-        {".asc", parse_blanks},    {".csv", parse_table},         {".tsv", parse_table},
-        {".ptx", parse_blanks},    {".ply", parse_ply},           {".obj", parse_obj},
-        {".off", parse_off},       {".roi", parse_one_roi},       {".zip", parse_roi_zip},
-        {".json", parse_markups},  {".fcsv", parse_fcsv},         {".landmarks", parse_landmarks},
-        {".lmk", parse_landmarks}, {".annot", parse_annotations}, {".pcd", parse_pcd},
-        {".las", parse_las},       {".laz", refuse_laz}};
+    static const std::vector<Format> list{{".xyz", parse_blanks},
+                                          {".txt", parse_blanks},
+                                          {".pts", parse_blanks},
+                                          {".asc", parse_blanks},
+                                          {".csv", parse_table},
+                                          {".tsv", parse_table},
+                                          {".ptx", parse_blanks},
+                                          {".ply", of_one<parse_ply>},
+                                          {".obj", of_one<parse_obj>},
+                                          {".off", of_one<parse_off>},
+                                          {".roi", parse_one_roi},
+                                          {".zip", parse_roi_zip},
+                                          {".json", parse_markups},
+                                          {".fcsv", parse_fcsv},
+                                          {".landmarks", of_one<parse_landmarks>},
+                                          {".lmk", of_one<parse_landmarks>},
+                                          {".annot", of_one<parse_annotations>},
+                                          {".pcd", of_one<parse_pcd>},
+                                          {".las", of_one<parse_las>},
+                                          {".laz", refuse_laz}};
     return list;
 }
 
@@ -92,7 +110,15 @@ void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, c
     table.lines.push_back({begin, table.points.size(), closed, name});
 }
 
-PointTable read_point_table(const std::string& path) {
+void name_structure(PointTable& table, const std::string& name) {
+    auto& names = table.structures;
+    const auto found = std::find(names.begin(), names.end(), name);
+    const auto number = std::uint32_t(found - names.begin());
+    if (found == names.end()) names.push_back(name);
+    table.structure.resize(table.points.size(), number);
+}
+
+PointTable read_point_table(const std::string& path, const std::string& structures_by) {
     const std::string extension = detail::extension(path);
     const auto& list = formats();
     const auto format = std::find_if(list.begin(), list.end(), [&](const Format& f) { return f.ending == extension; });
@@ -104,7 +130,14 @@ PointTable read_point_table(const std::string& path) {
     }
     const std::string content = read_text(path);
     if (content.empty()) fail(path, "the file is empty");
-    return format->parse(path, content);
+    PointTable table = format->parse(path, content, structures_by);
+    if (!structures_by.empty() && table.structure.size() != table.points.size())
+        throw Error(Errc::InvalidInput,
+                    path + ": `structure_column`: expected a table with a column " + quote(structures_by) +
+                        ", Fiji's selections with group or counter, or 3D Slicer's markups with label or node; a " +
+                        extension + " file has no '" + structures_by + "'",
+                    "structure_column");
+    return table;
 }
 
 }  // namespace covol::detail

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,12 +18,18 @@ struct PointTable {
     std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
-    std::string unit;  ///< of lengths, as normal_unit() has it; empty: not said
-    std::string rule;  ///< which columns or elements, for people
+    std::string unit;                      ///< of lengths, as normal_unit() has it; empty: not said
+    std::vector<std::string> structures;   ///< as in PointCloud
+    std::vector<std::uint32_t> structure;  ///< likewise
+    std::string rule;                      ///< which columns or elements, for people
 };
 
 /// Picks the reader by the name's end. @throws as read_points(), which it serves.
-PointTable read_point_table(const std::string& path);
+/// @param structures_by  as ReadPointsOptions::structure_column
+PointTable read_point_table(const std::string& path, const std::string& structures_by);
+
+/// The points that belong to no structure yet, the last ones of the table, belong to that of this name.
+void name_structure(PointTable& table, const std::string& name);
 
 /// A unit vector; 0 of what is no direction (NaN, zero length), which scanners write where they know none.
 [[nodiscard]] Vec3 normal_of(const Vec3& given);

@@ -10,7 +10,9 @@ namespace covol::detail {
 /// XYZ, CSV, TSV: one point a line, columns by name where there is a header. Lists of marks as Fiji, napari and
 /// people write them are told by their columns.
 /// @param blanks_only  columns are cut at runs of blanks and tabs, unless there are commas or semicolons
-PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only);
+/// @param structures_by  the column that names each row's structure; empty: none
+PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only,
+                         const std::string& structures_by = {});
 
 PointTable parse_obj(const std::string& path, const std::string& text);
 PointTable parse_off(const std::string& path, const std::string& text);
@@ -18,12 +20,15 @@ PointTable parse_ply(const std::string& path, const std::string& bytes);
 
 /// A selection of Fiji (ImageJ), and a ZIP of several as its ROI Manager saves them.
 /// @param name  of the selection, where the file has none
-PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name);
-PointTable parse_roi_zip(const std::string& path, const std::string& bytes);
+/// @param structures_by  "group" of a selection, "counter" of a multi-point's points, or empty
+PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name,
+                     const std::string& structures_by = {});
+PointTable parse_roi_zip(const std::string& path, const std::string& bytes, const std::string& structures_by = {});
 
 /// 3D Slicer's .mrk.json and .fcsv: the coordinate system is inside.
-PointTable parse_markups(const std::string& path, const std::string& text);
-PointTable parse_fcsv(const std::string& path, const std::string& text);
+/// @param structures_by  "label" of each point, "node" (the markup's own name; not of .fcsv), or empty
+PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by = {});
+PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by = {});
 /// c3d -landmarks-to-spheres: x y z label, in RAS; a label that is a word may come first.
 PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners are at integers.

@@ -1,5 +1,6 @@
 #include "covol/points.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
@@ -83,9 +84,12 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     // Who gives a scale knows better than the file.
     const bool has_lengths = cloud.space != PointSpace::Index && !table.unit.empty();
+    if (has_lengths && options.scale == 1) cloud.unit = table.unit;
     if (has_lengths)
-        cloud.rule += options.scale == 1 ? detail::unit_note(table.unit)
+        cloud.rule += options.scale == 1 ? "; lengths in " + table.unit
                                          : ", times a scale that is given, not in " + table.unit + " as the file says";
+    cloud.structures = std::move(table.structures);
+    cloud.structure = std::move(table.structure);
     return cloud;
 }
 
@@ -97,7 +101,7 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 
 KindedPoints read_kinded_points(const std::string& path, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    detail::PointTable table = detail::read_point_table(path);
+    detail::PointTable table = detail::read_point_table(path, options.structure_column);
     KindedPoints points;
     points.kinds = std::move(table.kinds);
     if (!points.kinds.empty()) table.rule += " with kinds";
@@ -111,18 +115,47 @@ PointCloud KindedPoints::of(MarkKind kind) const {
     some.points.clear();
     some.normals.clear();
     some.lines.clear();
+    some.structure.clear();
     for (std::size_t n = 0; n < kinds.size(); ++n) {
         if (kinds[n] != kind) continue;
         some.points.push_back(cloud.points[n]);
         if (!cloud.normals.empty()) some.normals.push_back(cloud.normals[n]);
+        if (!cloud.structure.empty()) some.structure.push_back(cloud.structure[n]);
     }
     return some;
+}
+
+PointCloud of_structure(const PointCloud& cloud, const std::string& name) {
+    PointCloud part = cloud;
+    for (std::vector<Vec3>* list : {&part.points, &part.normals}) list->clear();
+    part.lines.clear();
+    part.structures = {name};
+    part.structure.clear();
+    const auto found = std::find(cloud.structures.begin(), cloud.structures.end(), name);
+    const auto wanted = std::uint32_t(found - cloud.structures.begin());
+    std::vector<std::size_t> place(cloud.structure.size() + 1, 0);  // among the marks of the structure
+    for (std::size_t n = 0; n < cloud.structure.size(); ++n) {
+        place[n] = part.points.size();
+        if (cloud.structure[n] != wanted) continue;
+        part.points.push_back(cloud.points[n]);
+        if (!cloud.normals.empty()) part.normals.push_back(cloud.normals[n]);
+    }
+    place.back() = part.points.size();
+    for (MarkLine line : cloud.lines) {
+        if (line.begin >= line.end || cloud.structure.at(line.begin) != wanted) continue;
+        line.begin = place[line.begin];
+        line.end = place[line.end];
+        part.lines.push_back(line);
+    }
+    part.structure.assign(part.points.size(), 0);
+    return part;
 }
 
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
     if (text.empty()) throw Error(Errc::InvalidInput, source + ": expected points, got nothing");
-    return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true), options);
+    return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true, options.structure_column),
+                    options);
 }
 
 void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment) {

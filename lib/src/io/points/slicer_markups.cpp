@@ -36,17 +36,24 @@ Vec3 to_point(const std::string& path, const Json& position) {
     return point;
 }
 
-std::vector<Vec3> control_points(const std::string& path, const Json& markup) {
+struct ControlPoints {
     std::vector<Vec3> points;
-    if (!markup.contains("controlPoints")) return points;
+    std::vector<std::string> labels;  ///< of each, as people type them
+};
+
+ControlPoints control_points(const std::string& path, const Json& markup) {
+    ControlPoints found;
+    if (!markup.contains("controlPoints")) return found;
     for (const Json& control : markup.at("controlPoints")) {
         const std::string status = control.value("positionStatus", "defined");
-        if (status == "defined" || status == "nonblocking") points.push_back(to_point(path, control.at("position")));
+        if (status != "defined" && status != "nonblocking") continue;
+        found.points.push_back(to_point(path, control.at("position")));
+        found.labels.push_back(control.value("label", ""));
     }
-    return points;
+    return found;
 }
 
-PointTable read_markups(const std::string& path, const Json& file) {
+PointTable read_markups(const std::string& path, const Json& file, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
     std::string kinds;
@@ -54,17 +61,24 @@ PointTable read_markups(const std::string& path, const Json& file) {
         fail(path, "expected 3D Slicer's markups, found no list 'markups'");
     for (const Json& markup : file.at("markups")) {
         const std::string type = markup.value("type", "Fiducial");
-        std::vector<Vec3> points = control_points(path, markup);
+        auto [points, labels] = control_points(path, markup);
         if (points.empty() || type == "ROI" || type == "Plane") continue;
         // Slicer's own default; files that mix both take the first one's
         const PointSpace space = to_space(path, markup.value("coordinateSystem", "LPS"));
         if (table.space == PointSpace::Unstated) table.space = space;
         if (space != table.space) turn(points);
         const std::string name = markup.value("name", "");
-        if (type == "ClosedCurve" || type == "Curve" || type == "Line" || type == "Angle")
+        const bool by_label = structures_by == "label";
+        if (type == "ClosedCurve" || type == "Curve" || type == "Line" || type == "Angle") {
             add_line(table, points, type == "ClosedCurve", name);
-        else
-            table.points.insert(table.points.end(), points.begin(), points.end());
+            if (by_label) name_structure(table, labels.front());
+        } else {
+            for (std::size_t n = 0; n < points.size(); ++n) {
+                table.points.push_back(points[n]);
+                if (by_label) name_structure(table, labels[n]);
+            }
+        }
+        if (structures_by == "node") name_structure(table, name);
         kinds += (kinds.empty() ? "" : ", ") + type;
     }
     constexpr std::size_t kLongest = 80;
@@ -75,20 +89,21 @@ PointTable read_markups(const std::string& path, const Json& file) {
 
 }  // namespace
 
-PointTable parse_markups(const std::string& path, const std::string& text) {
+PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by) {
     try {
-        return read_markups(path, Json::parse(text));
+        return read_markups(path, Json::parse(text), structures_by);
     } catch (const Json::exception& e) {
         fail(path, std::string("not the JSON of 3D Slicer's markups: ") + e.what());
     }
 }
 
-PointTable parse_fcsv(const std::string& path, const std::string& text) {
+PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
     std::string system = "RAS";  // of files that state none: before Slicer 4.11
     bool stated = false;
     std::array<std::size_t, 3> at{1, 2, 3};
+    std::size_t label = 11;  // as Slicer has them where a file names no columns
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
@@ -109,9 +124,11 @@ PointTable parse_fcsv(const std::string& path, const std::string& text) {
                 stated = true;
             } else if (setting("columns", value)) {
                 split(value, ',', fields);
-                for (std::size_t n = 0; n < fields.size(); ++n)
+                for (std::size_t n = 0; n < fields.size(); ++n) {
                     if (fields[n].size() == 1 && fields[n][0] >= 'x' && fields[n][0] <= 'z')
                         at[static_cast<std::size_t>(fields[n][0] - 'x')] = n;
+                    if (fields[n] == "label") label = n;
+                }
             }
             continue;
         }
@@ -124,6 +141,8 @@ PointTable parse_fcsv(const std::string& path, const std::string& text) {
             point[a] = to_coordinate(path, lines.number(), fields[at[a]]);
         }
         table.points.push_back(point);
+        if (structures_by == "label")
+            name_structure(table, std::string(label < fields.size() ? fields[label] : string_view()));
     }
     table.space = to_space(path, system);
     table.rule =

@@ -18,20 +18,21 @@ struct Columns {
     PointOrder order = PointOrder::Unstated;
     bool slice_from_one = false;  ///< the third column counts slices from 1
     std::optional<std::array<std::size_t, 3>> normal;
-    bool normal_is_guess = false;         ///< the columns have no names
-    std::vector<std::size_t> line;        ///< rows that agree in these columns are one line
-    std::optional<std::size_t> shape;     ///< napari's shape-type
-    std::optional<std::size_t> vertex;    ///< the place of a mark in its line
-    bool closed = true;                   ///< lines whose shape is not told
-    std::array<std::string, 3> unit{};    ///< of each coordinate, where a header names a unit of length
-    std::optional<std::size_t> kind;      ///< what each mark says: surface, inside or outside
-    std::optional<std::size_t> row_unit;  ///< the column that names each row's unit
+    bool normal_is_guess = false;          ///< the columns have no names
+    std::vector<std::size_t> line;         ///< rows that agree in these columns are one line
+    std::optional<std::size_t> shape;      ///< napari's shape-type
+    std::optional<std::size_t> vertex;     ///< the place of a mark in its line
+    bool closed = true;                    ///< lines whose shape is not told
+    std::array<std::string, 3> unit{};     ///< of each coordinate, where a header names a unit of length
+    std::optional<std::size_t> kind;       ///< what each mark says: surface, inside or outside
+    std::optional<std::size_t> row_unit;   ///< the column that names each row's unit
+    std::optional<std::size_t> structure;  ///< the column that names each row's structure
     std::string rule;
 
     [[nodiscard]] std::size_t count() const {
         std::size_t last = *std::max_element(at.begin(), at.end());
         for (const std::size_t column : line) last = std::max(last, column);
-        return std::max({last, shape.value_or(0), vertex.value_or(0), row_unit.value_or(0)}) + 1;
+        return std::max({last, shape.value_or(0), vertex.value_or(0), row_unit.value_or(0), structure.value_or(0)}) + 1;
     }
 };
 

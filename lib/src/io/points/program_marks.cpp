@@ -1,0 +1,118 @@
+#include "covol/program_marks.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/text.h"
+#include "covol/error.h"
+#include "covol/file_set.h"
+
+namespace covol {
+namespace {
+
+std::string shortest(double value) {
+    std::array<char, 32> digits;
+    return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
+/// A field of a CSV table.
+std::string quoted_field(const std::string& text) {
+    std::string field = "\"";
+    for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return field + '"';
+}
+
+std::string to_napari(const std::vector<NamedMark>& marks) {
+    std::string text = "index,axis-0,axis-1,axis-2,name\n";
+    for (std::size_t n = 0; n < marks.size(); ++n) {
+        const auto [x, y, z] = marks[n].index;
+        text += std::to_string(n) + "," + shortest(z) + "," + shortest(y) + "," + shortest(x) + "," +
+                quoted_field(marks[n].name) + "\n";
+    }
+    return text;
+}
+
+std::string to_slicer(const std::vector<NamedMark>& marks, const ImageGeometry& geometry) {
+    nlohmann::ordered_json points = nlohmann::ordered_json::array();
+    for (std::size_t n = 0; n < marks.size(); ++n)
+        points.push_back({{"id", std::to_string(n + 1)},
+                          {"label", marks[n].name},
+                          {"position", geometry.index_to_world(marks[n].index)},
+                          {"positionStatus", "defined"}});
+    const nlohmann::ordered_json file{
+        {"@schema",
+         "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/"
+         "markups-schema-v1.0.3.json#"},
+        {"markups", {{{"type", "Fiducial"}, {"coordinateSystem", "LPS"}, {"controlPoints", points}}}}};
+    return file.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+/// Big-endian, as Java has it.
+template <typename T>
+void put(std::string& bytes, std::size_t at, T value) {
+    using Bits = std::conditional_t<sizeof(T) == 1, std::uint8_t,
+                                    std::conditional_t<sizeof(T) == 2, std::uint16_t, std::uint32_t>>;
+    const auto bits = std::bit_cast<Bits>(value);
+    for (std::size_t n = 0; n < sizeof(T); ++n) bytes[at + n] = char(bits >> (8 * (sizeof(T) - 1 - n)) & 255);
+}
+
+/// Layout: ij/io/RoiEncoder.java of ImageJ 1.53. Pixels as ImageJ counts them, centres at whole numbers for points.
+std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks) {
+    constexpr std::size_t kMost = 65535;  // a 16-bit count
+    if (marks.size() > kMost)
+        throw Error(Errc::Unsupported, path + ": a multi-point of Fiji has at most 65535 points, got " +
+                                           std::to_string(marks.size()) + "; write .csv or .mrk.json");
+    const std::size_t n = marks.size();
+    Vec3 low{0, 0, 0}, high{0, 0, 0};
+    for (std::size_t m = 0; m < n; ++m)
+        for (int a = 0; a < 3; ++a) {
+            low[a] = m == 0 ? marks[m].index[a] : std::min(low[a], marks[m].index[a]);
+            high[a] = m == 0 ? marks[m].index[a] : std::max(high[a], marks[m].index[a]);
+        }
+    if (low[0] < -0.5 || low[1] < -0.5 || low[2] < -0.5)
+        throw Error(Errc::InvalidInput, path + ": expected marks within the image, got voxel (" + shortest(low[0]) +
+                                            ", " + shortest(low[1]) + ", " + shortest(low[2]) + ")");
+    const std::size_t reals = 64 + 4 * n, second = reals + 8 * n, counters = second + 64;
+    std::string bytes(counters + 4 * n, '\0');
+    bytes.replace(0, 4, "Iout");
+    put<std::int16_t>(bytes, 4, 227);
+    put<std::uint8_t>(bytes, 6, 10);  // points
+    const auto left = std::int16_t(std::floor(low[0])), top = std::int16_t(std::floor(low[1]));
+    put<std::int16_t>(bytes, 8, top);
+    put<std::int16_t>(bytes, 10, left);
+    put<std::int16_t>(bytes, 12, std::int16_t(std::ceil(high[1]) + 1));
+    put<std::int16_t>(bytes, 14, std::int16_t(std::ceil(high[0]) + 1));
+    put<std::uint16_t>(bytes, 16, std::uint16_t(n));
+    put<std::int16_t>(bytes, 50, 128);  // coordinates are real numbers, too
+    put<std::uint32_t>(bytes, 60, std::uint32_t(second));
+    put<std::uint32_t>(bytes, second + 48, std::uint32_t(counters));
+    for (std::size_t m = 0; m < n; ++m) {
+        const auto [x, y, z] = marks[m].index;
+        put<std::int16_t>(bytes, 64 + 2 * m, std::int16_t(std::lround(x) - left));
+        put<std::int16_t>(bytes, 64 + 2 * n + 2 * m, std::int16_t(std::lround(y) - top));
+        put<float>(bytes, reals + 4 * m, float(x));
+        put<float>(bytes, reals + 4 * n + 4 * m, float(y));
+        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // the slice; counter 0
+    }
+    return bytes;
+}
+
+}  // namespace
+
+void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks, const ImageGeometry& geometry) {
+    const std::string name = detail::lower(path);
+    if (name.ends_with(".csv"))
+        write_text_file(path, to_napari(marks));
+    else if (name.ends_with(".mrk.json"))
+        write_text_file(path, to_slicer(marks, geometry));
+    else if (name.ends_with(".roi"))
+        write_text_file(path, to_fiji(path, marks));
+    else
+        throw Error(Errc::InvalidOptions, path + ": expected a name ending in " + kProgramMarks);
+}
+
+}  // namespace covol
