@@ -19,46 +19,16 @@ import pytest
 
 pytest.importorskip("nibabel", reason="see tests/install_packages.sh")
 import numpy as np  # noqa: E402
-import pyopenvdb  # noqa: E402
 
 import covol  # noqa: E402
 import lattice_files as files  # noqa: E402
+from lattice_body import SIZE, VOXELS_OF_BODY, image, indices, level, rotation, write_body  # noqa: E402
 from lattice_files import Lattice  # noqa: E402
 
 PROGRAM = os.environ.get("COVOL", "build/bin/covol")
 COUNT, FIRST, LAST = [*map(int, os.environ.get("COVOL_LATTICES", "30").split(":")), 0, 0][:3]
 
-SIZE = np.array([14, 12, 10])
-RADII, CENTRE = np.array([4.4, 3.3, 2.6]), np.array([6.3, 5.6, 4.4])
 MOST_VOXELS, LEAST_VOLUME = 2.0 ** 32, 0.05  # docs/formats.md: origins, sheared lattices
-
-
-def rotation(rng):
-    """Uniform, by a unit quaternion."""
-    w, x, y, z = (q := rng.normal(size=4)) / np.linalg.norm(q)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
-AXES = rotation(np.random.default_rng(5))  # of the body, in voxels
-
-
-def level(index):
-    """Of the body, in voxels: negative inside, about a distance."""
-    q = (np.asarray(index) - CENTRE) @ AXES / RADII
-    r = np.linalg.norm(q, axis=-1)
-    return (r - 1) * r / np.maximum(np.linalg.norm(q / RADII, axis=-1), 1e-9)
-
-
-def indices():
-    """[z, y, x, 3]"""
-    return np.stack(np.meshgrid(*map(np.arange, SIZE), indexing="ij"), -1).transpose(2, 1, 0, 3)
-
-
-def image():
-    """[z, y, x]: the body, on a ramp that tells every voxel from its neighbours."""
-    return (np.where(level(indices()) < 0, 150, 10) + indices() @ (1, 2, 3)).astype(np.uint8)
 
 
 def draw(number):
@@ -73,59 +43,11 @@ def draw(number):
         steps = rotation(rng) @ steps
     way = rng.normal(size=3)
     origin = way / np.linalg.norm(way) * 10 ** rng.uniform(-1, 7)
-    return Lattice(steps * spacing, origin, str(rng.choice(["um", "mm", "m", "nm", "cm"]))), rng
-
-
-def mesh_of_body():
-    """An icosahedron's faces, cut in four 4 times, on the body; in voxels."""
-    golden = (1 + 5 ** 0.5) / 2
-    vertices = [np.roll((0, a, b * golden), n) for n in range(3) for a in (-1, 1) for b in (-1, 1)]
-    vertices = [v / np.linalg.norm(v) for v in vertices]
-    near = 1.2
-    faces = [(a, b, c) for a in range(12) for b in range(a) for c in range(b)
-             if max(np.linalg.norm(vertices[p] - vertices[q]) for p, q in ((a, b), (b, c), (c, a))) < near]
-    for _ in range(4):
-        middle, cut = {}, []
-        for face in faces:
-            for p, q in zip(face, face[1:] + face[:1]):
-                if (min(p, q), max(p, q)) not in middle:
-                    middle[min(p, q), max(p, q)] = len(vertices)
-                    between = vertices[p] + vertices[q]
-                    vertices.append(between / np.linalg.norm(between))
-            m = [middle[min(p, q), max(p, q)] for p, q in zip(face, face[1:] + face[:1])]
-            cut += [(face[0], m[0], m[2]), (face[1], m[1], m[0]), (face[2], m[2], m[1]), tuple(m)]
-        faces = cut
-    return np.array(vertices) * RADII @ AXES.T + CENTRE, np.array(faces, np.uint32)
-
-
-MESH = mesh_of_body()
-VOXELS_OF_BODY = 0.4  # of the lattice's thinnest direction: edge of the level set's voxels
-
-
-def write_body(path, lattice):
-    """The body as a level set in the world, about a round place near it, for its vertices have single precision."""
-    vertices, faces = MESH
-    h = VOXELS_OF_BODY * np.linalg.svd(lattice.steps, compute_uv=False)[-1]
-    near = np.round(lattice.world(CENTRE) / h)
-    transform = pyopenvdb.createLinearTransform(h)
-    grid = pyopenvdb.FloatGrid.createLevelSetFromPolygons(
-        points=(lattice.world(vertices) - near * h).astype(np.float32), triangles=outward(vertices, faces),
-        transform=transform, halfWidth=3)
-    moved = np.diag([h, h, h, 1.0])
-    moved[3, :3] = near * h
-    grid.transform = pyopenvdb.createLinearTransform(moved.tolist())
-    grid.name = "surface"
-    pyopenvdb.write(str(path), grids=[grid])
-
-
-def outward(vertices, faces):
-    a, b, c = (vertices[faces[:, n]] for n in range(3))
-    turned = np.einsum("ni,ni->n", np.cross(b - a, c - a), a - CENTRE) < 0
-    return np.where(turned[:, None], faces[:, ::-1], faces)
+    return Lattice(steps * spacing, origin, str(rng.choice(["um", "mm", "m", "nm", "cm"])))
 
 
 # By name: what the file is called, how it is written and read without covol, the lattice that it can hold, and its units.
-Format = collections.namedtuple("Format", "ending write read hold units options", defaults=[{}])
+Format = collections.namedtuple("Format", "ending write read hold units")
 ANY, UPRIGHT, SPACING = (lambda g: g), Lattice.upright, (lambda g: g.upright(origin=False))
 FORMATS = {
     "NIfTI, sform": Format(".nii.gz", files.write_nifti, files.read_nifti, ANY, ("um", "mm", "m")),
@@ -194,8 +116,7 @@ class Trial:
 
     def __init__(self, folder, number, name):
         self.folder, self.name, self.format = folder, name, FORMATS[name]
-        drawn, self.rng = draw(number)
-        # By a name's own generator: the order of formats changes nothing.
+        drawn = draw(number)
         self.rng = np.random.default_rng([47, number, list(FORMATS).index(name)])
         drawn.unit = drawn.unit if drawn.unit in self.format.units else str(self.rng.choice(self.format.units))
         self.lattice = self.format.hold(drawn)
