@@ -67,6 +67,7 @@ def ras(lattice):
 
 def write_nifti(path, data, lattice, form="s"):
     image = nibabel.Nifti1Image(data.transpose(2, 1, 0), None)
+    image.header.set_zooms(lattice.spacing)
     image.header.set_xyzt_units({"um": "micron", "m": "meter"}.get(lattice.unit, lattice.unit))
     image.set_sform(ras(lattice) if form == "s" else np.eye(4), code=1 if form == "s" else 0)
     if form == "q":

@@ -155,19 +155,24 @@ class Trial:
         """A mask of the body on the lattice."""
         body = self.folder / "body.vdb"
         write_body(body, self.lattice)
-        ending, (read, hold) = list(MASKS.items())[self.rng.integers(len(MASKS))]
+        able = [ending for ending, (_, hold) in MASKS.items() if held(lattice, hold) or self.rng.random() < 0.1]
+        ending = str(self.rng.choice(able))
+        read, hold = MASKS[ending]
         mask = self.folder / ("mask" + ending)
         done = subprocess.run([PROGRAM, "mask", body, "--like", self.path, "-o", mask], capture_output=True, text=True)
         if not held(lattice, hold):
             assert "covol: warning" in done.stderr or done.returncode == 3, done.stderr
             return "not held by " + ending
         if done.returncode == 3:
-            assert "single precision" in done.stderr, done.stderr
-            assert ending == ".nii.gz" or ending == ".tif", done.stderr
-            return "too far for " + ending
+            assert ending == ".nii.gz" and "single precision" in done.stderr, done.stderr
+            return "refused as " + ending
         assert done.returncode == 0, done.stderr
         data, written = read(mask)
-        assert shift(written, lattice) < 0.01, (shift(written, lattice), done.stderr)
+        moved = shift(written, lattice)
+        if ending == ".nii.gz" and "single precision" in done.stderr:
+            assert 0.005 < moved < 0.6, moved
+            return "told of as " + ending
+        assert moved < 0.01, (moved, done.stderr)
         levels = level(self.lattice.index(lattice.world(indices())))
         wrong = (data > 0) != (levels < 0)
         assert not wrong[np.abs(levels) > 0.1 * VOXELS_OF_BODY].any(), (wrong.sum(), np.abs(levels[wrong]).max())

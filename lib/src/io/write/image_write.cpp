@@ -1,10 +1,12 @@
 // Images to files.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <string>
 
 #include "base/file.h"
+#include "base/number.h"
 #include "covol/error.h"
 #include "covol/image.h"
 #include "covol/image_stream.h"
@@ -60,13 +62,51 @@ bool is_ome_tiff(const std::string& path) {
     return detail::extension(name) == ".ome";
 }
 
+/// How far single precision moves a voxel at most, in voxels.
+double moved_by_rounding(const ImageGeometry& geometry) {
+    double most = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3 index, rounded;
+        for (int a = 0; a < 3; ++a) index[a] = (corner >> a & 1) != 0 ? geometry.size[a] - 1 : 0;
+        for (int a = 0; a < 3; ++a) {
+            rounded[a] = double(float(geometry.origin[a]));
+            for (int b = 0; b < 3; ++b)
+                rounded[a] += double(float(geometry.direction[a][b] * geometry.spacing[b])) * index[b];
+        }
+        const Vec3 found = geometry.world_to_index(rounded);
+        for (int a = 0; a < 3; ++a) most = std::max(most, std::abs(found[a] - index[a]));
+    }
+    return most;
+}
+
+/// NIfTI-1 has single precision: far from 0 that is not enough.
+/// @throws Error Unsupported where voxels would lie where others are
+void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
+    constexpr double kTold = 0.01, kMost = 0.5;  // voxels
+    const double moved = moved_by_rounding(geometry);
+    const std::string what = path + ": NIfTI-1 keeps places in single precision, which moves voxels by up to " +
+                             detail::number(moved) + " of their size so far from 0";
+    if (moved > kMost) throw Error(Errc::Unsupported, what + "; write .nrrd or .mha, which keep them");
+    if (moved > kTold) run.warn(what + "; .nrrd and .mha keep them");
+}
+
 /// What of the geometry such a file has no place for.
 void warn_of_losses(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
+    const std::string extension = detail::extension(path);
+    const bool is_tiff = extension == ".tif" || extension == ".tiff";
+    if ((is_tiff || extension == ".zarr") && !geometry.is_axis_aligned())
+        run.warn(path + ": the image's axes are turned, and " +
+                 (!is_tiff            ? "OME-Zarr 0.4"
+                  : is_ome_tiff(path) ? "OME-TIFF"
+                                      : "TIFF") +
+                 " has no place for that: the labels lie on its voxels, but elsewhere in the world; write .nrrd or "
+                 ".nii.gz to keep the direction");
+    if (extension == ".nii" || extension == ".nii.gz") check_precision(path, geometry, run);
     if (is_ome_tiff(path) && geometry.origin != Vec3{0, 0, 0})
         run.warn(path +
                  ": OME-TIFF has no place for the image's origin: its first voxel lies at 0 there; .tif, .nrrd "
                  "and others keep it");
-    if (detail::extension(path) == ".npy")
+    if (extension == ".npy")
         run.warn(path + ": NumPy's format has the voxels alone: neither spacing nor unit, origin and direction");
 }
 

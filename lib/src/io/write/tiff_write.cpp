@@ -12,17 +12,21 @@
 namespace covol::detail {
 namespace {
 
+/// What TIFF keeps of a spacing: libtiff has single precision.
+double resolution(double spacing) { return double(float(1.0 / spacing)); }
+
 /// @param range  what ImageJ shows from black to white; otherwise masks of ones are black among 255
 std::string imagej_description(const ImageGeometry& geometry, const std::optional<std::array<double, 2>>& range) {
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
     if (geometry.spacing_known) description += "spacing=" + shortest(geometry.spacing[2]) + "\n";
-    // ImageJ tells the origin in voxels, as the voxel that lies at 0.
-    for (std::size_t a = 0; a < 3; ++a)
+    // ImageJ tells the origin in voxels, as the voxel that lies at 0: in those that it will read.
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double per_length = a < 2 ? resolution(geometry.spacing[a]) : 1 / geometry.spacing[a];
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)
-            description +=
-                std::string(1, "xyz"[a]) + "origin=" + shortest(-geometry.origin[a] / geometry.spacing[a]) + "\n";
+            description += std::string(1, "xyz"[a]) + "origin=" + shortest(-geometry.origin[a] * per_length) + "\n";
+    }
     if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
     if (range) description += "min=" + shortest((*range)[0]) + "\nmax=" + shortest((*range)[1]) + "\n";
     return description;
@@ -92,8 +96,8 @@ void write_tiff(const std::string& path, const PixelSource& source, bool ome, co
             TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, std::uint32_t(parts.part[1]));
         }
         TIFFSetField(t, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
-        TIFFSetField(t, TIFFTAG_XRESOLUTION, 1.0 / geometry.spacing[0]);
-        TIFFSetField(t, TIFFTAG_YRESOLUTION, 1.0 / geometry.spacing[1]);
+        TIFFSetField(t, TIFFTAG_XRESOLUTION, resolution(geometry.spacing[0]));
+        TIFFSetField(t, TIFFTAG_YRESOLUTION, resolution(geometry.spacing[1]));
         if (first) TIFFSetField(t, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
     };
     const std::uint64_t per_page = parts.per_page();

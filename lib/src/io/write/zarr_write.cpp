@@ -295,10 +295,6 @@ private:
 
 void write_ome_zarr(const std::string& folder, const std::string& name, const PixelSource& source,
                     const RunContext& run) {
-    if (!source.geometry().is_axis_aligned())
-        run.warn(name +
-                 ": the image's axes are turned, and OME-Zarr 0.4 has no place for that: the labels lie on its voxels, "
-                 "but elsewhere in the world; write .nrrd or .nii.gz to keep the direction");
     PyramidWriter(folder, source, run).write(name);
 }
 
