@@ -15,8 +15,8 @@ LAYERS = [
     {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"io/dicom": [], "io/reader": [], "io/write": [], "io/points": ["points_text", "point_array", "mark_kinds"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
-    {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"], "cloud/poisson": []},
+    {"io/dicom": [], "io/reader": [], "io/write": ["program_marks"], "io/points": ["points_text", "point_array", "mark_kinds"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"io/points/programs": [], "points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"], "cloud/poisson": []},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "intensity"], "render/draw": ["picture"]},
     {"io/read": ["image_files"], "guess": ["guess", "guess_correction"], "cloud/surface": ["cloud_surface"], "report": ["report_page", "page_data"], "render": ["render"]},
@@ -50,7 +50,7 @@ LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 # Readers and writers, which the core does without: COVOL_IO.
-READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/read", "io/reader", "io/study", "io/write"}
+READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 
 

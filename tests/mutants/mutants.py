@@ -48,7 +48,7 @@ READERS = {
     "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
     "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/hdf5_test"],
     "io/points/fiji_roi.cpp": ["points_test", "point_formats_test"],
-    "io/points/zip.cpp": ["points_test", "point_formats_test"],
+    "io/points/programs/zip.cpp": ["points_test", "point_formats_test"],
     "io/points/point_columns.cpp": ["points_test", "point_formats_test", "points_check_test"],
     "io/points/point_scans.cpp": ["point_formats_test", "point_normals_test"],
     "io/points/slicer_markups.cpp": ["points_test", "point_formats_test"],

@@ -79,23 +79,26 @@ struct Contours {
     std::vector<Vec3> between;                  ///< on the interpolated surface between slices and on the caps: a guess
     std::shared_ptr<const ContourSolid> solid;  ///< null without a closed contour
     std::size_t closed = 0, open = 0;           ///< lines
-    std::size_t slices = 0;                     ///< with closed contours
+    std::size_t slices = 0;                     ///< with closed contours; planes of a network
     bool flat = false;  ///< all marks lie on one of several slices, and no thickness was given: the body is a guess
-    double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
-    std::string summary;        ///< one line for people
+    bool is_network = false;  ///< planes of several directions: no solid, `along` is thinned, and the sides are told
+    std::vector<Vec3> inside, outside;  ///< of a network: places in its planes, by the even-odd rule in each
+    double slice_distance = 0;          ///< between neighbouring ones of them, the median; world units
+    std::string summary;                ///< one line for people
 };
 
 /// Joins and densifies the lines of one or several clouds (several belong to one structure), and closes what lies
 /// between the slices.
 ///
-/// The plane of a line is found from its marks: an index coordinate that is constant along it. The body is built from
-/// the plane with the most marks; lines in other planes, and open lines, are joined along themselves only. Points that
-/// belong to no line count as marks. A closed line of fewer than three distinct marks is taken as open.
-/// @throws Error InvalidOptions; InvalidInput (no line; a line in none of the planes; a line outside the image: both
+/// The plane of a line is found from its marks: an index coordinate that is constant along it, else the plane that they
+/// lie closest to. Closed lines in parallel planes of any direction make the solid; those of several directions are a
+/// network. Open lines are joined along themselves only. Points that belong to no line count as marks. A closed line of
+/// fewer than three distinct marks is taken as open.
+/// @throws Error InvalidOptions; InvalidInput (no line; a line that lies in no plane; a line outside the image: both
 ///         name it).
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,
                                          const ContourOptions& options, const RunContext& run = {});
-/// Clouds in world units without an image: the slices lie across a world axis.
+/// Clouds in world units without an image.
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options,
                                          const RunContext& run = {});
 

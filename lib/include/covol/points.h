@@ -85,6 +85,7 @@ struct PointCloud {
 /// - .xyz .txt .pts .asc .csv .tsv: columns, by name where there is a header: x, y, z; slice, contour, x_px, y_px;
 ///   napari's points and shapes; Fiji's Results (X, Y, Slice)
 /// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
+/// - .csl: sections of bodies in planes of any direction
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
 /// Normals: nx, ny, nz of PLY and of columns, columns 4 to 6 of six without names where all are unit vectors, normal_x,
 /// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is

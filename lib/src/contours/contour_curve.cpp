@@ -68,4 +68,21 @@ std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed,
     return curve;
 }
 
+std::vector<Vec3> evenly_along(const std::vector<Vec3>& curve, bool closed, double step) {
+    double length = 0, next = 0;
+    std::vector<Vec3> kept;
+    const std::size_t edges = closed ? curve.size() : curve.size() - 1;
+    for (std::size_t n = 0; n < edges; ++n) {
+        const Vec3 &a = curve[n], &b = curve[(n + 1) % curve.size()];
+        const double edge = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+        for (; next < length + edge; next += step) {
+            const double t = (next - length) / edge;
+            kept.push_back({a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])});
+        }
+        length += edge;
+    }
+    if (kept.empty()) kept.push_back(curve.front());
+    return kept;
+}
+
 }  // namespace covol::detail

@@ -10,6 +10,7 @@
 #include "contours/contour_curve.h"
 #include "contours/contour_solid.h"
 #include "contours/heuristics.h"
+#include "contours/sections.h"
 #include "covol/error.h"
 
 namespace covol {
@@ -25,7 +26,8 @@ constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
 struct Line {
-    std::vector<Vec3> index;  ///< marks as voxels
+    std::vector<Vec3> index;  ///< marks as voxels, or along a frame of the contours' own
+    std::vector<Vec3> world;
     bool closed = true;
     std::string name;  ///< for messages: file, and the line's own name
     std::array<bool, 3> constant{false, false, false};
@@ -46,6 +48,7 @@ public:
     Densifier(const ImageGeometry* geometry, const ContourOptions& options, const RunContext& run)
         : geometry_(geometry != nullptr ? *geometry : ImageGeometry{}),
           has_image_(geometry != nullptr),
+          along_image_(geometry != nullptr),
           options_(options),
           run_(run) {}
 
@@ -57,8 +60,13 @@ public:
                             ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
                             "give those as points");
         choose_plane();
-        join_lines();
-        make_solid();
+        if (!lies_in_family()) choose_tilted_plane();
+        if (lies_in_family()) {
+            join_lines();
+            make_solid();
+        } else {
+            make_network();
+        }
         summarise();
         return std::move(result_);
     }
@@ -68,6 +76,10 @@ private:
     void check_inside(const Line& line) const;
     void find_planes(Line& line) const;
     void choose_plane();
+    [[nodiscard]] bool lies_in_family() const;
+    void choose_tilted_plane();
+    [[nodiscard]] std::vector<Vec3> curve_through(const Line& line, const std::vector<Vec3>& marks) const;
+    void make_network();
     void join_lines();
     [[nodiscard]] std::vector<Vec3> carried_beyond_sides(std::vector<Vec3> curve) const;
     void make_solid();
@@ -79,6 +91,7 @@ private:
 
     ImageGeometry geometry_;
     bool has_image_;
+    bool along_image_;        // the frame's axes are the image's
     bool has_loose_ = false;  // marks that belong to no line
     ContourOptions options_;
     const RunContext& run_;
@@ -102,6 +115,7 @@ void Densifier::read(const PointCloud& cloud) {
         }
         line.name = cloud.source + ": contour " + (from.name.empty() ? std::to_string(n + 1) : "'" + from.name + "'");
         line.index = without_repeats(line.index, from.closed);
+        for (const Vec3& p : line.index) line.world.push_back(geometry_.index_to_world(p));
         line.closed = from.closed && line.index.size() >= 3;
         if (has_image_) check_inside(line);
         find_planes(line);
@@ -143,12 +157,48 @@ void Densifier::find_planes(Line& line) const {
     const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
     const double tolerance = has_image_ ? kContours.same_slice : kContours.same_slice_of_extent * extent;
     for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= tolerance;
-    if (line.constant == std::array<bool, 3>{false, false, false}) {
+    if (line.constant != std::array<bool, 3>{false, false, false} || line.index.size() < 3) return;
+    const double off = detail::thickness_along(line.world, detail::plane_through(line.world).normal);
+    if (off > tolerance * geometry_.smallest_spacing()) {
         std::ostringstream text;
-        text << line.name << ": expected marks on one slice, an index coordinate that is constant; got ("
-             << high[0] - low[0] << ", " << high[1] - low[1] << ", " << high[2] - low[2] << ") voxels of extent";
+        text << line.name << ": expected marks in one plane, of any direction; they reach " << off
+             << " across the plane that they lie closest to";
         throw Error(Errc::InvalidInput, text.str());
     }
+}
+
+/// Whether all closed lines lie across the frame's axis.
+bool Densifier::lies_in_family() const {
+    return std::all_of(lines_.begin(), lines_.end(),
+                       [&](const Line& line) { return !line.closed || line.constant[frame_.axis()]; });
+}
+
+/// Parallel planes of another direction than the image's: a frame of their own, beside which the image's end is no
+/// plane.
+void Densifier::choose_tilted_plane() {
+    const Line* longest = nullptr;
+    for (const Line& line : lines_)
+        if (line.closed && (longest == nullptr || line.index.size() > longest->index.size())) longest = &line;
+    const detail::SectionPlane plane = detail::plane_through(longest->world);
+    const double spacing = geometry_.smallest_spacing();
+    const auto is_across = [&](const Line& line) {
+        const double tolerance = has_image_ ? kContours.same_slice * spacing
+                                            : kContours.same_slice_of_extent * detail::extent_of(line.world);
+        return detail::thickness_along(line.world, plane.normal) <= tolerance;
+    };
+    if (!std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) { return !line.closed || is_across(line); }))
+        return;
+    ImageGeometry tilted = geometry_;
+    tilted.origin = plane.origin;
+    tilted.spacing = {spacing, spacing, spacing};
+    for (int a = 0; a < 3; ++a) tilted.direction[a] = {plane.u[a], plane.v[a], plane.normal[a]};
+    for (Line& line : lines_) {
+        line.constant = {false, false, is_across(line)};
+        for (std::size_t n = 0; n < line.index.size(); ++n) line.index[n] = tilted.world_to_index(line.world[n]);
+    }
+    geometry_ = tilted;
+    along_image_ = false;
+    frame_ = SliceFrame(geometry_, 2);
 }
 
 /// The plane that most marks of closed lines lie in; a line that fits several counts for none.
@@ -201,14 +251,47 @@ std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const
     return curve;
 }
 
+std::vector<Vec3> Densifier::curve_through(const Line& line, const std::vector<Vec3>& marks) const {
+    return options_.curve == ContourCurve::Spline ? detail::centripetal_curve(marks, line.closed, options_.step)
+                                                  : marks;
+}
+
+/// Planes of several directions: marks along all lines, and places whose side the sections tell.
+void Densifier::make_network() {
+    std::vector<std::vector<Vec3>> curves, closed;
+    double length = 0;
+    for (const Line& line : lines_) {
+        curves.push_back(curve_through(line, line.world));
+        const std::vector<Vec3>& curve = curves.back();
+        for (std::size_t n = line.closed ? 0 : 1; n < curve.size(); ++n) {
+            const Vec3 &a = curve[n == 0 ? curve.size() - 1 : n - 1], &b = curve[n];
+            length += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+        }
+        ++(line.closed ? result_.closed : result_.open);
+        if (line.closed) closed.push_back(curve);
+    }
+    const double step = std::max(options_.step, length / kContours.network_marks);
+    for (std::size_t n = 0; n < lines_.size(); ++n) {
+        const std::vector<Vec3> evenly = detail::evenly_along(curves[n], lines_[n].closed, step);
+        result_.along.insert(result_.along.end(), evenly.begin(), evenly.end());
+    }
+    const double spacing = geometry_.smallest_spacing();
+    const std::vector<detail::Section> sections =
+        detail::sections_of(closed, has_image_ ? kContours.same_slice * spacing
+                                               : kContours.same_slice_of_extent * detail::extent_of(result_.marks));
+    detail::Sides sides = detail::sides_of(sections, options_.step);
+    result_.inside = std::move(sides.inside);
+    result_.outside = std::move(sides.outside);
+    result_.slices = sections.size();
+    result_.is_network = true;
+}
+
 void Densifier::join_lines() {
     for (const Line& line : lines_) {
         std::vector<Vec3> marks;
         for (const Vec3& p : line.index) marks.push_back(frame_.from_index(p));
-        std::vector<Vec3> curve = options_.curve == ContourCurve::Spline
-                                      ? detail::centripetal_curve(marks, line.closed, options_.step)
-                                      : marks;
-        if (has_image_ && line.closed && line.constant[frame_.axis()]) curve = carried_beyond_sides(curve);
+        std::vector<Vec3> curve = curve_through(line, marks);
+        if (along_image_ && line.closed && line.constant[frame_.axis()]) curve = carried_beyond_sides(curve);
         for (const Vec3& p : detail::subdivide(curve, line.closed, options_.step))
             result_.along.push_back(frame_.to_world(p));
         ++(line.closed ? result_.closed : result_.open);
@@ -342,7 +425,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const double distance = std::abs(slices[end].w - slices[before].w);
         slices[end].cap =
             std::max(compute_cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
-        if (!has_image_ || alone) return;
+        if (!along_image_ || alone) return;
         // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end
         // before.
         const double left =
@@ -359,7 +442,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         if (options_.thickness > 0) slices[0].cap = 0.5 * options_.thickness;
         const bool only_plane =
             std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis()]; });
-        const bool one_slice = has_image_ && geometry_.size[frame_.axis()] == 1;
+        const bool one_slice = along_image_ && geometry_.size[frame_.axis()] == 1;
         result_.flat = !(options_.thickness > 0) && only_plane && !one_slice && !has_loose_;
         return;
     }
@@ -372,8 +455,12 @@ void Densifier::summarise() {
     text << result_.marks.size() << " marks on " << result_.closed << " closed and " << result_.open
          << " open contours";
     if (result_.solid)
-        text << ", " << result_.slices << " slices across " << kAxisNames[frame_.axis()] << ", "
+        text << ", " << result_.slices << " slices across "
+             << (along_image_ || !has_image_ ? kAxisNames[frame_.axis()] : "an axis of their own") << ", "
              << result_.slice_distance << " apart";
+    if (result_.is_network)
+        text << " in " << result_.slices << " planes of several directions, which tell the side of "
+             << result_.inside.size() << " places inside and " << result_.outside.size() << " outside";
     text << ": " << result_.along.size() << " points along them, " << result_.between.size() << " between";
     result_.summary = text.str();
 }

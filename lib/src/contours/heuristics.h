@@ -18,6 +18,12 @@ struct ContoursHeuristics {
     double open_cells = heuristic("contours.open_cells", 6);
     /// [cells] That its flat end lies beyond the image's: a band's half width more than the domain goes on.
     double end_cells = heuristic("contours.end_cells", 10);
+    /// [count] Marks along contours in planes of several directions.
+    double network_marks = heuristic("contours.network_marks", 1500);
+    /// [count] Places of each side that a plane of them tells, at most.
+    double network_discs = heuristic("contours.network_discs", 64);
+    /// [of the section's extent] Around its contours, where its outside is told.
+    double network_around = heuristic("contours.network_around", 0.25);
 };
 COVOL_HEURISTICS ContoursHeuristics kContours{};
 

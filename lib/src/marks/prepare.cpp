@@ -80,9 +80,11 @@ public:
         if (!painted) add_outlines(marks, run);
         clean(marks, input, run);
         input.marks = marks.points;
-        input.options.contours = painted ? painted : join_contours(marks, input, run);
-        if (const auto& contours = input.options.contours)
+        input.joined = painted ? painted : join_contours(marks, input, run);
+        if (const auto& contours = input.joined)
             input.marks.insert(input.marks.end(), contours->marks.begin(), contours->marks.end());
+        const bool is_network = input.joined && input.joined->is_network;
+        if (!is_network) input.options.contours = input.joined;
         if (painted) input.count = input.marks.size();
         check_tag_distance(options_.tag_distance.value_or(0), input.marks);
         for (const Marks::Paint& paint : marks.paint)
@@ -90,6 +92,7 @@ public:
         input.options.inside = collect("`inside`", marks.inside, run);
         input.options.outside = collect("`outside`", marks.outside, run);
         add_paint_as_seeds(n, input.options, run);
+        if (is_network) add_network(*input.joined, marks, input.options);
         input.options.exterior_seeds.insert(input.options.exterior_seeds.end(), marks.exterior_seeds.begin(),
                                             marks.exterior_seeds.end());
         input.options.hints = std::move(marks.hints);
@@ -102,6 +105,18 @@ public:
 
 private:
     [[nodiscard]] double h() const { return marks_options_.contours.step; }
+
+    /// Its lines are marks, and its sections tell sides.
+    static void add_network(const Contours& network, Marks& marks, SegmentOptions& options) {
+        const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
+            list.insert(list.end(), more.begin(), more.end());
+        };
+        append(marks.points, network.along);
+        append(options.inside, network.inside);
+        append(options.outside, network.outside);
+        if (!marks.hints.normals.empty()) marks.hints.normals.resize(marks.points.size());
+        if (!marks.hints.to_sensor.empty()) marks.hints.to_sensor.resize(marks.points.size());
+    }
 
     /// Of the only view of the only painted image, which needs no common lattice; or null.
     std::shared_ptr<const Contours> own_contours(const Marks& marks, const RunContext& run) {

@@ -192,7 +192,7 @@ Json input_of(const StructureOutput& s) {
     json["points"]["count"] = s.count;
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
-        const Contours& contours = *s.result.report.resolved.contours;
+        const Contours& contours = *s.joined;
         json["contours"] = {{"paths", s.files.contours},      {"rules", s.contour_rules},
                             {"closed", contours.closed},      {"open", contours.open},
                             {"slices", contours.slices},      {"slice_distance", contours.slice_distance},

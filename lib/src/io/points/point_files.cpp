@@ -73,6 +73,7 @@ const std::vector<Format>& formats() {
                                           {".zip", parse_roi_zip},
                                           {".json", parse_markups},
                                           {".fcsv", parse_fcsv},
+                                          {".csl", parse_sections},
                                           {".landmarks", of_one<parse_landmarks>},
                                           {".lmk", of_one<parse_landmarks>},
                                           {".annot", of_one<parse_annotations>},

@@ -31,6 +31,12 @@ PointTable parse_markups(const std::string& path, const std::string& text, const
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by = {});
 /// c3d -landmarks-to-spheres: x y z label, in RAS; a label that is a word may come first.
 PointTable parse_landmarks(const std::string& path, const std::string& text);
+/// .csl, sections of bodies in planes of any direction: a header "CSLC", the numbers of planes and labels, and of each
+/// plane its number, the counts of its vertices and contours, A B C D of A x + B y + C z + D = 0, the vertices, and of
+/// each contour its count of vertices ("12", or "12h0" of a hole in contour 0), its label, and their numbers from 0.
+/// @param structures_by  "label": each label is a structure; empty: there may be only one
+PointTable parse_sections(const std::string& path, const std::string& text, const std::string& structures_by = {});
+
 /// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners are at integers.
 PointTable parse_annotations(const std::string& path, const std::string& text);
 

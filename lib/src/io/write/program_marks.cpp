@@ -5,7 +5,9 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "base/text.h"
 #include "covol/error.h"
@@ -43,11 +45,11 @@ std::string to_slicer(const std::vector<NamedMark>& marks, const ImageGeometry& 
                           {"label", marks[n].name},
                           {"position", geometry.index_to_world(marks[n].index)},
                           {"positionStatus", "defined"}});
-    const nlohmann::ordered_json file{
-        {"@schema",
-         "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/"
-         "markups-schema-v1.0.3.json#"},
-        {"markups", {{{"type", "Fiducial"}, {"coordinateSystem", "LPS"}, {"controlPoints", points}}}}};
+    nlohmann::ordered_json file;
+    file["@schema"] =
+        "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/"
+        "markups-schema-v1.0.3.json#";
+    file["markups"].push_back({{"type", "Fiducial"}, {"coordinateSystem", "LPS"}, {"controlPoints", points}});
     return file.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 

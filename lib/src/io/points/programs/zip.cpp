@@ -1,4 +1,4 @@
-#include "io/points/zip.h"
+#include "io/points/programs/zip.h"
 
 #include <zlib.h>
 

@@ -6,7 +6,7 @@
 #include "io/points/bytes.h"
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
-#include "io/points/zip.h"
+#include "io/points/programs/zip.h"
 
 // Layout and meaning: ij/io/RoiDecoder.java and ij/gui/PointRoi.java of ImageJ 1.54.
 //

@@ -1,0 +1,45 @@
+#pragma once
+#include <vector>
+
+#include "contours/slice_field.h"
+#include "covol/fwd.h"
+
+namespace covol::detail {
+
+/// A plane of any direction, with right-angled coordinates in it.
+struct SectionPlane {
+    Vec3 origin{0, 0, 0}, u{1, 0, 0}, v{0, 1, 0}, normal{0, 0, 1};  ///< unit, right-handed
+
+    [[nodiscard]] double height(const Vec3& p) const;  ///< along the normal
+    [[nodiscard]] Vec2 flat(const Vec3& p) const;
+    [[nodiscard]] Vec3 world(const Vec2& p) const;
+};
+
+/// The plane that the points lie closest to, by least squares. @pre three or more
+[[nodiscard]] SectionPlane plane_through(const std::vector<Vec3>& points);
+
+/// How far along a direction the points reach.
+[[nodiscard]] double thickness_along(const std::vector<Vec3>& points, const Vec3& direction);
+
+/// The longest side of their box.
+[[nodiscard]] double extent_of(const std::vector<Vec3>& points);
+
+/// The closed contours of one plane.
+struct Section {
+    SectionPlane plane;
+    std::vector<Polygon> polygons;
+};
+
+/// Contours by plane: those that lie within `tolerance` of one share it.
+[[nodiscard]] std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance);
+
+/// Places whose side the sections tell by the even-odd rule.
+struct Sides {
+    std::vector<Vec3> inside, outside;
+};
+/// The centres of discs in the planes that no contour meets, the largest first, none within another: they tell where a
+/// section's parts and holes lie with few places.
+/// @param cell  of the grid that they are looked for on, and the smallest disc's radius
+[[nodiscard]] Sides sides_of(const std::vector<Section>& sections, double cell);
+
+}  // namespace covol::detail
