@@ -52,7 +52,7 @@ def image(value, spacing=None, origin=None, direction=None, affine=None, name="i
 def from_affine(affine):
     """Spacing, origin and direction (LPS) of an affine matrix that maps voxels (i, j, k) to RAS, as nibabel has it.
 
-    Raises Error where its axes are not perpendicular.
+    Raises Error where it is no 4 x 4 matrix, or an axis has no length.
     """
     matrix = np.asarray(affine, float)
     if matrix.shape != (4, 4):
