@@ -110,15 +110,15 @@ class Columns(TwoBalls):
     def test_lines_keep_together(self):
         rows = []
         for name, middle in (("left", LEFT), ("right", RIGHT)):
-            for k in range(-3, 4):
-                r = math.sqrt(RADIUS ** 2 - k * k)
-                rows += [[name, int(middle[2] + 0.5) + k, 1, middle[0] + r * math.cos(t), middle[1] + r * math.sin(t)]
+            for k in range(17, 23):
+                r = math.sqrt(RADIUS ** 2 - (k - middle[2]) ** 2)
+                rows += [[name, k, 1, middle[0] + r * math.cos(t), middle[1] + r * math.sin(t)]
                          for t in (math.pi * n / 8 for n in range(16))]
         table = self.write("outlines.csv", ["cell", "slice", "contour", "x_px", "y_px"], rows)
         report = self.report("segment", self.scene, "--contours", table, "--structure-column", "cell", "-o", "s.vdb")
         for one in report["structures"]:
-            self.assertEqual(one["input"]["contours"]["closed"], 7)
-            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.1)
+            self.assertEqual(one["input"]["contours"]["closed"], 6)
+            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.25)  # of seven voxels across
 
     def test_what_does_not_fit_is_told(self):
         table = self.write("both.csv", ["x", "y", "z", "cell"], [[*to_world(p), name] for name, p in self.mixed()])
@@ -132,27 +132,34 @@ class Columns(TwoBalls):
 
 
 class Suggestions(TwoBalls):
+    """Where the image has no edge all that is far from the marks rests on nothing."""
+
+    def half_marked(self):
+        image, half = self.inputs / "grey.nrrd", self.inputs / "half.xyz"
+        write_nrrd(image, (SIZE,) * 3, bytes(
+            200 if k < RIGHT[2] and math.dist((i, j, k), RIGHT) < RADIUS else 20
+            for k in range(SIZE) for j in range(SIZE) for i in range(SIZE)))
+        write_xyz(half, [to_world(p) for p in on_ball(RIGHT, 300) if p[2] < RIGHT[2] + 0.5])
+        return "segment", image, "--points", half, "--rho", 0, "-o", "s.vdb"
+
     def test_programs_open_them_where_they_lie(self):
-        half = self.inputs / "half.xyz"
-        write_xyz(half, [to_world(p) for p in self.marks["left"] if p[2] < LEFT[2]])
-        run = ("segment", self.scene, "--points", half, "-o", "s.vdb", "--suggest", 2)
+        run = (*self.half_marked(), "--suggest", 2)
+        self.refuse(*run, "--suggestions", "s.txt", code=3, says=".mrk.json")
         for name, tolerance in (("n.csv", 1e-9), ("s.mrk.json", 1e-9), ("f.roi", 0.51)):
             with self.subTest(name):
                 places = self.report(*run, "--suggestions", name)["evidence"]["suggestions"]
-                self.assertEqual(len(places), 2)
+                self.assertGreater(len(places), 0)
                 self.run_covol("convert", name, "back.csv", "--like", self.scene, "--quiet")
-                rows = list(csv.reader((self.out / "back.csv").read_text().splitlines()))[1:]
-                self.assertEqual(len(rows), 2)
+                lines = [line for line in (self.out / "back.csv").read_text().splitlines() if not line.startswith("#")]
+                rows = list(csv.reader(lines[1:]))
+                self.assertEqual(len(rows), len(places))
                 for row, place in zip(rows, places):
                     for found, true in zip(map(float, row), place["world"]):
                         self.assertLessEqual(abs(found - true), tolerance * H + 1e-6)
-        self.refuse(*run[:-2], "--suggestions", self.inputs / "s.txt", code=3, says=".mrk.json")
 
     def test_three_where_no_number_is_given(self):
-        half = self.inputs / "half.xyz"
-        write_xyz(half, [to_world(p) for p in self.marks["left"] if p[2] < LEFT[2]])
-        places = self.report("segment", self.scene, "--points", half, "-o", "s.vdb", "--suggestions", "n.csv")["evidence"]["suggestions"]
-        self.assertLessEqual(len(places), 3)
+        places = self.report(*self.half_marked(), "--suggestions", "n.csv")["evidence"]["suggestions"]
+        self.assertIn(len(places), (1, 2, 3))
         self.assertEqual(len((self.out / "n.csv").read_text().splitlines()), len(places) + 1)
 
 

@@ -15,7 +15,7 @@ LAYERS = [
     {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"io/dicom": [], "io/reader": [], "io/write": ["program_marks"], "io/points": ["points_text", "point_array", "mark_kinds"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"io/dicom": [], "io/reader": [], "io/write": ["program_marks"], "io/points": ["points_text", "point_array", "mark_kinds", "point_structures"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"io/points/programs": [], "points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"], "cloud/poisson": []},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "intensity"], "render/draw": ["picture"]},

@@ -81,10 +81,10 @@ struct Contours {
     std::size_t closed = 0, open = 0;           ///< lines
     std::size_t slices = 0;                     ///< with closed contours; planes of a network
     bool flat = false;  ///< all marks lie on one of several slices, and no thickness was given: the body is a guess
-    bool is_network = false;  ///< planes of several directions: no solid, `along` is thinned, and the sides are told
+    double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
+    std::string summary;        ///< one line for people
+    bool is_network = false;    ///< planes of several directions: no solid, `along` is thinned, and the sides are told
     std::vector<Vec3> inside, outside;  ///< of a network: places in its planes, by the even-odd rule in each
-    double slice_distance = 0;          ///< between neighbouring ones of them, the median; world units
-    std::string summary;                ///< one line for people
 };
 
 /// Joins and densifies the lines of one or several clouds (several belong to one structure), and closes what lies

@@ -116,7 +116,6 @@ struct StructureFacts : MarksOrigin {
     std::optional<CloudCleanupReport> cleanup;  ///< where something was to be done
     std::vector<std::pair<std::string, PaintedLabel>> paint;  ///< paths, and what the paint says
     double contour_seconds = 0;                               ///< that densify() took
-    std::shared_ptr<const Contours> joined;                   ///< contours, a network too; null without any
 };
 
 /// What segment() and reconstruct() take of one structure.

@@ -35,8 +35,6 @@ struct ReadPointsOptions {
     double scale = 1;                         ///< Multiplies lengths (not voxels): 0.001 for micrometres to mm.
     int channels = 1;                         ///< z / channels is the slice: Fiji counts a multi-point's positions
                                               ///< through a hyperstack's channels too. Points in voxels alone.
-    std::string structure_column;             ///< What names the structure of each mark: a table's column, "group" or
-                                              ///< "counter" of Fiji, "label" or "node" of 3D Slicer. Empty: nothing.
 };
 
 template <>
@@ -51,8 +49,7 @@ inline constexpr auto kOptions<ReadPointsOptions> = std::tuple{
     Option{"points_scale", &ReadPointsOptions::scale, kPositive, Group::ReadingMarks,
            "multiplies the points' lengths, 0.001 for micrometres to mm"},
     Option{"points_channels", &ReadPointsOptions::channels, between(1, 1000), Group::ReadingMarks,
-           "channels of the hyperstack that a Fiji multi-point was clicked in"},
-    Option{"structure_column", &ReadPointsOptions::structure_column}};
+           "channels of the hyperstack that a Fiji multi-point was clicked in"}};
 
 /// An ordered line of marks: the points [begin, end) of a cloud, as a person clicked them along a border.
 struct MarkLine {
@@ -73,19 +70,12 @@ struct PointCloud {
     bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
     std::string source;                    ///< path, for messages
     std::string rule;                      ///< how coordinates were understood, one line for people
-    std::string unit;                      ///< of lengths, where the file names one and no scale was given; else empty
-    std::vector<std::string> structures;   ///< named by ReadPointsOptions::structure_column, in the file's order
-    std::vector<std::uint32_t> structure;  ///< of each point, one of them; empty where none were asked for
 };
-
-/// The marks of one of the cloud's structures, with their lines; none where there is no such structure.
-[[nodiscard]] COVOL_API PointCloud of_structure(const PointCloud& cloud, const std::string& name);
 
 /// Reads, by the name's end:
 /// - .xyz .txt .pts .asc .csv .tsv: columns, by name where there is a header: x, y, z; slice, contour, x_px, y_px;
 ///   napari's points and shapes; Fiji's Results (X, Y, Slice)
 /// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
-/// - .csl: sections of bodies in planes of any direction
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
 /// Normals: nx, ny, nz of PLY and of columns, columns 4 to 6 of six without names where all are unit vectors, normal_x,
 /// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is

@@ -4,6 +4,11 @@
 #include "io/pixels/raw_image.h"
 
 namespace covol {
+namespace {
+
+const std::string kUnitNote = "; lengths in ";
+
+}  // namespace
 
 Vec3 detail::to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry) {
     const Vec3& h = geometry.spacing;
@@ -18,17 +23,21 @@ Vec3 detail::to_world(PointSpace space, const Vec3& p, const ImageGeometry& geom
 std::vector<Vec3> to_world(const PointCloud& cloud) {
     if (cloud.space != PointSpace::World)
         throw Error(Errc::InvalidInput,
-                    cloud.source +
+                    "to_world: " + cloud.source +
                         ": the points are in an image's own frame, and there is no image; give "
                         "one, or `points_space = world` for points in lengths",
                     "points_space");
     return cloud.points;
 }
 
+std::string detail::unit_note(const std::string& unit) { return kUnitNote + unit; }
+
 double detail::unit_factor(const PointCloud& cloud, const ImageGeometry& geometry) {
-    if (cloud.unit.empty()) return 1;
-    const double own = unit_in_metres(cloud.unit), other = unit_in_metres(geometry.unit);
-    return own > 0 && other > 0 && cloud.unit != geometry.unit ? own / other : 1;
+    const std::size_t note = cloud.rule.rfind(kUnitNote);
+    if (note == std::string::npos) return 1;
+    const std::string unit = cloud.rule.substr(note + kUnitNote.size());
+    const double own = unit_in_metres(unit), other = unit_in_metres(geometry.unit);
+    return own > 0 && other > 0 && unit != geometry.unit ? own / other : 1;
 }
 
 Vec3 detail::scaled(PointSpace space, const Vec3& p, double factor) {

@@ -22,7 +22,7 @@ public:
     const Painted& of(const PaintedImage& given, const RunContext& run) {
         const auto known = images_.find(&given);
         if (known != images_.end()) return known->second;
-        if (!image_) throw Error(Errc::InvalidInput, "expected an image that the paint belongs to");
+        if (!image_) throw Error(Errc::InvalidInput, "prepare_marks: expected an image that the paint belongs to");
         const std::string who = given.image.path().empty() ? "painted" : given.image.path();
         Painted painted = understand_painted(placed_on(given.image, *image_, force_), given.labels, given.options, run);
         for (const PaintedLabel& label : painted.labels) run.info(who + ": " + label.summary);
@@ -34,8 +34,8 @@ public:
     const PaintedLabel& label_of(const Marks::Paint& paint, const RunContext& run) {
         for (const PaintedLabel& label : of(*paint.image, run).labels)
             if (label.label == paint.label) return label;
-        throw Error(Errc::InvalidInput,
-                    paint.image->image.path() + ": label " + std::to_string(paint.label) + " is not there");
+        throw Error(Errc::InvalidInput, "prepare_marks: " + paint.image->image.path() + ": label " +
+                                            std::to_string(paint.label) + " is not there");
     }
 
 private:
@@ -80,11 +80,10 @@ public:
         if (!painted) add_outlines(marks, run);
         clean(marks, input, run);
         input.marks = marks.points;
-        input.joined = painted ? painted : join_contours(marks, input, run);
-        if (const auto& contours = input.joined)
-            input.marks.insert(input.marks.end(), contours->marks.begin(), contours->marks.end());
-        const bool is_network = input.joined && input.joined->is_network;
-        if (!is_network) input.options.contours = input.joined;
+        const std::shared_ptr<const Contours> contours = painted ? painted : join_contours(marks, input, run);
+        if (contours) input.marks.insert(input.marks.end(), contours->marks.begin(), contours->marks.end());
+        const bool is_network = contours && contours->is_network;
+        if (!is_network) input.options.contours = contours;
         if (painted) input.count = input.marks.size();
         check_tag_distance(options_.tag_distance.value_or(0), input.marks);
         for (const Marks::Paint& paint : marks.paint)
@@ -92,7 +91,7 @@ public:
         input.options.inside = collect("`inside`", marks.inside, run);
         input.options.outside = collect("`outside`", marks.outside, run);
         add_paint_as_seeds(n, input.options, run);
-        if (is_network) add_network(*input.joined, marks, input.options);
+        if (is_network) add_network(*contours, marks, input.options);
         input.options.exterior_seeds.insert(input.options.exterior_seeds.end(), marks.exterior_seeds.begin(),
                                             marks.exterior_seeds.end());
         input.options.hints = std::move(marks.hints);
@@ -208,7 +207,7 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     for (const Marks& marks : structures) names.push_back(marks.name);
     std::set<std::string> unique(names.begin(), names.end());
     if (names.empty() || unique.size() < names.size() || (names.size() > 1 && unique.contains("")))
-        throw Error(Errc::InvalidInput, "expected a name of its own for each of several structures");
+        throw Error(Errc::InvalidInput, "prepare_marks: expected a name of its own for each of several structures");
     number_labels(structures);
     const std::vector<std::string> grids = make_grid_names(names);
     Preparer preparer(std::move(structures), image, options, marks_options);

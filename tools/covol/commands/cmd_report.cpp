@@ -33,7 +33,7 @@ struct ReportPageJob {
     PointFlags points;
     ContourFlags contours;
     ImageFlags image;
-    int suggestions = kSuggestions;
+    int suggestions = kPageSuggestions;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Page);

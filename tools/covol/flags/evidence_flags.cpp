@@ -46,7 +46,7 @@ void EvidenceFlags::check(Outputs& outputs, const std::function<std::string(cons
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                               const RunContext& run) const {
     return assess_evidence(result, marks, image,
-                           suggestions.value_or(for_page || !marks_path.empty() ? kSuggestions : 0), run);
+                           suggestions.value_or(for_page || !marks_path.empty() ? kPageSuggestions : 0), run);
 }
 
 Json to_json(const Evidence& e) {

@@ -12,8 +12,8 @@
 
 namespace covol::tool {
 
-/// Slices that are suggested where the command line does not say how many.
-inline constexpr int kSuggestions = 3;
+/// Slices that a report page, or a file of suggestions, names where the command line does not say how many.
+inline constexpr int kPageSuggestions = 3;
 
 /// What the surface rests on: --evidence and --suggest; a report page has it, too.
 struct EvidenceFlags {

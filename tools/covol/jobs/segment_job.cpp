@@ -183,7 +183,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     if (with_image) {
         in_group(command, Group::ReadingMarks);
         command
-            .add_option("--structure-column", points.options.structure_column,
+            .add_option("--structure-column", structure_column,
                         "what names each mark's structure, of one file with several: a column, group or counter of "
                         "Fiji, label or node of 3D Slicer")
             ->type_name("NAME");

@@ -21,6 +21,7 @@ struct SegmentJob {
     ImageFlags image;
     PointFlags points;
     ContourFlags contours;
+    std::string structure_column;  ///< what names each mark's structure, in files of several; empty: files are of one
     PaintedFlags painted;
     SeedFlags seeds;
     GuessFlags guess;

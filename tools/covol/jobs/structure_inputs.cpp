@@ -1,9 +1,12 @@
 #include "jobs/structure_inputs.h"
 
 #include <algorithm>
+#include <functional>
 #include <iomanip>
+#include <map>
 #include <sstream>
 
+#include "covol/point_structures.h"
 #include "covol/study.h"
 #include "covol/study_files.h"
 #include "covol/vdb_io.h"
@@ -19,20 +22,43 @@ Marks& owner_of(std::vector<Marks>& structures, const std::string& flag, const s
     return *found;
 }
 
-/// A file whose marks name their structures belongs to each of them; read_marks() takes what is its own.
 void add_files(std::vector<Marks>& structures, const std::vector<std::string>& texts,
-               std::vector<std::string> MarkFiles::*kind, const ReadPointsOptions& reading) {
+               std::vector<std::string> MarkFiles::*kind) {
     for (const std::string& text : texts) {
         const Named file = split_name(text);
-        if (reading.structure_column.empty()) {
-            (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
-            continue;
-        }
-        if (!file.name.empty() || file.value == "-" || file.value.find("{frame}") != std::string::npos)
-            throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
-        for (const std::string& name : read_points(file.value, reading).structures)
-            (find_or_add_structure(structures, name).files.*kind).push_back(file.value);
+        (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
     }
+}
+
+using TakeCloud = std::function<void(Marks& owner, const std::string& file, const PointCloud& cloud)>;
+
+/// Files whose marks name their structures: hands the marks of each over.
+void share_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
+                 const TakeCloud& take) {
+    for (const std::string& text : texts) {
+        if (text == "-" || !split_name(text).name.empty())
+            throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
+        for (const auto& [name, cloud] : read_structures_of_points(text, job.structure_column, job.points.options))
+            take(find_or_add_structure(structures, name), text, cloud);
+    }
+}
+
+/// The same once the image is known. @returns the files of each structure, for reports
+std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::vector<Marks>& structures,
+                                                   const std::optional<ImageGeometry>& geometry,
+                                                   const RunContext& run) {
+    std::map<std::string, MarkFiles> files;
+    if (job.structure_column.empty()) return files;
+    share_files(job, job.points.paths, structures, [&](Marks& owner, const std::string& file, const PointCloud& cloud) {
+        add_points(owner, cloud, geometry, speaking_for(owner.name, structures.size(), run));
+        files[owner.name].points.push_back(file);
+    });
+    share_files(job, job.contours.paths, structures,
+                [&](Marks& owner, const std::string& file, const PointCloud& cloud) {
+                    add_contours(owner, cloud, geometry, speaking_for(owner.name, structures.size(), run));
+                    files[owner.name].contours.push_back(file);
+                });
+    return files;
 }
 
 /// Gives each seed to its structure; one without a name to all.
@@ -70,8 +96,13 @@ std::vector<Marks> structures_of(const SegmentJob& job,
     std::vector<Marks> structures;
     if (!job.study.empty())
         structures = marks_of(read_study(job.study), open_study_site(job.study, read_study_image(job.study).geometry));
-    add_files(structures, job.points.paths, &MarkFiles::points, job.points.options);
-    add_files(structures, job.contours.paths, &MarkFiles::contours, job.points.options);
+    if (job.structure_column.empty()) {
+        add_files(structures, job.points.paths, &MarkFiles::points);
+        add_files(structures, job.contours.paths, &MarkFiles::contours);
+    } else {
+        for (const auto* paths : {&job.points.paths, &job.contours.paths})
+            share_files(job, *paths, structures, [](Marks&, const std::string&, const PointCloud&) {});
+    }
     add_paint(structures, painted);
     for (const std::string& text : job.guess.paths) {
         const Named file = split_name(text);
@@ -128,10 +159,15 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
     if (image) geometry = image->geometry();
     const ReadMarksOptions reading = job.reading(run);
     std::optional<double> h;
+    const std::map<std::string, MarkFiles> shared = read_shared_files(job, structures, geometry, run);
     for (Marks& marks : structures) {
         const RunContext own = speaking_for(marks.name, structures.size(), run);
         const Stopwatch watch;
         read_marks(marks, geometry, reading, own);
+        if (const auto own_files = shared.find(marks.name); own_files != shared.end()) {
+            marks.files.points = own_files->second.points;
+            marks.files.contours = own_files->second.contours;
+        }
         warn_of_voxels(marks, image, reading.points, own);
         if (!image) thin_points(marks, job.cloud.inputs.options.most_points, own);
         session.add_seconds("read", watch.seconds());

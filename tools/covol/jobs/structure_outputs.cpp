@@ -192,11 +192,14 @@ Json input_of(const StructureOutput& s) {
     json["points"]["count"] = s.count;
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
-        const Contours& contours = *s.joined;
-        json["contours"] = {{"paths", s.files.contours},      {"rules", s.contour_rules},
-                            {"closed", contours.closed},      {"open", contours.open},
-                            {"slices", contours.slices},      {"slice_distance", contours.slice_distance},
-                            {"along", contours.along.size()}, {"between", contours.between.size()}};
+        json["contours"] = {{"paths", s.files.contours}, {"rules", s.contour_rules}};
+        if (const auto& contours = s.result.report.resolved.contours)  // else a network, whose lines are marks
+            json["contours"].update({{"closed", contours->closed},
+                                     {"open", contours->open},
+                                     {"slices", contours->slices},
+                                     {"slice_distance", contours->slice_distance},
+                                     {"along", contours->along.size()},
+                                     {"between", contours->between.size()}});
     }
     for (const auto& [path, paint] : s.paint) {
         Json entry = to_json(paint);

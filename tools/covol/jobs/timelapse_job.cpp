@@ -50,6 +50,8 @@ public:
     void run() {
         if (!job_.painted.paths.empty() || !job_.guess.paths.empty())
             throw UsageError("--painted, --guess: expected one image, got a time-lapse");
+        if (!job_.structure_column.empty())
+            throw UsageError("--structure-column: expected one image, got a time-lapse");
         frames_ = frames_of(job_);
         check();
         add_starts(job_, structures_, session_.run());

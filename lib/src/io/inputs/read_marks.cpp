@@ -5,33 +5,24 @@
 #include "covol/mark_kinds.h"
 #include "covol/mesh_io.h"
 #include "covol/points_text.h"
-#include "covol/safe_text.h"
 #include "covol/vdb_io.h"
 
 namespace covol {
 
 void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const ReadMarksOptions& options,
                 const RunContext& run) {
-    const auto read_kinds = [&](const std::string& path, const ReadPointsOptions& reading) {
+    const auto read_kinds = [&](const std::string& path) {
         run.check();
         return path == "-" && options.standard_input
-                   ? KindedPoints{parse_points(options.standard_input(), "standard input", reading), {}}
-                   : read_kinded_points(path, reading);
+                   ? KindedPoints{parse_points(options.standard_input(), "standard input", options.points), {}}
+                   : read_kinded_points(path, options.points);
     };
-    // Of a file of several structures those marks that are the structure's own.
-    const auto own = [&](const PointCloud& cloud) {
-        for (const std::string& name : cloud.structures)
-            if (safe_text(name) == marks.name) return of_structure(cloud, name);
-        return cloud;
-    };
-    const auto read = [&](const std::string& path) { return own(read_kinds(path, options.points).cloud); };
-    ReadPointsOptions of_seeds = options.points;
-    of_seeds.structure_column.clear();
+    const auto read = [&](const std::string& path) { return read_kinds(path).cloud; };
     for (const std::string& path : marks.files.points) {
-        const KindedPoints given = read_kinds(path, options.points);
-        const PointCloud cloud = own(given.of(MarkKind::Surface));
+        const KindedPoints given = read_kinds(path);
+        const PointCloud cloud = given.of(MarkKind::Surface);
         for (const MarkKind kind : {MarkKind::Inside, MarkKind::Outside})
-            if (PointCloud seeds = own(given.of(kind)); !given.kinds.empty() && !seeds.points.empty())
+            if (PointCloud seeds = given.of(kind); !given.kinds.empty() && !seeds.points.empty())
                 (kind == MarkKind::Inside ? marks.inside : marks.outside).push_back(std::move(seeds));
         if (cloud.points.empty()) continue;
         if (!cloud.lines.empty())
@@ -42,8 +33,8 @@ void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const R
                  (cloud.rule.empty() ? "" : ", " + cloud.rule));
     }
     for (const std::string& path : marks.files.contours) add_contours(marks, read(path), image, run);
-    for (const std::string& path : marks.files.inside) marks.inside.push_back(read_kinds(path, of_seeds).cloud);
-    for (const std::string& path : marks.files.outside) marks.outside.push_back(read_kinds(path, of_seeds).cloud);
+    for (const std::string& path : marks.files.inside) marks.inside.push_back(read(path));
+    for (const std::string& path : marks.files.outside) marks.outside.push_back(read(path));
     if (!marks.files.guess.empty())
         marks.guess = [path = marks.files.guess, image, options](const RunContext& own) {
             return read_guess(path, image, options, own);

@@ -19,14 +19,14 @@ struct PointTable {
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
     std::string unit;                      ///< of lengths, as normal_unit() has it; empty: not said
-    std::vector<std::string> structures;   ///< as in PointCloud
-    std::vector<std::uint32_t> structure;  ///< likewise
+    std::vector<std::string> structures;   ///< named by the marks, in the file's order
+    std::vector<std::uint32_t> structure;  ///< of each point, one of them; empty where none were asked for
     std::string rule;                      ///< which columns or elements, for people
 };
 
 /// Picks the reader by the name's end. @throws as read_points(), which it serves.
-/// @param structures_by  as ReadPointsOptions::structure_column
-PointTable read_point_table(const std::string& path, const std::string& structures_by);
+/// @param structures_by  as of read_structures_of_points(); empty: nothing
+PointTable read_point_table(const std::string& path, const std::string& structures_by = {});
 
 /// The points that belong to no structure yet, the last ones of the table, belong to that of this name.
 void name_structure(PointTable& table, const std::string& name);

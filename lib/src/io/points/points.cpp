@@ -1,6 +1,5 @@
 #include "covol/points.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
@@ -10,6 +9,7 @@
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "covol/point_structures.h"
 #include "covol/points_text.h"
 #include "image/to_world.h"
 #include "io/points/point_files.h"
@@ -62,6 +62,29 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
+/// The points of one of a table's structures, with their lines.
+detail::PointTable part_of(const detail::PointTable& table, std::uint32_t structure) {
+    detail::PointTable part = table;
+    part.points.clear();
+    part.normals.clear();
+    part.lines.clear();
+    std::vector<std::size_t> place;  // of each point, among the structure's
+    for (std::size_t n = 0; n < table.points.size(); ++n) {
+        place.push_back(part.points.size());
+        if (table.structure[n] != structure) continue;
+        part.points.push_back(table.points[n]);
+        if (!table.normals.empty()) part.normals.push_back(table.normals[n]);
+    }
+    place.push_back(part.points.size());
+    for (MarkLine line : table.lines) {
+        if (line.begin >= line.end || table.structure[line.begin] != structure) continue;
+        line.begin = place[line.begin];
+        line.end = place[line.end];
+        part.lines.push_back(line);
+    }
+    return part;
+}
+
 PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
     if (table.points.empty()) throw Error(Errc::InvalidInput, path + ": expected at least one point, got none");
     PointCloud cloud;
@@ -84,12 +107,9 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     // Who gives a scale knows better than the file.
     const bool has_lengths = cloud.space != PointSpace::Index && !table.unit.empty();
-    if (has_lengths && options.scale == 1) cloud.unit = table.unit;
     if (has_lengths)
-        cloud.rule += options.scale == 1 ? "; lengths in " + table.unit
+        cloud.rule += options.scale == 1 ? detail::unit_note(table.unit)
                                          : ", times a scale that is given, not in " + table.unit + " as the file says";
-    cloud.structures = std::move(table.structures);
-    cloud.structure = std::move(table.structure);
     return cloud;
 }
 
@@ -101,7 +121,7 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 
 KindedPoints read_kinded_points(const std::string& path, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    detail::PointTable table = detail::read_point_table(path, options.structure_column);
+    detail::PointTable table = detail::read_point_table(path);
     KindedPoints points;
     points.kinds = std::move(table.kinds);
     if (!points.kinds.empty()) table.rule += " with kinds";
@@ -115,47 +135,28 @@ PointCloud KindedPoints::of(MarkKind kind) const {
     some.points.clear();
     some.normals.clear();
     some.lines.clear();
-    some.structure.clear();
     for (std::size_t n = 0; n < kinds.size(); ++n) {
         if (kinds[n] != kind) continue;
         some.points.push_back(cloud.points[n]);
         if (!cloud.normals.empty()) some.normals.push_back(cloud.normals[n]);
-        if (!cloud.structure.empty()) some.structure.push_back(cloud.structure[n]);
     }
     return some;
 }
 
-PointCloud of_structure(const PointCloud& cloud, const std::string& name) {
-    PointCloud part = cloud;
-    for (std::vector<Vec3>* list : {&part.points, &part.normals}) list->clear();
-    part.lines.clear();
-    part.structures = {name};
-    part.structure.clear();
-    const auto found = std::find(cloud.structures.begin(), cloud.structures.end(), name);
-    const auto wanted = std::uint32_t(found - cloud.structures.begin());
-    std::vector<std::size_t> place(cloud.structure.size() + 1, 0);  // among the marks of the structure
-    for (std::size_t n = 0; n < cloud.structure.size(); ++n) {
-        place[n] = part.points.size();
-        if (cloud.structure[n] != wanted) continue;
-        part.points.push_back(cloud.points[n]);
-        if (!cloud.normals.empty()) part.normals.push_back(cloud.normals[n]);
-    }
-    place.back() = part.points.size();
-    for (MarkLine line : cloud.lines) {
-        if (line.begin >= line.end || cloud.structure.at(line.begin) != wanted) continue;
-        line.begin = place[line.begin];
-        line.end = place[line.end];
-        part.lines.push_back(line);
-    }
-    part.structure.assign(part.points.size(), 0);
-    return part;
+std::vector<StructurePoints> read_structures_of_points(const std::string& path, const std::string& by,
+                                                       const ReadPointsOptions& options) {
+    require_valid(options, "read_points");
+    const detail::PointTable table = detail::read_point_table(path, by);
+    std::vector<StructurePoints> structures;
+    for (std::size_t n = 0; n < table.structures.size(); ++n)
+        structures.push_back({table.structures[n], to_cloud(path, part_of(table, std::uint32_t(n)), options)});
+    return structures;
 }
 
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
     if (text.empty()) throw Error(Errc::InvalidInput, source + ": expected points, got nothing");
-    return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true, options.structure_column),
-                    options);
+    return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true), options);
 }
 
 void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment) {

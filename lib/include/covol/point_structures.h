@@ -1,0 +1,24 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/api.h"
+#include "covol/points.h"
+
+namespace covol {
+
+/// The marks of one structure in a file that has several.
+struct StructurePoints {
+    std::string name;
+    PointCloud cloud;
+};
+
+/// As read_points(), of a file whose marks name their structures; in the order in which the file names them.
+/// @param by  what names them: the column of a table, "group" or "counter" of Fiji's selections, "label" or "node" of
+///            3D Slicer's markups, "label" of .csl
+/// @throws Error as read_points(); InvalidInput where the file has no such names, or a mark without one.
+[[nodiscard]] COVOL_API std::vector<StructurePoints> read_structures_of_points(const std::string& path,
+                                                                               const std::string& by,
+                                                                               const ReadPointsOptions& options = {});
+
+}  // namespace covol
