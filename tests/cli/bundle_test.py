@@ -63,6 +63,22 @@ class Bundle(unittest.TestCase):
         self.assertIn("closed, genus 0", said)
         self.assertGreater((self.work / "s.html").stat().st_size, 100_000)
 
+    def test_the_doctor_finds_its_own_parts(self):
+        root = self.work / "damaged"
+        shutil.copytree(self.root, root, symlinks=True)
+        environment = {**self.environment, "LD_LIBRARY_PATH": ""}
+        said = run(root / "bin/covol", "doctor", "--strict", env=environment)
+        self.assertIn(f"in {root}/lib\n", said)
+        next(root.glob("lib/covol-*/gdcm.so")).unlink()
+        done = subprocess.run([root / "bin/covol", "doctor", "--strict"], capture_output=True, text=True, env=environment)
+        self.assertEqual(done.returncode, 5, done.stdout + done.stderr)
+        self.assertIn("gdcm.so", done.stderr)
+        self.assertIn("reader itk: there", done.stdout)
+        (root / "share/covol/demo/celegans_embryo.tif").unlink()
+        done = subprocess.run([root / "bin/covol", "demo", "--no-browser"], capture_output=True, text=True, env=environment, cwd=self.work)
+        self.assertEqual(done.returncode, 4, done.stdout + done.stderr)
+        self.assertIn("expected the sample that is installed with covol", done.stderr)
+
     def test_every_file_has_its_package_and_licence(self):
         rows = [line.split("\t") for line in (self.root / "share/doc/covol/FILES.txt").read_text().splitlines()[1:]]
         listed = {row[0]: row for row in rows}

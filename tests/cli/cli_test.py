@@ -16,7 +16,7 @@ import unittest
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
 COMMANDS = ["mark", "segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
-            "info", "check", "convert", "render", "report", "phantom", "plan", "brick", "rerun"]
+            "info", "check", "convert", "render", "report", "phantom", "plan", "brick", "rerun", "demo", "doctor"]
 
 # The shape of all tests: a bright ball in a dark box.
 SIZE = 40          # voxels along each axis

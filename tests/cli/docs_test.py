@@ -60,7 +60,7 @@ class Pages(unittest.TestCase):
         for page in PAGES:
             for block in blocks(page):
                 for line in re.sub(r"\\\n", " ", block).splitlines():
-                    if command := re.match(r"\s*covol (?:brick )?(?:plan )?(\w+)", line):
+                    if command := re.match(r"\s*covol (?:brick )?(?:plan )?([a-z]\w*)", line):
                         # run and join of bricks go on with the planned command.
                         known = options["segment" if command[1] in ("run", "join") else command[1]]
                         for flag in re.findall(r"(?<=\s)--?[a-z][\w-]*", line.split("#")[0]):

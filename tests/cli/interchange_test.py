@@ -343,6 +343,29 @@ class MaskFiles(Folder):
 
 @unittest.skipIf(MISSING, MISSING)
 class NumpyImages(Folder):
+    def test_an_image_in_another_format_keeps_its_voxels(self):
+        values = np.arange(7 * 6 * 5).reshape(7, 6, 5)
+        for kind in (np.uint8, np.int8, np.uint16, np.int16, np.uint32, np.int32, np.float32, np.float64):
+            with self.subTest(kind.__name__):
+                large = 2**31 if kind == np.uint32 else -2**30 + 1 if kind == np.int32 else 0.1 if kind == np.float64 else 0
+                array = (values + large if large else values - (100 if np.dtype(kind).kind == "i" else 0)).astype(kind)
+                np.save(self.out / "same.npy", array)
+                self.run_covol("convert", "same.npy", "same.nrrd", "--spacing", "0.5,0.25,2", "--quiet")
+                self.run_covol("convert", "same.nrrd", "again.npy", "--quiet")
+                again = np.load(self.out / "again.npy")
+                self.assertEqual(again.dtype, array.dtype)
+                np.testing.assert_array_equal(again, array)
+        self.run_covol("convert", self.private / "i.tif", "i.nii.gz", "--quiet")
+        one, two = (self.report("info", path)["image"] for path in (self.private / "i.tif", "i.nii.gz"))
+        for name in ("size", "spacing", "origin", "unit", "type"):
+            self.assertEqual(one[name], two[name], name)
+        x, y, z = ORIGIN
+        self.run_covol("convert", self.private / "i.tif", "part.nrrd", "--roi", f"{x + 1},{y + 1},{z + 1},{x + 3},{y + 3},{z + 3}", "--quiet")
+        part = self.report("info", "part.nrrd")["image"]
+        self.assertLess(max(part["size"]), 10)
+        self.assertGreater(part["origin"][0], x)
+        self.assertIn("--like", self.run_covol("convert", "i.nii.gz", "j.nrrd", "--like", self.private / "i.tif", code=2).stderr)
+
     def test_types_and_orders(self):
         pixels = np.random.default_rng(5).integers(0, 100, SIZE[::-1])
         spacing = ("--spacing", ",".join(map(str, SPACING)))

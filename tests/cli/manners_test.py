@@ -117,7 +117,7 @@ class Reports(Case):
                       ("check", "m.ply"), ("convert", self.image, "i.vdb"), ("convert", "s.vdb", "i.nrrd"),
                       ("convert", self.points, "p.csv"), ("convert", "m.ply", "m.stl"),
                       ("render", "s.vdb", "-o", "r.png"), ("phantom", "sphere", "-o", "x.nrrd", "--size", "24"),
-                      ("plan", "segment", self.image, "--points", self.points, "-o", "x.vdb")):
+                      ("doctor",), ("plan", "segment", self.image, "--points", self.points, "-o", "x.vdb")):
             begin = time.monotonic()
             yield words, self.report(*words), time.monotonic() - begin
 

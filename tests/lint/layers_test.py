@@ -12,7 +12,7 @@ LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "options_table", "run", "domain", "safe_text"], "scheme": []},
     {"files": ["file_set", "digest"], "limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
-    {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": []},
+    {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": ["reader_parts"]},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
     {"io/dicom": [], "io/reader": [], "io/write": ["program_marks"], "io/points": ["points_text", "point_array", "mark_kinds", "point_structures"], "clip": ["clip"], "edge": ["edge"], "redistance": []},

@@ -30,6 +30,8 @@ int run(int argc, char** argv) {
     add_plan(session);
     add_brick(session);
     add_rerun(session);
+    add_demo(session);
+    add_doctor(session);
     return session.main(argc, argv);
 }
 

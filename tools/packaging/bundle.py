@@ -146,7 +146,7 @@ def write_licences(root, origins):
     own = "covol", "Apache-2.0, with code of CGAL: as a whole under GPL-3+"
     for path in sorted(path.relative_to(root) for path in root.rglob("*") if path.is_file()):
         if path not in listed and path.parent != texts.relative_to(root):
-            rows.append((path, *own))
+            rows.append((path, own[0], "CC0-1.0") if path.name == "celegans_embryo.tif" else (path, *own))
     lines = [f"{path}\t{package}\t{licences}" for path, package, licences in sorted(rows, key=lambda row: str(row[0]))]
     (doc / "FILES.txt").write_text("file\tpackage\tlicences (texts in share/doc/covol/licences)\n" + "\n".join(lines) + "\n")
     shutil.copyfile(SOURCE / "docs/licences.md", doc / "licences.md")
@@ -191,7 +191,7 @@ def main():
         staged = pathlib.Path(work) / "staged"
         for component in COMPONENTS:
             run("cmake", "--install", build, "--prefix", staged, "--component", component)
-        version = run(staged / "bin/covol", "--version").split()[-1]
+        version = run(staged / "bin/covol", "--version").split()[1]
         name = f"covol-{version}-linux-{os.uname().machine}"
         root = staged.rename(pathlib.Path(work) / name)
         flatten(root)

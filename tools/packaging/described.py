@@ -57,6 +57,6 @@ class Program:
     def __init__(self, source):
         run = lambda *words: subprocess.run([source, *words], capture_output=True, text=True, check=True).stdout
         described = json.loads(sys.stdin.read() if source == "-" else run("--describe-options"))
-        self.version = "" if source == "-" else run("--version").split()[-1]
+        self.version = "" if source == "-" else run("--version").split()[1]
         self.common = Command("", "", described["common"])
         self.commands = [Command(c["name"], c["description"], c["groups"]) for c in described["commands"]]

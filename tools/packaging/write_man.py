@@ -16,6 +16,9 @@ EXAMPLES = {
     "compare": "covol compare cell.nrrd truth.nrrd",
     "render": "covol render cell.vdb --image stack.tif --points marks.csv -o cell.png",
     "info": "covol info stack.tif",
+    "mark": "covol mark stack.tif",
+    "demo": "covol demo",
+    "doctor": "covol doctor",
 }
 
 

@@ -15,4 +15,8 @@ namespace covol {
 /// COVOL_VERSION_STRING of the library that the program runs with; the macros are of that which it was compiled with.
 [[nodiscard]] COVOL_API const char* version() noexcept;
 
+/// How the library was built: "GCC 12.2.0, x86_64, OpenVDB 10.0.1", and the revision of its source where the build was
+/// told one (the CMake variable COVOL_REVISION).
+[[nodiscard]] COVOL_API const char* build_text() noexcept;
+
 }  // namespace covol

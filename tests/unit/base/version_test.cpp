@@ -1,5 +1,8 @@
 #include "covol/version.h"
 
+#include <openvdb/version.h>
+
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <string>
 
@@ -8,4 +11,11 @@ TEST_CASE("the version as text is its three numbers") {
     CHECK(covol::version() == std::to_string(COVOL_VERSION_MAJOR) + "." + std::to_string(COVOL_VERSION_MINOR) + "." +
                                   std::to_string(COVOL_VERSION_PATCH));
     CHECK(COVOL_VERSION_NUMBER / 10000 == COVOL_VERSION_MAJOR);
+}
+
+TEST_CASE("the build names its compiler, machine and OpenVDB") {
+    const std::string text = covol::build_text();
+    CHECK(text.find(OPENVDB_LIBRARY_VERSION_STRING) != std::string::npos);
+    CHECK(std::count(text.begin(), text.end(), ',') >= 2);
+    CHECK(text.find("another") == std::string::npos);  // tested on x86-64 and aarch64, with GCC and Clang
 }

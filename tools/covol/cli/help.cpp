@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cli/first_steps.h"
 #include "cli/job_options.h"
 
 namespace covol::tool {
@@ -155,7 +156,8 @@ std::string Help::command_help(const CLI::App& command, const std::string& name,
 }
 
 std::string Help::program_help(const CLI::App& program, const std::string& name, bool all) const {
-    std::string text = program.get_description() + "\n\nUsage: " + name + " COMMAND [OPTIONS]\n\nCommands:\n";
+    std::string text = program.get_description() + "\n\nUsage: " + name + " COMMAND [OPTIONS]\n\nTo begin with:\n" +
+                       kFirstSteps + "\nCommands:\n";
     for (const CLI::App* command : program.get_subcommands({}))
         text += entry(command->get_name(), command->get_description());
     text += section("Options of every command", options_in(program, "Options"));

@@ -9,6 +9,7 @@
 
 #include "cli/arguments.h"
 #include "cli/config_file.h"
+#include "cli/first_steps.h"
 #include "cli/grid_metadata.h"
 #include "cli/job_options.h"
 #include "cli/nearest.h"
@@ -129,6 +130,18 @@ void expect_values(const CLI::App& app) {
     }
 }
 
+/// `covol help segment` is `covol segment --help`. @throws UsageError
+std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI::App& program) {
+    words.erase(words.begin());
+    if (!words.empty() && !words[0].starts_with('-')) {
+        if (words.size() > 1 && !words[1].starts_with('-'))
+            throw UsageError("help: expected one command, as in covol help " + words[0]);
+        if (const std::string unknown = unknown_name(program, {words[0]}); !unknown.empty()) throw UsageError(unknown);
+    }
+    words.emplace_back("--help");
+    return words;
+}
+
 constexpr int kReportSchema = 1;    // grows when a field of the report goes or means something else
 constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
 
@@ -150,9 +163,10 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
     app_.name("covol");
     app_.require_subcommand(1);
     app_.formatter(help_);
-    app_.footer("covol COMMAND --help shows the options of a command.");
+    app_.footer("covol COMMAND --help, or covol help COMMAND, shows the options of a command.");
     add_help_flags(app_);
-    app_.set_version_flag("--version", std::string("covol ") + version(), "print the version");
+    app_.set_version_flag("--version", std::string("covol ") + version() + "\n" + build_text(),
+                          "print the version, and what it was built with");
     app_.add_flag_callback("--describe-options", [this] { throw CLI::CallForVersion(help_->describe(app_), kDone); })
         ->configurable(false)
         ->group("");
@@ -218,11 +232,16 @@ int Session::run_command_line(int argc, char** argv) {
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
     for (const std::string& word : words) command_line_ += " " + shell_quoted(word);
+    if (words.empty() && ::isatty(STDOUT_FILENO) != 0) {
+        std::cout << kFirstSteps << "covol help shows all commands.\n";
+        return kUsage;
+    }
     const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == word; };
     planning_ = is(0, "plan") && (is(1, "segment") || is(1, "reconstruct"));
     if (planning_) words.erase(words.begin());
     std::vector<std::string> given;
     try {
+        if (is(0, "help")) words = words_of_help(words, app_);
         check_blanks(words);
         brick_ = take_brick_call(words, app_);
         given = words;

@@ -1,8 +1,12 @@
 
+#include <algorithm>
+#include <vector>
+
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
+#include "covol/image_stream.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
 #include "flags/cloud_flags.h"
@@ -21,6 +25,42 @@ OutputKind output_kind(FileKind kind) {
     }
     return OutputKind::Points;
 }
+
+/// The voxels of an image, in its own type.
+class SameVoxels : public PixelSource {
+public:
+    explicit SameVoxels(const Image& image) : PixelSource(image.geometry(), image.pixel_type(), false), image_(image) {}
+    void fill(const VoxelBox& box, void* out) const override {
+        switch (type()) {
+            case PixelType::UInt8: return fill_through_floats(box, static_cast<std::uint8_t*>(out));
+            case PixelType::Int8: return fill_through_floats(box, static_cast<std::int8_t*>(out));
+            case PixelType::UInt16: return fill_through_floats(box, static_cast<std::uint16_t*>(out));
+            case PixelType::Int16: return fill_through_floats(box, static_cast<std::int16_t*>(out));
+            case PixelType::Float: return image_.copy(box, static_cast<float*>(out));
+            case PixelType::UInt32: return fill_one_by_one(box, static_cast<std::uint32_t*>(out));
+            case PixelType::Int32: return fill_one_by_one(box, static_cast<std::int32_t*>(out));
+            case PixelType::Double: return fill_one_by_one(box, static_cast<double*>(out));
+        }
+    }
+
+private:
+    /// Of types whose values a float holds.
+    template <typename T>
+    void fill_through_floats(const VoxelBox& box, T* out) const {
+        const Index3 n = box.size();
+        std::vector<float> values(std::size_t(n[0]) * n[1] * n[2]);
+        image_.copy(box, values.data());
+        std::transform(values.begin(), values.end(), out, [](float v) { return static_cast<T>(v); });
+    }
+    template <typename T>
+    void fill_one_by_one(const VoxelBox& box, T* out) const {
+        for (int k = box.min[2]; k <= box.max[2]; ++k)
+            for (int j = box.min[1]; j <= box.max[1]; ++j)
+                for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = static_cast<T>(image_.at(i, j, k));
+    }
+
+    Image image_;
+};
 
 struct ConvertJob {
     std::string input, output, like, grid_name;
@@ -53,6 +93,16 @@ struct ConvertJob {
         session.report()["image"] = to_json(geometry);
         session.outputs().add(
             output, [values, geometry](const std::string& path) { write_image(path, geometry, values->data()); });
+    }
+
+    /// The same voxels in another format.
+    void image_to_image(Session& session) const {
+        if (!like.empty()) throw UsageError("--like: expected no image beside one whose voxels stay where they are");
+        const auto pixels = std::make_shared<const SameVoxels>(image.read(input, session.run()));
+        session.report()["image"] = to_json(pixels->geometry());
+        session.outputs().add(output, [pixels, this, &session](const std::string& path) {
+            write_image(path, *pixels, {true, input}, session.run());
+        });
     }
 
     /// The file's float grids, or the one that is named, packed as the options say.
@@ -116,14 +166,15 @@ struct ConvertJob {
         cloud_flags.check_used(from == FileKind::Points);
         cloud_flags.check();
         if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
+        if (from == FileKind::Image && to == FileKind::Image) return image_to_image(session);
         if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
         if (from == FileKind::Vdb && to == FileKind::Vdb) return vdb_to_vdb(session);
         if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
         if (from == FileKind::Mesh && to == FileKind::Mesh) return convert_mesh(session);
         throw Error(Errc::Unsupported, std::string("convert: ") + input + " holds " + to_string(from) + ", " + output +
                                            " would hold " + to_string(to) +
-                                           ": expected image and .vdb, .vdb and .vdb or .nvdb, points and points, or "
-                                           "mesh and mesh; see also covol mesh, mask and segment --init");
+                                           ": expected image and image or .vdb, .vdb and .vdb or .nvdb, points and "
+                                           "points, or mesh and mesh; see also covol mesh, mask and segment --init");
     }
 };
 
@@ -131,7 +182,7 @@ struct ConvertJob {
 
 void add_convert(Session& session) {
     const auto [job, command] = session.add_job<ConvertJob>(
-        "convert", "Image to .vdb and back, .vdb to .vdb or .nvdb, points to points, mesh to mesh");
+        "convert", "Image to .vdb and back, image to image, .vdb to .vdb or .nvdb, points to points, mesh to mesh");
     in_group(*command, Group::Input);
     command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
     in_group(*command, Group::Output);

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "commands/commands.h"
+#include "commands/mark_call.h"
 #include "covol/digest.h"
 #include "covol/error.h"
 #include "covol/image_levels.h"
@@ -228,6 +229,21 @@ private:
 
 }  // namespace
 
+void run_mark(Session& session, const MarkCall& call) {
+    MarkJob job;
+    job.image_path = call.image;
+    job.points = call.points;
+    job.without_browser = call.without_browser;
+    job.port = call.port;
+    job.run(session);
+}
+
+void bind_page(CLI::App& command, bool& without_browser, int& port) {
+    command.add_flag("--no-browser", without_browser,
+                     "print the address alone; from another machine: ssh -L PORT:127.0.0.1:PORT, with --port PORT");
+    command.add_option("--port", port, "of the address, 0 takes the study's own, or one that is free")->type_name("N");
+}
+
 void add_mark(Session& session) {
     const auto [job, command] =
         session.add_job<MarkJob>("mark", "Click marks on an image in the browser, and see the surface");
@@ -254,10 +270,7 @@ void add_mark(Session& session) {
         ->type_name("FILE")
         ->allow_extra_args(false);
     in_group(*command, Group::Output);
-    command->add_flag("--no-browser", job->without_browser,
-                      "print the address alone; from another machine: ssh -L PORT:127.0.0.1:PORT, with --port PORT");
-    command->add_option("--port", job->port, "of the address, 0 takes the study's own, or one that is free")
-        ->type_name("N");
+    bind_page(*command, job->without_browser, job->port);
     command
         ->add_option("--also-at", job->authorities,
                      "a further address that the page is loaded from, localhost:9000 where ssh -L 9000:127.0.0.1:PORT")

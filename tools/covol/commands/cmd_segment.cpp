@@ -20,8 +20,9 @@ void add_segment(Session& session) {
         ->type_name("[NAME=]FILE...");
     command->add_option("--study", job->study, "structures and marks of covol mark")->type_name("STUDY");
     job->bind(*command, true);
-    session.help().show_first(*command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess",
-                                         "--mask", "--mesh", "--suggest", "--frame", "--rho", "--voxel-size"});
+    session.help().show_first(
+        *command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess", "--mask", "--mesh",
+                   "--report", "--suggest", "--frame", "--rho", "--voxel-size"});
 }
 
 }  // namespace covol::tool

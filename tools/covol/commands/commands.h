@@ -24,5 +24,7 @@ void add_phantom(Session& session);
 void add_plan(Session& session);
 void add_brick(Session& session);
 void add_rerun(Session& session);
+void add_demo(Session& session);
+void add_doctor(Session& session);
 
 }  // namespace covol::tool

@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstdlib>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 
 #include "covol/error.h"
@@ -14,6 +16,20 @@
 extern char** environ;
 
 namespace covol::tool {
+
+std::string find_opener() {
+    const char* const path = std::getenv("PATH");
+    for (const char* const name : {"xdg-open", "open"}) {
+        std::istringstream folders(path == nullptr ? "" : path);
+        for (std::string folder; std::getline(folders, folder, ':');) {
+            const std::string program = (std::filesystem::path(folder) / name).string();
+            std::error_code status;
+            if (std::filesystem::is_regular_file(program, status) && ::access(program.c_str(), X_OK) == 0)
+                return program;
+        }
+    }
+    return {};
+}
 
 BrowserLink::BrowserLink(const std::string& url) {
     std::string name = (std::filesystem::temp_directory_path() / "covol-open-XXXXXX").string();
@@ -33,21 +49,19 @@ BrowserLink::~BrowserLink() {
 
 bool BrowserLink::open() const {
     const std::string file = (folder_ / "open.html").string();
-    for (const char* program : {"xdg-open", "open"}) {
-        posix_spawn_file_actions_t actions;
-        posix_spawn_file_actions_init(&actions);
-        for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-            posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
-        const std::array<const char*, 3> words{program, file.c_str(), nullptr};
-        pid_t child = 0;
-        const int failed =
-            ::posix_spawnp(&child, program, &actions, nullptr, const_cast<char* const*>(words.data()), environ);
-        posix_spawn_file_actions_destroy(&actions);
-        if (failed != 0) continue;
-        int status = 0;
-        return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    }
-    return false;
+    const std::string program = find_opener();
+    if (program.empty()) return false;
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
+    const std::array<const char*, 3> words{program.c_str(), file.c_str(), nullptr};
+    pid_t child = 0;
+    const int failed =
+        ::posix_spawn(&child, program.c_str(), &actions, nullptr, const_cast<char* const*>(words.data()), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    int status = 0;
+    return failed == 0 && ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 }  // namespace covol::tool

@@ -17,3 +17,14 @@ std::string reader_program() {
 }
 
 }  // namespace covol::detail
+
+namespace covol {
+
+std::vector<ReaderPart> check_reader_parts() {
+    return {{"itk", "NRRD and MetaImage", {}, {}},
+            {"gdcm", "compressed DICOM", {}, {}},
+            {"hdf5", "HDF5", {}, {}},
+            detail::check_reader_program()};
+}
+
+}  // namespace covol

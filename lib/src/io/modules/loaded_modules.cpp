@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "covol/error.h"
+#include "covol/reader_parts.h"
 #include "covol/version.h"
 #include "io/modules/reader.h"
 
@@ -21,10 +22,16 @@ fs::path folder_of_modules() {
     return library.parent_path() / "covol-" COVOL_VERSION_STRING;
 }
 
+constexpr const char* kOfItk = "NRRD and MetaImage";
+constexpr const char* kOfGdcm = "compressed DICOM";
+constexpr const char* kOfHdf5 = "HDF5";
+
+fs::path path_of_module(const std::string& name) { return folder_of_modules() / (name + ".so"); }
+
 /// It stays loaded until the program ends: libraries below it have threads and handlers of their own.
 template <typename Module>
 const Module& load(const std::string& name, const char* formats) {
-    const fs::path path = folder_of_modules() / (name + ".so");
+    const fs::path path = path_of_module(name);
     void* const library = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     void* const entry = library == nullptr ? nullptr : dlsym(library, ("covol_" + name).c_str());
     if (entry == nullptr) {
@@ -41,18 +48,37 @@ const Module& load(const std::string& name, const char* formats) {
 std::string reader_program() { return folder_of_modules() / "covol-reader"; }
 
 const ItkModule& itk_module() {
-    static const auto& module = load<ItkModule>("itk", "NRRD and MetaImage");
+    static const auto& module = load<ItkModule>("itk", kOfItk);
     return module;
 }
 
 const GdcmModule& gdcm_module() {
-    static const auto& module = load<GdcmModule>("gdcm", "compressed DICOM");
+    static const auto& module = load<GdcmModule>("gdcm", kOfGdcm);
     return module;
 }
 
 const Hdf5Module& hdf5_module() {
-    static const auto& module = load<Hdf5Module>("hdf5", "HDF5");
+    static const auto& module = load<Hdf5Module>("hdf5", kOfHdf5);
     return module;
 }
 
 }  // namespace covol::detail
+
+namespace covol {
+
+std::vector<ReaderPart> check_reader_parts() {
+    using namespace detail;
+    const auto check = [](const std::string& name, const char* formats, const auto& load) {
+        ReaderPart part{name, formats, path_of_module(name), {}};
+        try {
+            (void)load();
+        } catch (const Error& error) {
+            part.problem = error.what();
+        }
+        return part;
+    };
+    return {check("itk", kOfItk, itk_module), check("gdcm", kOfGdcm, gdcm_module), check("hdf5", kOfHdf5, hdf5_module),
+            check_reader_program()};
+}
+
+}  // namespace covol

@@ -1,6 +1,9 @@
 #include "io/modules/reader.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <span>
 
@@ -26,6 +29,14 @@ std::vector<std::uint64_t> begins_of(const std::vector<Piece>& files) {
 }
 
 }  // namespace
+
+ReaderPart check_reader_program() {
+    ReaderPart part{"covol-reader", "DICOM, HDF5, NRRD, MetaImage, apart from this program", reader_program(), {}};
+    if (::access(part.path.c_str(), X_OK) != 0)
+        part.problem = part.path + ": expected a program beside covol's library, got: " + std::strerror(errno) +
+                       "; install covol again";
+    return part;
+}
 
 bool FlatHeader::take(const ItkHeader& header) {
     if (header.size.size() > kMost) return false;

@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "covol/reader_parts.h"
 #include "io/child.h"
 #include "io/modules/modules.h"
 
@@ -13,6 +14,9 @@ namespace covol::detail {
 
 /// Where it lies. @throws Error Io where that cannot be said.
 std::string reader_program();
+
+/// Whether it is there and may be started.
+ReaderPart check_reader_program();
 
 /// What it is asked to do with a file. A Piece's detail begins the message where ITK or GDCM cannot read it, and names
 /// the dataset in an HDF5 file.

@@ -1,0 +1,156 @@
+"""What a person meets first: covol without a command, covol help, covol demo, covol doctor. Standard library only.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/first_contact_test.py
+"""
+import json
+import os
+import pathlib
+import pty
+import signal
+import subprocess
+import unittest
+
+from cli_test import COMMANDS, COVOL, Case
+from live_client import Live, Page
+
+SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/data"
+
+
+class Words(Case):
+    def on_terminal(self, *words):
+        """What a command says on a terminal, and its exit code."""
+        near, far = pty.openpty()
+        try:
+            process = subprocess.Popen([COVOL, *words], stdin=far, stdout=far, stderr=far, cwd=self.out)
+        finally:
+            os.close(far)
+        said = b""
+        try:
+            while part := os.read(near, 65536):
+                said += part
+        except OSError:  # the other end is closed
+            pass
+        os.close(near)
+        return said.decode().replace("\r", ""), process.wait(60)
+
+    def test_without_a_command(self):
+        said, code = self.on_terminal()
+        self.assertEqual(code, 2)
+        lines = said.strip().splitlines()
+        self.assertEqual([line.split()[1] for line in lines], ["demo", "mark", "segment", "help"])
+        self.assertIn("--report", lines[2])
+        self.assertLessEqual(max(map(len, lines)), 100)
+        self.assertNotIn("error", said)
+        self.refuse(code=2, says="covol --help")  # a script is told that a command is missing
+
+    def test_help_begins_with_what_to_do(self):
+        text = self.run_covol("--help").stdout
+        self.assertLess(text.index("covol mark stack.tif"), text.index("Commands:"))
+        self.assertLess(text.index("--report cell.html"), text.index("Commands:"))
+        self.assertIn("--report", self.run_covol("segment", "--help").stdout)
+
+    def test_help_as_a_command(self):
+        self.assertEqual(self.run_covol("help").stdout, self.run_covol("--help").stdout)
+        for command in COMMANDS:
+            self.assertEqual(self.run_covol("help", command).stdout, self.run_covol(command, "--help").stdout)
+        self.refuse("help", "segmnet", code=2, says="segment")
+        self.refuse("help", "segment", "mesh", code=2, says="expected one command")
+
+    def test_the_version_says_the_build(self):
+        first, second = self.run_covol("--version").stdout.splitlines()
+        self.assertRegex(first, r"^covol \d+\.\d+\.\d+$")
+        self.assertRegex(second, r"^(GCC|Clang) \d+\.\d+.*, (x86_64|aarch64), OpenVDB \d+\.\d+\.\d+")
+
+
+class Demo(Case):
+    def start(self, *words, code=None, **more):
+        program = subprocess.Popen([COVOL, "demo", *words, "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   cwd=self.out, **more)
+        self.addCleanup(self.stop, program)
+        line = program.stdout.readline()
+        self.assertTrue(line.startswith("open http://127.0.0.1:"), line + (program.stderr.read() if not line else ""))
+        return program, Page(line.split()[1])
+
+    def stop(self, program):
+        if program.poll() is None:
+            program.kill()
+        program.wait()
+        program.stdout.close()
+        program.stderr.close()
+
+    def end(self, program):
+        program.send_signal(signal.SIGINT)
+        said = program.stderr.read()
+        self.assertEqual(program.wait(60), 0, said)
+        return said
+
+    def test_a_surface_without_a_click(self):
+        program, page = self.start()
+        live = Live(page)
+        self.addCleanup(live.close)
+        [structure] = live.state["structures"]
+        self.assertEqual((structure["name"], len(structure["marks"])), ("embryo", 398))
+        result = live.wait_for(structure["id"], "refined", 1)
+        self.assertGreater(result["volume"], 3e6)  # 4.0e6 cubic pixels, by the quickstart
+        said = self.end(program)
+        folder = self.out / "covol_demo"
+        for name in ("celegans_embryo.tif", "celegans_marks.csv"):
+            self.assertEqual((folder / name).read_bytes(), (SAMPLES / name).read_bytes())
+        self.assertTrue((folder / "README.md").exists() and (folder / "celegans_embryo.tif.covol").is_dir())
+        # The command that it names does the same without a page.
+        command = said.split("without a page: covol ")[1].splitlines()[0].split()
+        self.assertEqual(self.run_covol("plan", *command, "--quiet").returncode, 0)
+        program, page = self.start()  # once more: the study goes on, and marks are not added twice
+        again = Live(page)
+        self.addCleanup(again.close)
+        self.assertEqual(len(again.state["structures"][0]["marks"]), 398)
+        self.end(program)
+
+    def test_nothing_of_others_is_replaced(self):
+        (self.out / "covol_demo").mkdir()
+        (self.out / "covol_demo/celegans_marks.csv").write_text("mine")
+        self.assertIn("covol demo FOLDER", self.run_covol("demo", "--no-browser", code=3).stderr)
+        self.assertEqual([p.name for p in (self.out / "covol_demo").iterdir()], ["celegans_marks.csv"])
+        self.assertEqual((self.out / "covol_demo/celegans_marks.csv").read_text(), "mine")
+        (self.out / "file").write_text("")
+        self.assertIn("a folder cannot be made", self.run_covol("demo", "file", "--no-browser", code=4).stderr)
+
+
+class Doctor(Case):
+    def test_what_is_there(self):
+        said = self.run_covol("doctor", "--json", "r.json").stdout
+        found = json.loads((self.out / "r.json").read_text())["doctor"]
+        self.assertEqual({part["name"]: part["problem"] for part in found["readers"]},
+                         {"itk": "", "gdcm": "", "hdf5": "", "covol-reader": ""})
+        self.assertTrue(any("libopenvdb.so" in path for path in found["libraries"]))
+        self.assertGreater(found["memory"]["free_bytes"], 0)
+        self.assertGreater(found["scratch"]["free_bytes"], 0)
+        self.assertEqual(pathlib.Path(found["program"]), pathlib.Path(COVOL).resolve())
+        for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: there"):
+            self.assertIn(word, said)
+
+    def test_a_browser(self):
+        tools = self.out / "bin"
+        tools.mkdir()
+        (tools / "xdg-open").write_text("#!/bin/sh\n")
+        (tools / "xdg-open").chmod(0o755)
+
+        def browser(**more):
+            environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+            done = subprocess.run([COVOL, "doctor"], capture_output=True, text=True, env={**environment, **more}, check=True)
+            return next(line for line in done.stdout.splitlines() if line.startswith("browser: "))
+
+        self.assertEqual(browser(PATH=str(tools), DISPLAY=":0"), f"browser: opened by {tools}/xdg-open")
+        self.assertIn("no display", browser(PATH=str(tools)))
+        self.assertIn("no xdg-open", browser(PATH=str(self.out), DISPLAY=":0"))
+
+    def test_what_is_wrong_is_a_warning(self):
+        environment = {**os.environ, "TMPDIR": str(self.out / "nowhere")}
+        done = subprocess.run([COVOL, "doctor", "--strict"], capture_output=True, text=True, env=environment)
+        self.assertEqual(done.returncode, 5, done.stderr)
+        self.assertIn("set TMPDIR", done.stderr)
+        self.assertIn("browser: ", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,150 @@
+#include <link.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "cli/free_memory.h"
+#include "commands/commands.h"
+#include "covol/evolve.h"
+#include "covol/reader_parts.h"
+#include "covol/version.h"
+#include "mark/browser.h"
+
+namespace covol::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string gib(std::uint64_t bytes) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f GiB", double(bytes) / double(1ULL << 30));
+    return text;
+}
+
+std::string variable(const char* name) {
+    const char* const value = std::getenv(name);
+    return value == nullptr ? "" : value;
+}
+
+/// The shared libraries that are loaded now, as their files are called behind all links.
+std::set<fs::path> loaded_libraries() {
+    std::set<fs::path> found;
+    const auto add = [](dl_phdr_info* info, std::size_t, void* to) {
+        std::error_code failed;
+        const fs::path path = fs::canonical(info->dlpi_name, failed);
+        if (*info->dlpi_name != '\0' && !failed) static_cast<std::set<fs::path>*>(to)->insert(path);
+        return 0;
+    };
+    dl_iterate_phdr(add, &found);
+    return found;
+}
+
+bool is_main(const std::string& name) {
+    constexpr const char* kNames[] = {"libcovol.", "libopenvdb.", "libtbb.", "libtiff.", "libITKIONRRD", "libhdf5"};
+    return std::any_of(std::begin(kNames), std::end(kNames), [&](const char* main) { return name.starts_with(main); });
+}
+
+struct DoctorJob {
+    void run(Session& session) const {
+        Json& report = session.report()["doctor"];
+        session.say(std::string("covol ") + version() + ", " + build_text());
+        if (std::string(version()) != COVOL_VERSION_STRING)
+            session.warn(
+                std::string("the program is of version " COVOL_VERSION_STRING ", the library that it found of ") +
+                version() + "; install covol again, and see LD_LIBRARY_PATH");
+        const std::string program = fs::read_symlink("/proc/self/exe").string();
+        session.say("program: " + program);
+        report = {{"build", build_text()}, {"program", program}};
+        report["readers"] = readers(session);  // before libraries(): their own are then loaded
+        report["libraries"] = libraries(session);
+        const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
+        session.say(std::string("processor: ") + std::to_string(cores) + " cores, instruction set " +
+                    instruction_set());
+        report["cores"] = cores;
+        report["memory"] = memory(session);
+        report["scratch"] = scratch(session);
+        report["browser"] = browser(session);
+    }
+
+private:
+    static Json readers(Session& session) {
+        Json list = Json::array();
+        for (const ReaderPart& part : check_reader_parts()) {
+            if (part.problem.empty())
+                session.say("reader " + part.name + ": there (" + part.formats + ")");
+            else
+                session.warn("reader " + part.name + " (" + part.formats + "): " + part.problem);
+            list.push_back(
+                {{"name", part.name}, {"formats", part.formats}, {"path", part.path}, {"problem", part.problem}});
+        }
+        session.say("other formats need no part of their own: TIFF, NIfTI, OME-Zarr, MRC, OpenVDB, meshes, tables");
+        return list;
+    }
+
+    static Json libraries(Session& session) {
+        std::map<std::string, int> folders;
+        Json list = Json::array();
+        std::string main;
+        for (const fs::path& path : loaded_libraries()) {
+            ++folders[path.parent_path().string()];
+            list.push_back(path.string());
+            if (is_main(path.filename().string())) main += (main.empty() ? "" : ", ") + path.filename().string();
+        }
+        std::string text = "libraries: " + main;
+        for (const auto& [folder, count] : folders) text += "\n  " + std::to_string(count) + " in " + folder;
+        for (const char* const name : {"LD_LIBRARY_PATH", "LD_PRELOAD"})
+            if (const std::string value = variable(name); !value.empty())
+                text += std::string("\n  ") + name + " is " + value;
+        session.say(text);
+        return list;
+    }
+
+    static Json memory(Session& session) {
+        const std::optional<FreeMemory> free = find_free_memory();
+        if (!free) {
+            session.say("memory: nobody says what is free");
+            return {{"free_bytes", nullptr}, {"where", ""}};
+        }
+        session.say("memory: " + gib(free->bytes) + " free, says " + free->where);
+        return {{"free_bytes", free->bytes}, {"where", free->where}};
+    }
+
+    static Json scratch(Session& session) {
+        std::error_code failed;
+        const fs::path folder = fs::temp_directory_path(failed);
+        const fs::space_info space = failed ? fs::space_info{0, 0, 0} : fs::space(folder, failed);
+        if (failed) {
+            session.warn("temporary files: " + folder.string() + ": " + failed.message() +
+                         "; set TMPDIR to a folder that can be written");
+            return {{"folder", folder.string()}, {"free_bytes", 0}};
+        }
+        session.say("temporary files: " + folder.string() + ", " + gib(space.available) + " free");
+        return {{"folder", folder.string()}, {"free_bytes", space.available}};
+    }
+
+    static Json browser(Session& session) {
+        const std::string opener = find_opener();
+        const std::string display =
+            variable("WAYLAND_DISPLAY").empty() ? variable("DISPLAY") : variable("WAYLAND_DISPLAY");
+        if (opener.empty() || display.empty())
+            session.say(std::string("browser: ") + (opener.empty() ? "no xdg-open, " : "no display, ") +
+                        "so covol mark prints its address; from another machine: covol mark IMAGE --no-browser --port "
+                        "9000 behind ssh -L 9000:127.0.0.1:9000");
+        else
+            session.say("browser: opened by " + opener);
+        return {{"opener", opener}, {"display", display}};
+    }
+};
+
+}  // namespace
+
+void add_doctor(Session& session) {
+    session.add_job<DoctorJob>("doctor", "What this covol is and finds here: libraries, readers, memory, browser");
+}
+
+}  // namespace covol::tool
