@@ -3,11 +3,15 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/blender_test.py
 """
 import json
+import os
 import shutil
 import subprocess
+import sys
+import tomllib
 import unittest
+from pathlib import Path
 
-from interchange_test import MISSING, Folder
+from interchange_test import COVOL, MISSING, Folder
 
 SCRIPT = "houdini_free_examples/13_blender.py"
 BLENDER = shutil.which("blender")
@@ -23,7 +27,6 @@ class Blender(Folder):
         cls.run_covol("mesh", "both.vdb", "-o", "m.glb", "--quiet")
 
     def blender(self, *words, code=0):
-        from pathlib import Path
         script = Path(__file__).resolve().parents[2] / SCRIPT
         done = subprocess.run([BLENDER, "-b", "--factory-startup", "--python", str(script), "--", ".", *words],
                               cwd=self.out, capture_output=True, text=True, timeout=300)
@@ -59,6 +62,40 @@ class Blender(Folder):
             with self.subTest(compression):
                 self.run_covol("convert", "both.vdb", "packed.vdb", "--compression", compression, "--half", "--quiet")
                 self.blender("packed.vdb", "m.ply", "m.glb", "checks")
+
+
+@unittest.skipIf(MISSING, MISSING)
+@unittest.skipUnless(BLENDER, "SKIPPED: Blender is not installed (apt-get install --no-install-recommends blender)")
+class Addon(Folder):
+    """tools/blender, installed into a Blender that has nothing else."""
+
+    def test_marks_become_objects(self):
+        root = Path(__file__).resolve().parents[2]
+        subprocess.run([sys.executable, root / "tools/plugins/pack.py", "blender", "--output", self.out], check=True, capture_output=True)
+        [archive] = self.out.glob("covol_blender-*.zip")
+        folder = self.out / "addon"
+        folder.mkdir()
+        environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(self.out / "scripts"), "COVOL": str(Path(COVOL).resolve())}
+        done = subprocess.run([BLENDER, "-b", "--factory-startup", "--python-exit-code", "1", "--python", root / "tests/cli/blender_addon.py",
+                               "--", archive, self.private / "i.tif", self.private / "p.xyz", folder],
+                              capture_output=True, text=True, timeout=300, env=environment)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        checks = json.loads((folder / "addon.json").read_text())
+        self.assertEqual([what for what, holds in checks.items() if not holds], [], done.stdout)
+        self.assertGreater(len(checks), 20)
+
+    def test_the_manifest_of_an_extension(self):
+        """By the rules of Blender 4.2's manual; Debian's Blender knows no extensions."""
+        root = Path(__file__).resolve().parents[2]
+        manifest = tomllib.loads((root / "tools/blender/covol_blender/blender_manifest.toml").read_text())
+        for name in ("schema_version", "id", "version", "name", "tagline", "maintainer", "type", "blender_version_min", "license"):
+            self.assertTrue(manifest[name], name)
+        self.assertLessEqual(len(manifest["tagline"]), 64)
+        self.assertNotRegex(manifest["tagline"], r"[.!]$")
+        self.assertLessEqual(set(manifest["permissions"]), {"files", "network", "clipboard", "camera", "microphone"})
+        for text in manifest["permissions"].values():
+            self.assertFalse(text.endswith("."))
+        self.assertIn(manifest["version"], subprocess.run([COVOL, "--version"], capture_output=True, text=True).stdout)
 
 
 if __name__ == "__main__":

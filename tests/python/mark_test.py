@@ -108,12 +108,12 @@ def test_what_cannot_be_shown(sphere, program, tmp_path):
 
 
 def test_an_array_comes_back_as_it_was(tmp_path):
-    from covol._mark import _write_nrrd
+    from covol._files import write_nrrd
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     for kind in (np.uint8, np.int16, np.float32, np.float64):
         array = (np.arange(60).reshape(3, 4, 5) - (0 if kind == np.uint8 else 7)).astype(kind)
         image = covol.Image(array, spacing=(0.5, 0.25, 2), origin=(1, 2, 3), direction=turn, unit="um")
-        _write_nrrd(tmp_path / "a.nrrd", image)
+        write_nrrd(tmp_path / "a.nrrd", image)
         back = covol.read_image(tmp_path / "a.nrrd")
         assert np.array_equal(back.array, array)
         np.testing.assert_allclose(back.spacing, image.spacing)

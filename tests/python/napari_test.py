@@ -141,3 +141,46 @@ def test_a_sheared_image(scene):
     assert dice(mask, labels) > 0.97
     assert np.allclose(about["affine"], layers.transform_of(sheared))
     assert np.linalg.norm(vertices.mean(0) - (layers.transform_of(sheared) @ (12, 18, 20, 1))[:3]) < 0.5
+
+
+class Viewer:
+    """What layers.show() uses of napari's viewer, by its documentation: `layers`, add_labels(), add_surface(), add_points()."""
+
+    def __init__(self):
+        self.layers = []
+
+    def add(kind):
+        def add(self, data, *, name, metadata, affine=None, units=None, features=None, face_color=None, size=None):
+            layer = type(kind.title(), (), {})()
+            layer.__dict__.update(data=data, name=name, metadata=metadata, affine=affine, units=units, features=features, visible=True)
+            self.layers.append(layer)
+        return add
+
+    add_labels, add_surface, add_points = add("labels"), add("surface"), add("points")
+
+
+def test_results_go_into_the_layers_of_the_last_one(scene):
+    image, labels, _, world = scene
+    scaled = Layer(**vars(image), units=("micrometer",) * 3)
+    viewer = Viewer()
+    first = layers.segment(scaled, Layer(data=world), suggestions=0)
+    place = (world[:1], {"name": "cells suggested marks", "metadata": {"covol": {}}, "features": {"slice": [3]}}, "points")
+    layers.show(viewer, [*first, place])
+    mask, surface, places = viewer.layers
+    assert [layer.units for layer in (mask, surface)] == [("micrometer",) * 3] * 2 and len(places.data) == 1
+    surface.visible = False
+    mine = type("Labels", (), {"name": mask.name + " 2", "metadata": {}, "data": labels})()
+    viewer.layers.append(mine)
+    middle = world.mean(0)
+    layers.show(viewer, layers.segment(scaled, Layer(data=middle + 0.8 * (world - middle)), suggestions=0, init="tag"))
+    assert viewer.layers == [mask, surface, mine] and not surface.visible and mine.data is labels
+    assert dice(mask.data, labels) < 0.97 and mask.metadata["covol"]["resolved"] and len(surface.data[0]) != len(first[1][0][0])
+    assert layers.units_of(Layer()) is None and layers.units_of(Layer(units=("s", "nm", "um", "um"))) == ("nm", "um", "um")
+
+
+def test_a_layer_of_a_person_is_not_taken(scene):
+    image, labels, _, world = scene
+    viewer = Viewer()
+    viewer.layers.append(type("Labels", (), {"name": "cells covol", "metadata": {}, "data": labels})())
+    layers.show(viewer, layers.segment(image, Layer(data=world), suggestions=0))
+    assert len(viewer.layers) == 3 and viewer.layers[0].data is labels

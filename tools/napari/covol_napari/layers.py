@@ -128,22 +128,55 @@ def segment(image, points=None, shapes=None, labels=None, labels_as="painted", s
         given.update(points=marks, points_space="world", points_order="xyz")
     result = covol.segment(voxels_of(image, step), **geometry_of(image), **given)
     name = getattr(image, "name", "image")
-    return layers_of(result, transform_of(image), name, suggestions)
+    return layers_of(result, transform_of(image), name, suggestions, units_of(image))
 
 
-def layers_of(result, transform, name, suggestions=0):
-    """@param transform  of the image's data to napari's world"""
+def units_of(layer):
+    """Of a layer's last three axes, as napari from 0.5.5 on has them; None of an older one."""
+    units = getattr(layer, "units", None)
+    return None if units is None or len(units) < 3 else tuple(units[-3:])
+
+
+def layers_of(result, transform, name, suggestions=0, units=None):
+    """@param transform  of the image's data to napari's world @param units  of its three axes: the scale bar's"""
     mesh = result.mesh
-    where = {"affine": transform}
+    about = {"metadata": {"covol": result.report}, **({} if units is None else {"units": units})}
     made = [
-        (result.mask, {"name": f"{name} covol", "metadata": {"covol": result.report}, **where}, "labels"),
+        (result.mask, {"name": f"{name} covol", "affine": transform, **about}, "labels"),
         # another order of the axes is a mirror: corners in reverse keep the outside outside
-        ((mesh.vertices[:, ::-1].copy(), mesh.faces[:, ::-1].astype(np.int64)), {"name": f"{name} covol surface"}, "surface"),
+        ((mesh.vertices[:, ::-1].copy(), mesh.faces[:, ::-1].astype(np.int64)), {"name": f"{name} covol surface", **about}, "surface"),
     ]
     found = result.suggest(suggestions) if suggestions > 0 else []
     if found:
         made.append((np.array([s.world[::-1] for s in found]),
                      {"name": f"{name} suggested marks", "features": {"slice": [s.slice for s in found],
                                                                       "area": [s.area for s in found]},
-                      "face_color": "yellow", "size": 5 * result.surface.voxel_size}, "points"))
+                      "face_color": "yellow", "size": 5 * result.surface.voxel_size, **about}, "points"))
     return made
+
+
+def show(viewer, made):
+    """Puts layer-data tuples into a viewer: into the layers of the last result of the same name, which keep their place, colours and
+    visibility, or into new ones. Suggested places that are done with go.
+    """
+    for data, meta, kind in made:
+        last = _shown(viewer, meta["name"], kind)
+        if last is None:
+            getattr(viewer, "add_" + kind)(data, **meta)
+            continue
+        last.data = data
+        for key in ("affine", "features", "metadata"):
+            if key in meta:
+                setattr(last, key, meta[key])
+    if made and not any(kind == "points" for _, _, kind in made):
+        gone = _shown(viewer, made[0][1]["name"].removesuffix(" covol") + " suggested marks", "points")
+        if gone is not None:
+            viewer.layers.remove(gone)
+
+
+def _shown(viewer, name, kind):
+    """The layer of that name and kind that a result was put into; a person's own layer is none."""
+    for layer in viewer.layers:
+        if layer.name == name and type(layer).__name__.lower() == kind and "covol" in layer.metadata:
+            return layer
+    return None

@@ -31,8 +31,7 @@ def make_widget():
 
         def show(made):
             panel.call_button.enabled = True
-            for data, meta, kind in made:
-                getattr(viewer, "add_" + kind)(data, **meta)
+            layers.show(viewer, made)
             for line in made[0][1]["metadata"]["covol"]["warnings"]:
                 show_warning(line)
 

@@ -11,38 +11,17 @@ import weakref
 
 import numpy as np
 
-from . import _covol, _inputs
+from . import _covol, _files, _inputs
 from ._errors import Error
 
 _PATIENCE = 30  # seconds for the program to end
-_TYPES = {"uint8": "uint8", "int8": "int8", "uint16": "uint16", "int16": "int16", "uint32": "uint32", "int32": "int32",
-          "float32": "float", "float64": "double"}
 
 
 def _program(given):
-    found = given or os.environ.get("COVOL") or shutil.which("covol")
+    found = given or os.environ.get("COVOL") or getattr(_covol, "PROGRAM", None) or shutil.which("covol")
     if not found:
         raise Error("mark: the program covol was not found; install it, or name it with program=", "io", "program")
     return os.path.abspath(os.fspath(found))
-
-
-def _write_nrrd(path, image):
-    """An image as a file that covol reads back to the same numbers."""
-    array = np.ascontiguousarray(image.array)
-    if array.dtype == bool:
-        array = array.astype(np.uint8)
-    if array.dtype.name not in _TYPES:
-        array = array.astype(np.float32)
-    axes = np.asarray(image.direction) * np.asarray(image.spacing)
-    vectors = " ".join("(" + ",".join(repr(float(x)) for x in axes[:, a]) + ")" for a in range(3))
-    head = ["NRRD0004", f"type: {_TYPES[array.dtype.name]}", "dimension: 3", "space dimension: 3",
-            "sizes: " + " ".join(map(str, array.shape[::-1])), f"space directions: {vectors}", "endian: little", "encoding: raw",
-            "space origin: (" + ",".join(repr(float(x)) for x in image.origin) + ")"]
-    if image.unit:
-        head.insert(4, "space units: " + " ".join([f'"{image.unit}"'] * 3))
-    with open(path, "wb") as file:
-        file.write(("\n".join(head) + "\n\n").encode())
-        file.write(array.astype(array.dtype.newbyteorder("<"), copy=False).tobytes())
 
 
 def _notebooks():
@@ -87,7 +66,7 @@ class Study:
             else:  # in the study, which can be opened again without the array
                 os.makedirs(self.folder, exist_ok=True)
                 path = os.path.join(self.folder, "volume.nrrd")
-                _write_nrrd(path, self.image)
+                _files.write_nrrd(path, self.image)
             self._height = int(height)
             origins = [notebook] if isinstance(notebook, str) else _notebooks() if notebook is None else list(notebook)
             command = [_program(program), "mark", path, self.folder, "--no-browser", "--quiet"]
@@ -97,7 +76,7 @@ class Study:
                 command += ["--spacing", ",".join(repr(float(x)) for x in np.broadcast_to(geometry["spacing"], 3))]
             for name, places in _named(marks).items():
                 file = os.path.join(self._own, f"marks{len(command)}.csv")
-                np.savetxt(file, places, "%.17g", ",", header="x,y,z", comments="")
+                _files.write_positions(file, places)
                 command += ["--points", f"{name}={file}"]
             # A group of its own: Ctrl-C in a notebook stops the cell, not the page.
             with open(os.path.join(self._own, "said.txt"), "w+") as said:
@@ -138,8 +117,11 @@ class Study:
         journal = pathlib.Path(self.folder) / "journal.jsonl"
         size = journal.stat().st_size  # it only grows
         if self._known is None or self._known[0] != size:
-            from . import structures
-            self._known = size, structures(self.image, self.marks, **self.options)
+            from . import Structures, structures
+            if hasattr(_covol, "solve_study"):  # by the program, which reads the study itself
+                self._known = size, Structures(*_covol.solve_study(self.image, self.folder, {}, _inputs.call()))
+            else:
+                self._known = size, structures(self.image, self.marks, **self.options)
         return self._known[1]
 
     def close(self):

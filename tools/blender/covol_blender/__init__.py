@@ -1,0 +1,257 @@
+"""covol in Blender: marks on an image's border become a surface, as a mesh and a volume that stay where they are when they are
+made again. In the sidebar of the 3D view, tab covol."""
+import os
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from . import _process, job
+
+bl_info = {
+    "name": "covol",
+    "author": "covol developers",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "3D view > Sidebar > covol",
+    "description": "Surfaces in 3D images and of point clouds from a few marks",
+    "category": "Import-Export",
+}
+ROLE = "covol_role"  # what an object below the space is: "surface" or "volume"
+TICK = 0.1           # seconds between two looks at a run
+
+
+def is_marks(_, candidate):
+    return candidate.type in ("EMPTY", "MESH")
+
+
+class Preferences(bpy.types.AddonPreferences):
+    bl_idname = __package__
+    program: bpy.props.StringProperty(name="Program", subtype="FILE_PATH",
+                                      description="Path of the program covol; empty: the variable COVOL, or as the shell finds it")
+
+    def draw(self, _):
+        self.layout.prop(self, "program")
+
+
+class Settings(bpy.types.PropertyGroup):
+    image: bpy.props.StringProperty(name="Image", subtype="FILE_PATH",
+                                    description="3D image, of any format that covol reads; empty: the marks are a point cloud")
+    marks: bpy.props.PointerProperty(name="Marks", type=bpy.types.Object, poll=is_marks,
+                                     description="An empty whose children are marks, or a mesh whose vertices are")
+    space: bpy.props.PointerProperty(name="Space", type=bpy.types.Object,
+                                     description="The object in whose space the image lies, in its own unit, its first voxel at the image's "
+                                     "origin; where it moves, scales and turns, results go with it. Made where there is none")
+    scale: bpy.props.FloatProperty(name="Scale", default=0.01, min=1e-9, soft_max=1000,
+                                   description="Blender's units for one unit of the image, of a space that is made")
+    voxel_size: bpy.props.StringProperty(name="Voxel size", description="In the image's unit, or voxels as in 2vx; empty: automatic")
+    options: bpy.props.StringProperty(name="Options", description="Further options of covol segment, --model paper for example")
+    folder: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", default="//covol",
+                                     description="Where results are written; // is the folder of the .blend file")
+    status: bpy.props.StringProperty()
+
+
+def program_of(context):
+    addon = context.preferences.addons.get(__package__)
+    return addon.preferences.program if addon else ""
+
+
+def space_of(context):
+    """The object in whose space the image lies, made where there is none."""
+    settings = context.scene.covol
+    if settings.space is None:
+        space = bpy.data.objects.new("covol space", None)
+        context.scene.collection.objects.link(space)
+        space.scale = (settings.scale,) * 3
+        context.view_layer.update()
+        settings.space = space
+    return settings.space
+
+
+def places_of(marks, space):
+    """(n, 3), x, y, z, of marks in the image's world."""
+    if marks is None:
+        return np.zeros((0, 3))
+    if marks.type == "MESH":
+        local = np.empty(3 * len(marks.data.vertices))
+        marks.data.vertices.foreach_get("co", local)
+        turn = np.array(marks.matrix_world)
+        places = local.reshape(-1, 3) @ turn[:3, :3].T + turn[:3, 3]
+    else:
+        places = np.array([child.matrix_world.translation for child in marks.children]).reshape(-1, 3)
+    back = np.linalg.inv(np.array(space.matrix_world))
+    return places @ back[:3, :3].T + back[:3, 3]
+
+
+def child_of(space, role, make, context):
+    """The object below the space that has this role, made where there is none."""
+    for child in space.children:
+        if child.get(ROLE) == role:
+            return child
+    made = bpy.data.objects.new(f"covol {role}", make())
+    made[ROLE] = role
+    context.scene.collection.objects.link(made)
+    made.parent = space
+    made.matrix_parent_inverse = Matrix()
+    return made
+
+
+def show(context, space, run, columns, faces, report):
+    """Puts a result into the scene: in the objects of the last one, with their materials and modifiers."""
+    surface = child_of(space, "surface", lambda: bpy.data.meshes.new("covol surface"), context)
+    mesh = surface.data
+    mesh.clear_geometry()
+    mesh.from_pydata(np.stack(columns, 1).tolist(), [], faces.tolist())
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+    mesh.update()
+    volume = child_of(space, "volume", lambda: bpy.data.volumes.new("covol volume"), context)
+    before = volume.get("covol_files", "").splitlines()
+    volume.data.filepath = str(run.vdb)
+    if not volume.data.grids.load():
+        raise _process.Failed(4, f"{run.vdb}: {volume.data.grids.error_message}")
+    volume["covol_files"] = "\n".join(str(path) for path in (run.vdb, run.ply, run.report))
+    for path in before:  # of the last result, which nothing shows now
+        if os.path.exists(path):
+            os.remove(path)
+    for key in ("volume", "area", "genus"):
+        surface[f"covol_{key}"] = report["surface"][key]
+    context.scene.covol.status = job.summary(report)
+
+
+class Segment(bpy.types.Operator):
+    """Finds the surface through the marks, in the image or of the marks alone"""
+    bl_idname = "covol.segment"
+    bl_label = "Find the surface"
+    bl_options = {"REGISTER"}
+
+    _timer = _run = _space = None
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.covol.marks is not None
+
+    def start(self, context):
+        settings = context.scene.covol
+        folder = bpy.path.abspath(settings.folder)
+        if settings.folder.startswith("//") and not bpy.data.filepath:
+            raise _process.Failed(3, "save the .blend file first, or choose a folder that does not begin with //")
+        self._space = space_of(context)
+        image = bpy.path.abspath(settings.image) if settings.image else ""
+        name = os.path.basename(image).split(".")[0] if image else settings.marks.name
+        self._run = job.Job(program_of(context), folder, name, image, places_of(settings.marks, self._space), settings.voxel_size,
+                            settings.options)
+
+    def tell(self, event):
+        kind, value = event
+        if kind == "warning":
+            self.report({"WARNING"}, value)
+        elif kind == "stage":
+            bpy.context.scene.covol.status = f"{value[0]} {100 * value[1]:.0f} %"
+
+    def finish(self, context):
+        show(context, self._space, self._run, *self._run.result())
+        self.report({"INFO"}, context.scene.covol.status)
+        return {"FINISHED"}
+
+    def fail(self, context, error):
+        context.scene.covol.status = str(error)
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+    def execute(self, context):
+        """To its end, for scripts."""
+        try:
+            self.start(context)
+            for event in self._run.process.follow():
+                self.tell(event)
+            return self.finish(context)
+        except _process.Failed as error:
+            return self.fail(context, error)
+
+    def invoke(self, context, _):
+        """Beside the work of the person; Escape cancels."""
+        try:
+            self.start(context)
+        except _process.Failed as error:
+            return self.fail(context, error)
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self._run.process.cancel()
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        events = self._run.process.poll()
+        for found in events or []:
+            self.tell(found)
+        for area in context.screen.areas:
+            area.tag_redraw()
+        if events is not None:
+            return {"PASS_THROUGH"}
+        context.window_manager.event_timer_remove(self._timer)
+        try:
+            return self.finish(context)
+        except _process.Failed as error:
+            return self.fail(context, error)
+
+
+class AddMark(bpy.types.Operator):
+    """Adds a mark at the 3D cursor, to the empty that has the marks"""
+    bl_idname = "covol.add_mark"
+    bl_label = "Mark at the cursor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        marks = context.scene.covol.marks
+        return marks is None or marks.type == "EMPTY"
+
+    def execute(self, context):
+        settings = context.scene.covol
+        if settings.marks is None:
+            settings.marks = bpy.data.objects.new("covol marks", None)
+            context.scene.collection.objects.link(settings.marks)
+        mark = bpy.data.objects.new("mark", None)
+        context.scene.collection.objects.link(mark)
+        mark.empty_display_size = 3 * (settings.space.matrix_world.median_scale if settings.space else settings.scale)
+        mark.empty_display_type = "SPHERE"
+        mark.parent = settings.marks
+        mark.matrix_world = Matrix.Translation(Vector(context.scene.cursor.location))
+        return {"FINISHED"}
+
+
+class Panel(bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_covol"
+    bl_label = "covol"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "covol"
+
+    def draw(self, context):
+        settings, layout = context.scene.covol, self.layout
+        layout.use_property_split = True
+        for name in ("image", "marks", "space", "scale", "voxel_size", "options", "folder"):
+            row = layout.row()
+            row.enabled = name != "scale" or settings.space is None
+            row.prop(settings, name)
+        layout.operator(AddMark.bl_idname)
+        layout.operator(Segment.bl_idname)
+        if settings.status:
+            layout.label(text=settings.status)
+
+
+CLASSES = (Preferences, Settings, Segment, AddMark, Panel)
+
+
+def register():
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+    bpy.types.Scene.covol = bpy.props.PointerProperty(type=Settings)
+
+
+def unregister():
+    del bpy.types.Scene.covol
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)
