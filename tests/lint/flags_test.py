@@ -13,7 +13,7 @@ FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # "--" alone is put before a
 FIELD = re.compile(r"`([a-z_]+)(?=`| = )|(?:^|, )([a-z_]{2,}) = ")
 ROW = re.compile(r'Option\{\s*"([a-z_]+)",\s*&')
 # Flags that belong to no struct of options.
-BY_HAND = {"checkpoint", "checkpoint_every", "contours", "guess", "inside", "outside", "resume"}
+BY_HAND = {"checkpoint", "checkpoint_every", "contours", "guess", "inside", "outside", "resume", "structure_column"}
 # Options of every kind that nothing names but their row: the rest is made from it. Others are named where one depends on another, where a
 # report has a result of the same name, and in messages about what would help.
 PLAIN = ("guess_weight", "epsilon", "edge_epsilon", "solver_tolerance", "coarse_levels", "guess_radius", "hole_distance", "contour_curve",

@@ -20,7 +20,7 @@ ALLOWED = {
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
     "guidance/border_profile.cpp:kNothing", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
     "inference/appearance.cpp:kEnough", "inference/appearance.cpp:kFeatureSigmas", "inference/candidate.cpp:kCells", "inference/candidate.cpp:kFarCells",
-    "inference/candidate.cpp:kMostCells", "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMostCells",
+    "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMostCells",
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMostCaps",
