@@ -137,8 +137,8 @@ export class BodyScene extends Stage3D {
     const box = new Box3();
     for (const [id, {mesh}] of this.surfaces) if (study.structure(id)?.visible) box.union(mesh.geometry.boundingBox);
     this.setBox(box.isEmpty() ? this.imageBox : box);
-    const ball = ballOf(study.structures.reduce((sum, {marks}) => sum + marks.length, 0));
-    for (const structure of study.structures) this.updateMarks(structure, ball);
+    const count = study.structures.reduce((sum, {marks}) => sum + marks.length, 0);
+    for (const structure of study.structures) this.updateMarks(structure, count);
     if (!box.isEmpty() && !this.isTouched && !this.isWellSeen()) this.look(this.camera.position.clone().sub(this.controls.target), true);
     for (const axis of [0, 1, 2]) if (this.planes[axis].group.visible && this.app.panels[axis]) this.drawOutlines(axis);
     this.updateClip();
@@ -177,18 +177,18 @@ export class BodyScene extends Stage3D {
     own.mesh.visible = structure.visible;
   }
 
-  updateMarks(structure, ball) {
+  updateMarks(structure, count) {
     let own = this.balls.get(structure.id);
-    const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null;
-    const isShown = structure.visible && this.state.get('marks'), key = [structure.marks, structure.color, isShown, moved, this.sphere.radius, ball];
+    const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null, isShown = structure.visible && this.state.get('marks');
+    // On the screen about as large beside a small body as beside a large one; smaller where there are many.
+    const radius = this.sphere.radius * Math.min(0.013, Math.max(0.005, 0.2 / Math.sqrt(count))), ball = ballOf(count);
+    const key = [structure.marks, structure.color, isShown, moved, radius, ball];
     if (own && key.every((part, n) => part === own.key[n])) return;
     if (own) {
       this.scene.remove(own.group);
-      for (const ball of own.group.children) ball.dispose();
+      for (const one of own.group.children) one.dispose();
     }
     own = {key, group: new Group()};
-    // On the screen about as large beside a small body as beside a large one.
-    const radius = this.sphere.radius * Math.min(0.013, Math.max(0.005, 0.2 / Math.sqrt(structure.marks.length)));
     for (const kind of KINDS) {
       const marks = structure.marks.filter((m) => m.kind === kind);
       if (marks.length === 0) continue;
