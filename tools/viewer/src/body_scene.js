@@ -101,12 +101,14 @@ export class BodyScene extends Stage3D {
   refreshIn(wait) {
     const due = performance.now() + wait;
     if (this.due <= due) return;
-    clearTimeout(this.timer);
-    this.due = due;
-    this.timer = setTimeout(() => {
+    const refresh = () => {
       this.due = Infinity;
       if (this.isChanged()) this.update();
-    }, wait);
+    };
+    clearTimeout(this.timer);
+    this.due = due;
+    if (wait > 0) this.timer = setTimeout(refresh, wait);
+    else refresh();
   }
 
   /** Whether structures came, went, or are shown in another way. */
