@@ -85,15 +85,19 @@ struct Contours {
     std::string summary;        ///< one line for people
     bool is_network = false;    ///< planes of several directions: no solid, `along` is thinned, and the sides are told
     std::vector<Vec3> inside, outside;  ///< of a network: places in its planes, by the even-odd rule in each
+    /// Of a network: of each place of `along` the direction within its plane that points out of the section; empty
+    /// where there are open lines.
+    std::vector<Vec3> outward;
 };
 
 /// Joins and densifies the lines of one or several clouds (several belong to one structure), and closes what lies
 /// between the slices.
 ///
 /// The plane of a line is found from its marks: an index coordinate that is constant along it, else the plane that they
-/// lie closest to. Closed lines in parallel planes of any direction make the solid; those of several directions are a
-/// network. Open lines are joined along themselves only. Points that belong to no line count as marks. A closed line of
-/// fewer than three distinct marks is taken as open.
+/// lie closest to. Closed lines in parallel planes of any direction make the solid, where all lie across axes those of
+/// the axis with the most marks; closed lines in planes of several other directions are a network. Other lines are
+/// joined along themselves only. Points that belong to no line count as marks. A closed line of fewer than three
+/// distinct marks is taken as open.
 /// @throws Error InvalidOptions; InvalidInput (no line; a line that lies in no plane; a line outside the image: both
 ///         name it).
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,

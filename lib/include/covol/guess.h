@@ -24,13 +24,18 @@ struct GuessOptions {
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
     std::optional<WorldBox> end;
+    /// About where the normals point, outwards: one for each mark. Empty: nothing is known.
+    std::vector<Vec3> normals;
 };
 
 template <>
-inline constexpr auto kOptions<GuessOptions> = std::tuple{
-    Option{"deviation", &GuessOptions::deviation},
-    Option{"most_deviation", &GuessOptions::most_deviation, kNotNegative}, Option{"inside", &GuessOptions::inside},
-    Option{"outside", &GuessOptions::outside}, Option{"end", &GuessOptions::end}};
+inline constexpr auto kOptions<GuessOptions> =
+    std::tuple{Option{"deviation", &GuessOptions::deviation},
+               Option{"most_deviation", &GuessOptions::most_deviation, kNotNegative},
+               Option{"inside", &GuessOptions::inside},
+               Option{"outside", &GuessOptions::outside},
+               Option{"end", &GuessOptions::end},
+               Option{"normals", &GuessOptions::normals}};
 
 struct GuessReport {
     std::size_t marks = 0;        ///< that hold the surface

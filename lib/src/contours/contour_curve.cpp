@@ -68,6 +68,15 @@ std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed,
     return curve;
 }
 
+double length_of(const std::vector<Vec3>& curve, bool closed) {
+    double length = 0;
+    for (std::size_t n = closed ? 0 : 1; n < curve.size(); ++n) {
+        const Vec3 &a = curve[n == 0 ? curve.size() - 1 : n - 1], &b = curve[n];
+        length += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+    }
+    return length;
+}
+
 std::vector<Vec3> evenly_along(const std::vector<Vec3>& curve, bool closed, double step) {
     double length = 0, next = 0;
     std::vector<Vec3> kept;

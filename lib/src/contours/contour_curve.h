@@ -13,6 +13,8 @@ namespace covol::detail {
 /// returned as they are. @pre no two neighbours are equal
 [[nodiscard]] std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed, double step);
 
+[[nodiscard]] double length_of(const std::vector<Vec3>& curve, bool closed);
+
 /// Places about `step` apart along a curve, its first point among them. @pre the curve has a point, step > 0
 [[nodiscard]] std::vector<Vec3> evenly_along(const std::vector<Vec3>& curve, bool closed, double step);
 

@@ -60,8 +60,7 @@ public:
                             ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
                             "give those as points");
         choose_plane();
-        if (!lies_in_family()) choose_tilted_plane();
-        if (lies_in_family()) {
+        if (lies_in_slices() || choose_tilted_plane()) {
             join_lines();
             make_solid();
         } else {
@@ -76,8 +75,8 @@ private:
     void check_inside(const Line& line) const;
     void find_planes(Line& line) const;
     void choose_plane();
-    [[nodiscard]] bool lies_in_family() const;
-    void choose_tilted_plane();
+    [[nodiscard]] bool lies_in_slices() const;
+    [[nodiscard]] bool choose_tilted_plane();
     [[nodiscard]] std::vector<Vec3> curve_through(const Line& line, const std::vector<Vec3>& marks) const;
     void make_network();
     void join_lines();
@@ -167,15 +166,16 @@ void Densifier::find_planes(Line& line) const {
     }
 }
 
-/// Whether all closed lines lie across the frame's axis.
-bool Densifier::lies_in_family() const {
-    return std::all_of(lines_.begin(), lines_.end(),
-                       [&](const Line& line) { return !line.closed || line.constant[frame_.axis()]; });
+/// Whether each closed line lies across one of the image's axes, or of the world's.
+bool Densifier::lies_in_slices() const {
+    return std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) {
+        return !line.closed || line.constant != std::array<bool, 3>{false, false, false};
+    });
 }
 
 /// Parallel planes of another direction than the image's: a frame of their own, beside which the image's end is no
-/// plane.
-void Densifier::choose_tilted_plane() {
+/// plane. @returns whether closed lines lie in such
+bool Densifier::choose_tilted_plane() {
     const Line* longest = nullptr;
     for (const Line& line : lines_)
         if (line.closed && (longest == nullptr || line.index.size() > longest->index.size())) longest = &line;
@@ -187,7 +187,7 @@ void Densifier::choose_tilted_plane() {
         return detail::thickness_along(line.world, plane.normal) <= tolerance;
     };
     if (!std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) { return !line.closed || is_across(line); }))
-        return;
+        return false;
     ImageGeometry tilted = geometry_;
     tilted.origin = plane.origin;
     tilted.spacing = {spacing, spacing, spacing};
@@ -199,6 +199,7 @@ void Densifier::choose_tilted_plane() {
     geometry_ = tilted;
     along_image_ = false;
     frame_ = SliceFrame(geometry_, 2);
+    return true;
 }
 
 /// The plane that most marks of closed lines lie in; a line that fits several counts for none.
@@ -258,27 +259,25 @@ std::vector<Vec3> Densifier::curve_through(const Line& line, const std::vector<V
 
 /// Planes of several directions: marks along all lines, and places whose side the sections tell.
 void Densifier::make_network() {
-    std::vector<std::vector<Vec3>> curves, closed;
+    std::vector<std::vector<Vec3>> open, closed;
     double length = 0;
     for (const Line& line : lines_) {
-        curves.push_back(curve_through(line, line.world));
-        const std::vector<Vec3>& curve = curves.back();
-        for (std::size_t n = line.closed ? 0 : 1; n < curve.size(); ++n) {
-            const Vec3 &a = curve[n == 0 ? curve.size() - 1 : n - 1], &b = curve[n];
-            length += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
-        }
+        std::vector<Vec3> curve = curve_through(line, line.world);
+        length += detail::length_of(curve, line.closed);
         ++(line.closed ? result_.closed : result_.open);
-        if (line.closed) closed.push_back(curve);
+        (line.closed ? closed : open).push_back(std::move(curve));
     }
     const double step = std::max(options_.step, length / kContours.network_marks);
-    for (std::size_t n = 0; n < lines_.size(); ++n) {
-        const std::vector<Vec3> evenly = detail::evenly_along(curves[n], lines_[n].closed, step);
+    const std::vector<detail::Section> sections =
+        detail::sections_of(closed, has_image_ ? kContours.same_slice * geometry_.smallest_spacing()
+                                               : kContours.same_slice_of_extent * detail::extent_of(result_.marks));
+    detail::SectionMarks marks = detail::marks_along(sections, step);
+    result_.along.insert(result_.along.end(), marks.places.begin(), marks.places.end());
+    if (open.empty() && !has_loose_) result_.outward = std::move(marks.outward);
+    for (const std::vector<Vec3>& curve : open) {
+        const std::vector<Vec3> evenly = detail::evenly_along(curve, false, step);
         result_.along.insert(result_.along.end(), evenly.begin(), evenly.end());
     }
-    const double spacing = geometry_.smallest_spacing();
-    const std::vector<detail::Section> sections =
-        detail::sections_of(closed, has_image_ ? kContours.same_slice * spacing
-                                               : kContours.same_slice_of_extent * detail::extent_of(result_.marks));
     detail::Sides sides = detail::sides_of(sections, options_.step);
     result_.inside = std::move(sides.inside);
     result_.outside = std::move(sides.outside);

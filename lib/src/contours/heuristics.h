@@ -24,6 +24,8 @@ struct ContoursHeuristics {
     double network_discs = heuristic("contours.network_discs", 64);
     /// [of the section's extent] Around its contours, where its outside is told.
     double network_around = heuristic("contours.network_around", 0.25);
+    /// [of a contour's step] Beside a contour, where its outside is looked for.
+    double network_beside = heuristic("contours.network_beside", 1e-3);
 };
 COVOL_HEURISTICS ContoursHeuristics kContours{};
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "contours/contour_curve.h"
 #include "contours/heuristics.h"
 
 namespace covol::detail {
@@ -36,6 +37,18 @@ std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceG
         if (double(centres.size()) >= kContours.network_discs) break;
     }
     return centres;
+}
+
+/// By the even-odd rule.
+bool is_inside(const std::vector<Polygon>& polygons, const Vec2& at) {
+    bool inside = false;
+    for (const Polygon& polygon : polygons)
+        for (std::size_t n = 0, last = polygon.size() - 1; n < polygon.size(); last = n++) {
+            const Vec2 &a = polygon[n], &b = polygon[last];
+            if ((a[1] > at[1]) != (b[1] > at[1]) && at[0] < a[0] + (b[0] - a[0]) * (at[1] - a[1]) / (b[1] - a[1]))
+                inside = !inside;
+        }
+    return inside;
 }
 
 SliceGrid grid_around(const std::vector<Polygon>& polygons, double cell) {
@@ -115,6 +128,32 @@ std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours,
         for (const Vec3& p : contour) polygon.push_back(own->plane.flat(p));
     }
     return sections;
+}
+
+SectionMarks marks_along(const std::vector<Section>& sections, double step) {
+    SectionMarks marks;
+    for (const Section& section : sections)
+        for (const Polygon& polygon : section.polygons) {
+            std::vector<Vec3> curve;
+            for (const Vec2& p : polygon) curve.push_back(section.plane.world(p));
+            const std::vector<Vec3> places = evenly_along(curve, true, step);
+            for (std::size_t n = 0; n < places.size(); ++n) {
+                const Vec2 at = section.plane.flat(places[n]),
+                           before = section.plane.flat(places[n == 0 ? places.size() - 1 : n - 1]),
+                           after = section.plane.flat(places[(n + 1) % places.size()]);
+                Vec2 out{after[1] - before[1], before[0] - after[0]};
+                const double length = std::hypot(out[0], out[1]);
+                if (!(length > 0)) continue;  // of a contour of one or two places
+                out = {out[0] / length, out[1] / length};
+                const double off = kContours.network_beside * step;
+                const Vec2 beside{at[0] + off * out[0], at[1] + off * out[1]};
+                if (is_inside(section.polygons, beside)) out = {-out[0], -out[1]};
+                const Vec3 tip = section.plane.world(out), zero = section.plane.origin;
+                marks.places.push_back(places[n]);
+                marks.outward.push_back(minus(tip, zero));
+            }
+        }
+    return marks;
 }
 
 Sides sides_of(const std::vector<Section>& sections, double cell) {

@@ -33,6 +33,12 @@ struct Section {
 /// Contours by plane: those that lie within `tolerance` of one share it.
 [[nodiscard]] std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance);
 
+/// Places along contours, and the direction within its plane, of length 1, that points out of the section there.
+struct SectionMarks {
+    std::vector<Vec3> places, outward;
+};
+[[nodiscard]] SectionMarks marks_along(const std::vector<Section>& sections, double step);
+
 /// Places whose side the sections tell by the even-odd rule.
 struct Sides {
     std::vector<Vec3> inside, outside;

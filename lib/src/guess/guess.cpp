@@ -57,6 +57,7 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& o
     if (const double said = longest(options.deviation); options.most_deviation > said && said > 0)
         result.most_factor = options.most_deviation * options.most_deviation / (said * said);
     result.world = options.faces;
+    if (options.normals.size() == marks.size()) result.normals = options.normals;  // none was left out
     return result;
 }
 

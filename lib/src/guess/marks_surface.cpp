@@ -157,19 +157,22 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         return part;
     };
     const std::vector<std::size_t> few = spread_out(marks.marks, kMarks.oriented);
-    const Constraints unoriented = with_seeds(part_of(marks, few, {}));
-    const VariationalSurface first(unoriented, {}, Search::Wide);
+    // Where about the normals point is known, no other directions are tried.
+    const bool is_known = !marks.normals.empty();
+    const Search search = is_known ? Search::Near : Search::Wide;
+    const VariationalSurface first(with_seeds(part_of(marks, few, marks.normals)),
+                                   is_known ? at(marks.normals, few) : Normals{}, search);
     const LikeliestVariance likeliest = likeliest_variance(first, marks, few, with_seeds, run);
     const VariationalSurface& oriented = *likeliest.surface;
     variance_factor_ = likeliest.factor;
     const std::vector<std::size_t> many = spread_out(marks.marks, kMarks.whole);
     const auto make_whole = [&](const Normals& normals, double amplitude) {
         const Constraints part = with_factor(with_seeds(part_of(marks, many, normals)));
-        whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), Search::Wide, amplitude);
+        whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), search, amplitude);
         offset_ = mean_value(*whole_, part);
         run.check();
     };
-    make_whole(normals_of(oriented, marks.marks), oriented.amplitude());
+    make_whole(is_known ? marks.normals : normals_of(oriented, marks.marks), oriented.amplitude());
     if (marks.most_factor > 1 && variance_factor_ == 1) {
         const Normals normals = normals_of(*whole_, marks.marks);
         variance_factor_ = likeliest_coarser_factor(marks, normals, run);
@@ -179,7 +182,7 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
 }
 
 void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& run) {
-    const std::vector<Vec3> normals = normals_of(*whole_, marks.marks);
+    const std::vector<Vec3> normals = marks.normals.empty() ? normals_of(*whole_, marks.marks) : marks.normals;
     const std::size_t count = marks.marks.size();
     std::vector<char> covered(count, 0);
     struct Neighbourhood {

@@ -20,6 +20,8 @@ struct ImpreciseMarks {
 
     Clip world;  ///< beyond its end nothing is known
 
+    std::vector<Vec3> normals;  ///< about, outwards: one for each mark, or none
+
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };
 

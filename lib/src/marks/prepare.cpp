@@ -110,10 +110,12 @@ private:
         const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
             list.insert(list.end(), more.begin(), more.end());
         };
+        // Other points have none: then nothing is known.
+        if (marks.points.empty()) marks.hints.normals = network.outward;
         append(marks.points, network.along);
         append(options.inside, network.inside);
         append(options.outside, network.outside);
-        if (!marks.hints.normals.empty()) marks.hints.normals.resize(marks.points.size());
+        if (!marks.hints.normals.empty()) marks.hints.normals.resize(marks.points.size(), Vec3{0, 0, 0});
         if (!marks.hints.to_sensor.empty()) marks.hints.to_sensor.resize(marks.points.size());
     }
 

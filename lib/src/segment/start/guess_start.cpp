@@ -37,6 +37,10 @@ GuessOptions guess_options(const Problem& problem, double h, const std::vector<V
     options.inside = asked.inside;
     options.outside = asked.outside;
     options.outside.insert(options.outside.end(), asked.exterior_seeds.begin(), asked.exterior_seeds.end());
+    const std::vector<Vec3>& normals = asked.hints.normals;
+    const auto is_direction = [](const Vec3& n) { return n != Vec3{0, 0, 0}; };
+    if (normals.size() == marks.size() && std::all_of(normals.begin(), normals.end(), is_direction))
+        options.normals = normals;
     return options;
 }
 
