@@ -570,13 +570,57 @@ TEST_CASE("what is no contour is refused, and the message names it") {
     for (const double step : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
         CHECK(code_of([&] { (void)Drawing(cube(40)).circle(20, 20, 5, 3).densify(step); }) == Errc::InvalidOptions);
     }
-    const Drawing slanted = Drawing(cube(40)).add({{1, 2, 3}, {10, 2, 5}, {5, 9, 8}});
-    CHECK(message_of([&] { (void)slanted.densify(1); }).find("marks.csv: contour 1: expected marks on one slice") !=
+    const Drawing crooked = Drawing(cube(40)).add({{1, 2, 3}, {10, 2, 5}, {5, 9, 8}, {3, 6, 20}});
+    CHECK(message_of([&] { (void)crooked.densify(1); }).find("marks.csv: contour 1: expected marks in one plane") !=
           std::string::npos);
     const Drawing outside = Drawing(cube(40)).circle(20, 20, 5, 3).circle(38, 20, 6, 5);
     const std::string why = message_of([&] { (void)outside.densify(1); });
     CHECK(why.find("contour 2") != std::string::npos);
     CHECK(why.find("outside the image") != std::string::npos);
+}
+
+TEST_CASE("contours in planes of other directions are a network whose directions point out of the sections") {
+    const auto square = [](double low, double high, double slope) {  // around (20, 20, 20), in planes through it
+        std::vector<Vec3> marks;
+        for (const auto& [x, y] : {std::pair{low, low}, {high, low}, {high, high}, {low, high}})
+            marks.push_back({x, y, 20 + slope * (x - 20)});
+        return marks;
+    };
+    const Contours network = Drawing(cube(40))
+                                 .add(square(10, 30, 0.5))
+                                 .add(square(15, 25, 0.5))
+                                 .add(square(10, 30, -0.25))
+                                 .add(square(15, 25, -0.25))
+                                 .densify(1, ContourCurve::Lines);
+    CHECK(network.is_network);
+    CHECK(network.solid == nullptr);
+    CHECK(network.slices == 2);
+    REQUIRE(network.outward.size() == network.along.size());
+    const auto is_in_ring = [](const Vec3& p) {
+        const double off = std::max(std::abs(p[0] - 20), std::abs(p[1] - 20));
+        return off > 5 && off < 10;
+    };
+    for (std::size_t n = 0; n < network.along.size(); ++n) {
+        Vec3 in = network.along[n], out = in;
+        for (int a = 0; a < 3; ++a) {
+            in[a] -= 0.1 * network.outward[n][a];
+            out[a] += 0.1 * network.outward[n][a];
+        }
+        CHECK((is_in_ring(in) && !is_in_ring(out)));
+    }
+    REQUIRE_FALSE((network.inside.empty() || network.outside.empty()));
+    for (const Vec3& p : network.inside) CHECK(is_in_ring(p));
+    for (const Vec3& p : network.outside) CHECK_FALSE(is_in_ring(p));
+    // Parallel ones have a frame of their own.
+    std::vector<Vec3> other = square(10, 30, 0.5);
+    for (Vec3& p : other) p[2] += 6;
+    const Contours tilted = Drawing(cube(40)).add(square(10, 30, 0.5)).add(other).densify(1);
+    CHECK_FALSE(tilted.is_network);
+    REQUIRE(tilted.solid != nullptr);
+    CHECK(tilted.slices == 2);
+    CHECK(std::abs(tilted.slice_distance - 6 / std::sqrt(1.25)) < 1e-6);
+    CHECK(tilted.solid->level({20, 20, 23}) < 0);
+    CHECK(tilted.solid->level({20, 32, 23}) > 0);
 }
 
 TEST_CASE("one mark, two marks, marks on a line and marks that repeat") {
