@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 bash tests/install_packages.sh clang-format-14 snakemake slurm-wlm munge \
-  chromium chromium-driver python3-selenium blender imagej meshlab cloudcompare xvfb xauth
+  chromium chromium-driver python3-selenium blender imagej meshlab cloudcompare xvfb xauth python3-venv python3-pip
 cmake --preset ci
 cmake --build build-ci --parallel "${COVOL_JOBS:-$(nproc)}" --target all all_verify_interface_header_sets
 if [[ -n ${COVOL_DATA:-} ]]; then
