@@ -74,6 +74,25 @@ class Images(PageCase):
         voxel = SPACING[0] * SPACING[1] * math.cos(math.radians(20))
         self.assertAlmostEqual(painted * voxel, math.pi * radius ** 2, delta=0.08 * math.pi * radius ** 2)
 
+    def test_a_plane_of_any_direction_shows_the_image(self):
+        self.open(write=write_sheared)
+        self.slices(*BALL)
+        self.keys("y")
+        grey = ("const o = mark.view.oblique, p = o.pixels, n = 384, at = (x, y) => p.slice(4 * (y * n + x), 4 * (y * n + x) + 4);"
+                "return o.codes ? [[...at(192, 192)], [...at(0, 0)]] : null")
+        middle, corner = self.wait(grey)
+        self.assertGreater(middle[0], 110)  # the bright body lies in the middle
+        self.assertEqual(middle[3], 255)
+        self.assertEqual(corner[3], 0)  # outside of the image
+        self.driver.find_element(By.CSS_SELECTOR, ".three canvas").send_keys("]" * 3)
+        self.wait("return mark.view.oblique.codes")
+        page = Page(self.server.url)
+        for bad in ("first=0,0&right=1,0,0&down=0,1,0&count=9", "first=0,0,0&right=1,0,0&down=0,1,x&count=9", "first=0,0,0&right=1,0,0&down=0,1,0&count=0",
+                    "first=0,0,0&right=1,0,0&down=0,1,0&count=5000", "first=nan,0,0&right=1,0,0&down=0,1,0&count=9"):
+            self.assertEqual(page.get("/oblique?" + bad)[0], 400, bad)
+        self.keys("y")
+        self.wait("return mark.state.get('oblique') === null")
+
     def bright(self, axis, index):
         x, y = self.spot(axis, index)
         red = self.js("const p = mark.panels[arguments[0]], c = p.layer.canvas, b = c.getBoundingClientRect(), r = c.width / b.width; p.draw();"
