@@ -1,0 +1,140 @@
+"""The macro for ImageJ and Fiji: marks as a person sets them there, and what comes back, in Debian's ImageJ under a virtual screen.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/imagej_test.py
+"""
+import csv
+import math
+import os
+import shutil
+import struct
+import subprocess
+import unittest
+from pathlib import Path
+
+from interchange_test import CENTRE, COVOL, MISSING, RADIUS, Folder, np, tifffile
+
+MACRO = Path(__file__).resolve().parents[2] / "tools/imagej/Covol_.ijm"
+JAR = Path("/usr/share/java/ij.jar")
+PROGRAMS = [name for name in ("java", "xvfb-run") if not shutil.which(name)]
+SETUP = '''open("%(image)s");
+%(marks)s
+said = runMacro("%(macro)s", "%(settings)s");
+File.saveString(said, "%(out)s/said.txt");
+if (said != "") exec("sh", "-c", "kill $PPID");
+text = "";
+for (i = 0; i < Overlay.size; i++) {
+    Overlay.activateSelection(i);
+    getStatistics(area);
+    Roi.getPosition(c, z, t);
+    text = text + z + "," + area + "\\n";
+}
+run("Select None");
+File.saveString("title=" + getTitle() + "\\n" + text, "%(out)s/overlay.txt");
+selectImage("Mask of " + getTitle());
+saveAs("Tiff", "%(out)s/back.tif");
+selectWindow("covol: %(title)s");
+saveAs("Results", "%(out)s/table.csv");
+'''
+
+
+def roi_of_points(points):
+    """A selection of the multi-point tool as ImageJ saves it, of (x, y, slice from 1): points of several slices."""
+    n = len(points)
+    head, head2 = bytearray(64), bytearray(64)
+    struct.pack_into(">4shBB", head, 0, b"Iout", 228, 10, 0)
+    struct.pack_into(">H", head, 16, n)
+    struct.pack_into(">h", head, 50, 128)  # coordinates follow as floats, too
+    struct.pack_into(">i", head, 60, 64 + 12 * n)
+    struct.pack_into(">i", head2, 48, 64 + 12 * n + 64)
+    x, y, z = zip(*points)
+    return (bytes(head) + struct.pack(f">{2 * n}h", *map(int, x), *map(int, y)) + struct.pack(f">{2 * n}f", *x, *y) + bytes(head2) +
+            struct.pack(f">{n}i", *(slice << 8 for slice in z)))
+
+
+@unittest.skipIf(MISSING, MISSING)
+@unittest.skipIf(PROGRAMS or not JAR.exists(), "SKIPPED: ImageJ is not there (apt-get install imagej xvfb xauth)")
+class Macro(Folder):
+    def java(self, text):
+        """Runs a macro as from ImageJ's menu: in its batch mode one macro does not see the ROI Manager of another."""
+        (self.out / "test.ijm").write_text(text + 'exec("sh", "-c", "kill $PPID");')
+        return subprocess.run(["xvfb-run", "-a", "java", "-Xmx1g", f"-Duser.home={self.out}", "-cp", JAR, "ij.ImageJ", "-macro",
+                               self.out / "test.ijm"], capture_output=True, text=True, timeout=90, cwd=self.out)
+
+    def imagej(self, marks, settings="", title="i.tif"):
+        """Runs the macro; @return (mask, [(slice, area of its outline)], the table's row)"""
+        for name in ("overlay.txt", "back.tif", "table.csv"):
+            (self.out / name).unlink(missing_ok=True)
+        said = self.java(SETUP % {"image": self.private / "i.tif", "marks": marks, "macro": MACRO, "out": self.out, "title": title,
+                                  "settings": "program=" + str(Path(COVOL).resolve()) + settings})
+        self.assertTrue((self.out / "back.tif").exists(), (self.out / "said.txt").read_text() + said.stdout + said.stderr)
+        name, *rows = (self.out / "overlay.txt").read_text().splitlines()
+        self.assertEqual(name, "title=" + title)
+        with open(self.out / "table.csv", newline="") as file:
+            table = next(csv.DictReader(file))
+        return tifffile.imread(self.out / "back.tif"), [tuple(map(float, row.split(","))) for row in rows], table
+
+    def rings(self):
+        """(slice from 1, x, y) of rings around the ball in pixels, and of its poles."""
+        geometry = self.report("info", self.private / "i.tif")["image"]
+        middle = (np.array(CENTRE) - geometry["origin"]) / geometry["spacing"]
+        radius = RADIUS / np.array(geometry["spacing"])
+        turns = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        rings = []
+        for z in range(math.ceil(middle[2] - radius[2]), math.floor(middle[2] + radius[2]) + 1):
+            part = math.sqrt(max(0, 1 - ((z - middle[2]) / radius[2])**2))
+            rings.append((z + 1, middle[0] + part * radius[0] * np.cos(turns), middle[1] + part * radius[1] * np.sin(turns)))
+        return rings
+
+    def multi_point(self):
+        """A macro that opens the rings as one selection of the multi-point tool."""
+        points = [(x, y, z) for z, xs, ys in self.rings() for x, y in zip(xs, ys)]
+        (self.out / "points.roi").write_bytes(roi_of_points(points))
+        return f'open("{self.out}/points.roi");'
+
+    def expect_the_ball(self, found):
+        mask, outlines, table = found
+        self.run_covol(*self.job, "-o", "s.vdb", "--mask", "s.nrrd")
+        # ImageJ's file lies where the stack does: covol compares the two in the world.
+        compared = self.report("compare", "back.tif", "s.nrrd")["compare"]
+        self.assertGreater(compared["dice"], 0.97)
+        full = [k for k in range(len(mask)) if mask[k].any()]
+        self.assertEqual([int(z) for z, _ in outlines], [k + 1 for k in full])
+        pixel = np.prod(self.report("info", self.private / "i.tif")["image"]["spacing"][:2])
+        for z, area in outlines:
+            self.assertAlmostEqual(area, np.count_nonzero(mask[int(z) - 1]) * pixel, delta=1e-3 * area)
+        self.assertAlmostEqual(float(table["volume"]) / compared["volume_b"], 1, delta=0.05)
+
+    def test_a_multi_point(self):
+        self.expect_the_ball(self.imagej(self.multi_point()))
+
+    def test_outlines_and_points_in_the_roi_manager(self):
+        marks, (first, *between, last) = "", self.rings()
+        for z, xs, ys in between[::2]:  # by the corners of pixels, as ImageJ has outlines of areas
+            x, y = (", ".join(f"{v + 0.5:.2f}" for v in values) for values in (xs, ys))
+            marks += f'setSlice({z}); makeSelection("polygon", newArray({x}), newArray({y})); roiManager("add");\n'
+        for z, xs, ys in (first, last):
+            marks += f'setSlice({z}); makePoint({xs.mean():.2f}, {ys.mean():.2f}, "small"); roiManager("add");\n'
+        self.expect_the_ball(self.imagej(marks))
+
+    def test_settings(self):
+        page = self.out / "it's a page.html"
+        self.imagej(self.multi_point(), f"\\nvoxel size=2vx\\noptions=--rho 0.5 --quiet\\nreport={page}")
+        self.assertGreater(page.stat().st_size, 100_000)
+        self.assertEqual([name for name in os.listdir("/tmp") if name.startswith("covol-1") and os.path.isdir("/tmp/" + name)], [])
+
+    def test_what_is_wrong_is_returned(self):
+        program = Path(COVOL).resolve()
+        stack = f'open("{self.private / "i.tif"}"); '
+        cases = [("", "program=covol", "open a stack first"), (stack, "program=covol", "set marks on the border first"),
+                 (stack + "makePoint(5, 5); ", "program=/nowhere/covol", "/nowhere/covol"),
+                 (stack + "makePoint(5, 5); ", f"program={program}\\noptions=--no-such-option", "--no-such-option")]
+        text = ""
+        for n, (begin, settings, _) in enumerate(cases):
+            text += f'{begin}said = runMacro("{MACRO}", "{settings}"); File.saveString(said, "{self.out}/said{n}.txt"); close("*");\n'
+        done = self.java(text)
+        for n, (_, _, says) in enumerate(cases):
+            self.assertIn(says, (self.out / f"said{n}.txt").read_text(), done.stdout + done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
