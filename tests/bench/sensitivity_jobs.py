@@ -279,8 +279,8 @@ TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere"]
 GUESSED = ["m round", "m torus", "m two"]
 FLOWS = ["m paper", "m init", "m grow"]
 PLAN = {  # step: the jobs that exercise it, the most telling first
-    "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "indicator": CLOUDS, "winding_field": CLOUDS,
-    "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
+    "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "filled": CLOUDS, "indicator": CLOUDS, "winding_field": CLOUDS,
+    "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "iteration": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
     "tagging": TAGGED, "closing": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],
     "variational": ["m torus alone", "few", "m two"], "guidance": GUESSED + REAL_JOBS, "learning": GUESSED + REAL_JOBS, "border": GUESSED + REAL_JOBS, "offset_field": GUESSED,
     "correction": ["m guess", "m guess seed"], "torn": ["spikes", "plate", "normals plate"], "areas": CLOUDS, "join_pieces": ["spikes", "spikes noisy", "plate noisy", "twins"],

@@ -19,8 +19,10 @@ struct CloudReport {
     double near_noise = 0;           ///< CloudScale::near_noise
     int iterations = 0;              ///< of the orientation
     bool encloses = true;            ///< CloudOrientation::encloses
+    bool fills = false;              ///< CloudOrientation::fills
     double indicator_cell = 0;       ///< of its finest lattice
     std::size_t stray = 0;           ///< points far from all surfaces, left out
+    std::size_t enclosed = 0;        ///< CloudOrientation::enclosed
     std::size_t bare_nodes = 0;      ///< places with points that are no sheet: the indicator alone tells of the surface
     std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
     std::size_t joined_pieces = 0;   ///< small ones, joined to what is nearest along points

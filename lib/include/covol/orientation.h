@@ -96,12 +96,15 @@ struct CloudOrientation {
     std::vector<Vec3> points;  ///< those that lie on a surface
     Orientation orientation;   ///< of them
     CloudScale scale;
-    std::size_t stray = 0;  ///< points far from all others that lie on no sheet, left out
-    bool encloses = true;   ///< else the normals are those of what was seen from outside
+    std::size_t stray = 0;     ///< points far from all others that lie on no sheet, left out
+    std::size_t enclosed = 0;  ///< points that given normals put within the solid, left out
+    bool encloses = true;      ///< else the normals are those of what was seen from outside
+    bool fills = false;        ///< the points fill a solid: the indicator is their density, half at its border
     HintsReport hints;
 };
 /// measure_cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly
-/// enclose anything, as scans of some sides do: then each normal points to where its point can be seen from.
+/// enclose anything, as scans of some sides do: then each normal points to where its point can be seen from. Points
+/// that fill a solid are known by their neighbourhoods, of which none is a sheet; their density is the indicator.
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
 /// The same, by normals and sensors where they are consistent: half of them has to foresee the sides of the other half,
 /// and an orientation that settles without them may not contradict them in whole parts. A sensor gives each point the

@@ -8,9 +8,10 @@
 #include <utility>
 
 #include "base/geometry.h"
-#include "cloud/orientation/areas.h"
+#include "cloud/indicator/areas.h"
+#include "cloud/indicator/heuristics.h"
+#include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
-#include "cloud/orientation/indicator.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
 #include "points/heuristics.h"
@@ -172,6 +173,17 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
 }
 
 }  // namespace
+
+std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                                const Indicator& indicator, double reach) {
+    std::vector<char> enclosed(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const Vec3 away = times(reach, normals[n]);
+        enclosed[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
+                                indicator.inside(minus(points[n], away))}) > kGivenSides.enclosed;
+    });
+    return enclosed;
+}
 
 double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const Orientation& orientation,
                 bool turned_over) {

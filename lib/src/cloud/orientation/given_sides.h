@@ -20,6 +20,13 @@ struct GivenSides {
 [[nodiscard]] GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale,
                                      double cell, const RunContext& run);
 
+/// For each point whether the solid is there and on both of its sides, as where two walls touch or two bodies run into
+/// each other: no surface passes there, whatever normals say.
+/// @param normals  of either sign
+/// @param reach    distance from a point at which nothing of it is seen in the indicator, world units
+[[nodiscard]] std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                                              const Indicator& indicator, double reach);
+
 /// Share of the given ones, turned over where all are, that fall in with the orientation's indicator; 0 of none.
 [[nodiscard]] double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given,
                               const Orientation& orientation, bool turned_over);

@@ -43,49 +43,34 @@ struct StrayHeuristics {
 };
 COVOL_HEURISTICS StrayHeuristics kStray{};
 
-/// The lattice of the indicator function: indicator.cpp.
-struct IndicatorHeuristics {
-    /// [longest sides] Of the lattice around the points.
-    double beyond = heuristic("indicator.beyond", 0.2);
-    /// [cells] Fewest along the longest side.
-    int least_cells = heuristic("indicator.least_cells", 48);
-    /// [spacings around a point] Largest cell there, above which its cells are those of a coarser grid.
-    double local_cells = heuristic("indicator.local_cells", 0.5);
-    /// [V-cycles] Of multigrid where nothing is known yet.
-    int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
+/// Points that fill a solid: filled.cpp.
+struct FilledHeuristics {
+    /// [points] That are looked at, evenly spread.
+    std::size_t most_points = heuristic("filled.most_points", 20000);
+    /// [points] Whose neighbourhoods are, of those.
+    std::size_t samples = heuristic("filled.samples", 400);
+    /// [points] Fewest in a neighbourhood.
+    double least_neighbours = heuristic("filled.least_neighbours", 24);
+    /// [radii] Least standard deviation along any direction, at all radii, of points that fill a solid: measured 0.29
+    /// to 0.42 of balls, boxes, tori and lattices, 0.24 and less of surfaces with noise and thin parts.
+    double least_thickness = heuristic("filled.least_thickness", 0.27);
+    /// [distances of the points] Cell of the grid of their density: its splines hold about 70 points.
+    double cell_spacings = heuristic("filled.cell_spacings", 2);
 };
-COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
+COVOL_HEURISTICS FilledHeuristics kFilled{};
 
 /// Normals that agree with their indicator function: orientation.cpp. Hou et al., Iterative Poisson surface
-/// reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022, has the iteration; patches, tries and doubts are ours.
+/// reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022, has the iteration; tries and doubts are ours.
 struct OrientationHeuristics {
-    /// [cells] Edge of the patches over which the indicator is averaged.
-    double patch_cells = heuristic("orientation.patch_cells", 2);
-    /// [indicator] Distance from 1/2 of a patch's mean from which on it may be turned.
-    double patch_off = heuristic("orientation.patch_off", 0.12);
-    /// [rounds] Of turning patches.
-    int patch_rounds = heuristic("orientation.patch_rounds", 4);
-    /// [V-cycles] Of multigrid after each turn of patches.
-    int patch_cycles = heuristic("orientation.patch_cycles", 2);
-    /// [iterations] Of all normals once patches were turned.
-    int after_turning = heuristic("orientation.after_turning", 3);
-    /// [share of the points] In patches that stay turned: fewer, and those left may turn to and fro.
-    double few_stayed = heuristic("orientation.few_stayed", 0.002);
     /// [cells] Of the grid of the density whose gradient is the first guess.
     double first_cells = heuristic("orientation.first_cells", 3.2);
     /// [cells] The same of a further try, if normals go on turning: tunnels and layers close to each other ask for it.
     double finer_first_cells = heuristic("orientation.finer_first_cells", 2.25);
-    /// [1 - cosine] Mean change of the normals at which the iteration ends.
-    double steady = heuristic("orientation.steady", 1e-4);
     /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of
     /// these.
     double enclosed = heuristic("orientation.enclosed", 0.9);
     /// [indicator] The same where more noise is allowed for.
     double surely_enclosed = heuristic("orientation.surely_enclosed", 1.2);
-    /// [V-cycles] Of multigrid in an iteration.
-    int cycles = heuristic("orientation.cycles", 1);
-    /// [V-cycles] Of multigrid in the last one.
-    int last_cycles = heuristic("orientation.last_cycles", 4);
     /// [spacings] Cell of the finest lattice: smaller ones let single points turn, larger ones lose thin parts.
     double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
     /// [noises] The same, at least.
@@ -99,14 +84,6 @@ struct OrientationHeuristics {
     double off_weight = heuristic("orientation.off_weight", 2);
     /// [cells] Of the lattice on which tries are compared, in those of the first: too fine for walls to run together.
     double strain_cells = heuristic("orientation.strain_cells", 0.67);
-    /// [ratio] Of a normal that turns there, against a point that the surface passes by.
-    double strain_turned = heuristic("orientation.strain_turned", 3);
-    /// [share of the points] Strain at which a try on finer cells that is not in doubt is the last; of walls that run
-    /// into each other 0.003 and more.
-    double no_strain = heuristic("orientation.no_strain", 0.001);
-    /// [ratio] Of two tries' strains that noise alone may make; of walls that run into each other and such that do not
-    /// 1.3 and more.
-    double same_strain = heuristic("orientation.same_strain", 1.2);
     /// [cells] Of the first lattice, above which the one that was chosen is too coarse for what its normals tell.
     double coarse = heuristic("orientation.coarse", 1.2);
     /// [spacings] Noise below which a surface may be as fine as the tries were compared.
@@ -171,6 +148,8 @@ struct GivenSidesHeuristics {
     int turns = heuristic("given_sides.turns", 3);
     /// [indicator's step over a cell] Slope from which on the indicator contradicts a normal.
     double speaks_against = heuristic("given_sides.speaks_against", 0.1);
+    /// [indicator] At a point and on both of its sides, from which on it is within the solid: halfway from a border.
+    double enclosed = heuristic("given_sides.enclosed", 0.75);
     /// [rounds] Of smoothing normals that noise has mixed.
     int smoothings = heuristic("given_sides.smoothings", 2);
     /// [points] Neighbours whose normals are compared.
@@ -229,23 +208,5 @@ struct LayersHeuristics {
     std::size_t least_points = heuristic("layers.least_points", 12);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};
-
-/// Normals turned over or lying in their sheet, where there is no noise: torn.cpp.
-struct TornHeuristics {
-    /// [ratio] Of the least variance of the neighbours to the middle one, above which they are no sheet.
-    double flat = heuristic("torn.flat", 0.06);
-    /// [cosine] Between a normal and its sheet's, below which it lies in the sheet.
-    double upright = heuristic("torn.upright", 0.5);
-    /// [cosine] Between normals of sheets that go on into each other.
-    double same_sheet = heuristic("torn.same_sheet", 0.9);
-};
-COVOL_HEURISTICS TornHeuristics kTorn{};
-
-/// Area of the surface that a point stands for: areas.cpp.
-struct AreasHeuristics {
-    /// [points] Within whose distance the density is taken.
-    std::size_t neighbours = heuristic("areas.neighbours", 8);
-};
-COVOL_HEURISTICS AreasHeuristics kAreas{};
 
 }  // namespace covol

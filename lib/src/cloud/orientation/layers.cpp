@@ -6,8 +6,9 @@
 #include <cmath>
 
 #include "base/geometry.h"
+#include "cloud/indicator/heuristics.h"
+#include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
-#include "cloud/orientation/indicator.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {

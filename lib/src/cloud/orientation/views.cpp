@@ -7,9 +7,10 @@
 #include <cstdint>
 
 #include "base/geometry.h"
-#include "cloud/orientation/areas.h"
+#include "cloud/indicator/areas.h"
+#include "cloud/indicator/heuristics.h"
+#include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
-#include "cloud/orientation/indicator.h"
 #include "cloud/orientation/layers.h"
 #include "covol/points.h"
 #include "points/point_cells.h"

@@ -402,6 +402,8 @@ CloudField::CloudField(const CloudOrientation& cloud, double h, CloudReport& rep
     report.near_noise = cloud.scale.near_noise;
     report.stray = cloud.stray;
     report.encloses = cloud.encloses;
+    report.fills = cloud.fills;
+    report.enclosed = cloud.enclosed;
     report.layered = cloud.orientation.layered;
     report.hints = cloud.hints;
     report.iterations = cloud.orientation.iterations;

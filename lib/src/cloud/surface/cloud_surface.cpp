@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "cloud/orientation/indicator.h"
+#include "cloud/indicator/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/hold_topology.h"

@@ -39,16 +39,25 @@ void tell_of_hints(const HintsReport& hints, Remarks& remarks, const RunContext&
 }
 
 void tell_of_cloud(const CloudReport& report, std::size_t points, Remarks& remarks, const RunContext& run) {
-    const std::string how = report.encloses ? "; averaged within " + number(report.radius)
-                                            : "; they enclose nothing: inside is what they hide";
+    const std::string how = report.fills      ? "; they fill a solid: it ends where their density is half of its median"
+                            : report.encloses ? "; averaged within " + number(report.radius)
+                                              : "; they enclose nothing: inside is what they hide";
     remarks.choose(
         "start", "cloud",
         std::to_string(points) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how,
         run);
+    if (report.fills)
+        remarks.warn(
+            "the points fill a solid, they do not lie on a surface: the surface is where their density falls "
+            "to half of its median; if they do lie on one, there are too few of them for their noise",
+            run);
     tell_of_hints(report.hints, remarks, run);
     if (report.stray > 0)
         remarks.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out",
                        run);
+    if (report.enclosed > 0)
+        remarks.choose("enclosed_points", std::to_string(report.enclosed),
+                       "inside on both sides by the normals, as where walls touch or cross: left out", run);
     if (report.layered > 0)
         remarks.choose("layered_points", std::to_string(report.layered),
                        "of layers below others, as of scans that do not quite fit: not passed", run);

@@ -1,9 +1,11 @@
 // Orientation by what files tell of their points.
 #include "cloud/orientation/given_sides.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "covol/cloud_surface.h"
 #include "covol/error.h"
@@ -144,6 +146,47 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
     const CloudOrientation whole = orient_cloud(s.points, PointHints{{}, towards(sensor, s.points)});
     CHECK_FALSE(whole.hints.used);
     CHECK(share_wrong(whole.orientation.normals, s.normals) < 0.001);
+}
+
+TEST_CASE("walls that touch and bodies that cross: points within the solid are left out") {
+    const test::Solid3 box = test::block({0.5, 0.5, 0.5});
+    for (const double shift : {1.0, 0.6}) {  // beside each other, and run into each other
+        const Vec3 by{shift, shift == 1.0 ? 0 : 0.3, 0};
+        std::vector<Vec3> points, normals, within;
+        for (const unsigned seed : {1U, 2U}) {
+            const test::SurfaceSample s = box.sample(6000, seed);
+            for (std::size_t n = 0; n < s.points.size(); ++n) {
+                const Vec3 p = seed == 1 ? s.points[n] : test::sum(s.points[n], by);
+                points.push_back(p);
+                normals.push_back(s.normals[n]);
+                const double in_other = box.distance(seed == 1 ? test::sum(p, test::scaled(-1, by)) : p);
+                // Beside the rim of the wall that they share the surface is near.
+                const bool is_near_rim = std::max(std::abs(p[1]), std::abs(p[2])) > 0.4;
+                if (shift == 1.0 ? in_other < 1e-3 && !is_near_rim : in_other < -0.1) within.push_back(p);
+            }
+        }
+        const CloudOrientation cloud = with_normals(points, normals);
+        CHECK(cloud.hints.used);
+        CHECK(cloud.points.size() + cloud.enclosed == points.size());
+        REQUIRE(within.size() > 300);
+        const std::set<Vec3> kept(cloud.points.begin(), cloud.points.end());
+        const auto left = std::count_if(within.begin(), within.end(), [&](const Vec3& p) { return kept.count(p) > 0; });
+        INFO("shift " << shift << ": " << left << " of " << within.size() << " within are left, " << cloud.enclosed
+                      << " left out");
+        // Of walls that touch some stay where one's points are denser than the other's.
+        CHECK(double(left) < 0.3 * double(within.size()));
+        CHECK(double(cloud.enclosed) < 1.6 * double(within.size()));
+    }
+    // Narrow gaps are no solid.
+    std::vector<Vec3> points, normals;
+    for (const double side : {0.0, 1.1}) {
+        const test::SurfaceSample s = box.sample(6000, 3);  // 0.032 apart
+        for (std::size_t n = 0; n < s.points.size(); ++n) {
+            points.push_back(test::sum(s.points[n], {side, 0, 0}));
+            normals.push_back(s.normals[n]);
+        }
+    }
+    CHECK(with_normals(points, normals).enclosed == 0);
 }
 
 TEST_CASE("hints follow their points") {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 
-#include "cloud/orientation/areas.h"
+#include "cloud/indicator/areas.h"
+#include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
-#include "cloud/orientation/indicator.h"
 #include "support/clouds.h"
 #include "support/surface_samples.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "cloud/orientation/indicator.h"
+#include "cloud/indicator/indicator.h"
 #include "covol/points.h"
 #include "support/clouds.h"
 #include "support/surface_samples.h"

@@ -31,6 +31,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 /// The share of the cells which the indicator's surface passes that have no point within `reach` of their middle.
 [[nodiscard]] double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
 
+[[nodiscard]] std::shared_ptr<const Indicator> make_indicator(StackField field);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
 
 /// The indicator of normals as they are, on cells of another size.

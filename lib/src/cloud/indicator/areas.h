@@ -2,7 +2,7 @@
 #include <cmath>
 #include <vector>
 
-#include "cloud/orientation/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "covol/domain.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"

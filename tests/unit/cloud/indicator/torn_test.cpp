@@ -1,4 +1,4 @@
-#include "cloud/orientation/torn.h"
+#include "cloud/indicator/torn.h"
 
 #include <catch2/catch.hpp>
 #include <random>

@@ -1,14 +1,15 @@
-#include "cloud/orientation/indicator.h"
+#include "cloud/indicator/indicator.h"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/geometry.h"
 #include "base/median.h"
-#include "cloud/orientation/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
 
@@ -108,10 +109,12 @@ double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, d
     return all > 0 ? bare / all : 1;
 }
 
-std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
+std::shared_ptr<const Indicator> make_indicator(StackField field) {
     return std::make_shared<const Indicator>(
-        std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
+        std::make_unique<const Indicator::Values>(Indicator::Values{std::move(field)}));
 }
+
+std::shared_ptr<const Indicator> make_indicator(const WindingField& field) { return make_indicator(field.indicator()); }
 
 void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles,
            const RunContext& run) {

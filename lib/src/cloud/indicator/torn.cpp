@@ -1,4 +1,4 @@
-#include "cloud/orientation/torn.h"
+#include "cloud/indicator/torn.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "base/disjoint_sets.h"
 #include "base/geometry.h"
-#include "cloud/orientation/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "points/point_cells.h"

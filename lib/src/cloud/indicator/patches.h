@@ -1,0 +1,25 @@
+#pragma once
+// Parts of a cloud that may be oriented the wrong way round as a whole.
+#include <cstdint>
+#include <vector>
+
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+
+/// The cells beside each cell that have points.
+[[nodiscard]] std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells);
+
+/// The number of each cell's patch, from 0: connected cells of the same side; -1: of side 0.
+/// @param beside  neighbours_of()
+[[nodiscard]] std::vector<int> patches_of(const std::vector<std::vector<std::uint32_t>>& beside,
+                                          const std::vector<int>& side);
+
+/// visit(cell, point as it was given)
+template <typename Visit>
+void for_points_of(const PointCells& cells, Visit visit) {
+    for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)
+        for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) visit(cell, cells.order()[at]);
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,153 @@
+// Which of several orientations a cloud takes: its own, that of its file, or that of where its points can be seen from.
+#include <algorithm>
+#include <utility>
+
+#include "cloud/indicator/consistency.h"
+#include "cloud/indicator/indicator.h"
+#include "cloud/orientation/filled.h"
+#include "cloud/orientation/given_sides.h"
+#include "cloud/orientation/heuristics.h"
+#include "cloud/orientation/judge.h"
+#include "cloud/orientation/stray.h"
+#include "cloud/orientation/views.h"
+#include "covol/orientation.h"
+#include "covol/points.h"
+
+namespace covol {
+namespace {
+
+using cloud::doubt;
+using cloud::first_cell;
+using cloud::is_settled;
+using cloud::share_passed;
+
+/// Share of the surface that lies far from every point.
+double share_bare(const CloudOrientation& cloud) {
+    const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    return cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach);
+}
+
+bool does_enclose(const CloudOrientation& cloud) {
+    return doubt(cloud.orientation) < kOrientation.settled || share_bare(cloud) < kOrientation.bare;
+}
+/// The indicator that was found may be too coarse for what its normals tell.
+void refine(CloudOrientation& cloud, const RunContext& run) {
+    Orientation& o = cloud.orientation;
+    const double noise = cloud.scale.noise, spacing = cloud.scale.spacing;
+    // Where normals are beyond doubt, the surface may be as fine as the points tell.
+    const double first =
+        is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
+    const double cell = cloud::indicator_cell(cloud.points, first);
+    if (o.indicator->cell() > kOrientation.coarse * cell)
+        o.indicator = cloud::indicator_of(cloud.points, o, first, run);
+    if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
+        share_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
+        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
+}
+
+/// Of points that enclose nothing as they are oriented.
+/// @param reach  distance at which a surface passes a point by
+void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
+    const double passed = share_passed(*cloud.orientation.indicator, cloud.points, reach);
+    const bool mostly_bare = share_bare(cloud) > kOrientation.mostly_bare;
+    if (mostly_bare && passed > 0) {
+        // What closes a scan of one side is larger than the scan, and turns parts of it; where they were seen from
+        // tells.
+        cloud::GivenSides seen = cloud::given_sides(cloud.points, cloud::hints_by_views(cloud.points, cloud.scale),
+                                                    cloud.scale, first_cell(cloud.scale, cloud.points), run);
+        if (seen.report.used && share_passed(*seen.orientation.indicator, cloud.points, reach) <
+                                    std::min(passed, kOrientation.many_passed)) {
+            cloud.orientation = std::move(seen.orientation);
+            cloud.encloses = true;
+            return;
+        }
+    }
+    Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
+    // Normals waver in the folds of a closed surface, too; but there views pass by most points.
+    cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
+                     passed < kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
+    if (!cloud.encloses) cloud.orientation = std::move(seen);
+}
+
+/// Points that given normals put within the solid are on no surface. @return whether there were any
+bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::GivenSides& given) {
+    const double reach = kOrientation.passed_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    const std::vector<char> enclosed =
+        cloud::find_enclosed(cloud.points, given.given, *given.orientation.indicator, reach);
+    cloud.enclosed = std::size_t(std::count(enclosed.begin(), enclosed.end(), 1));
+    if (cloud.enclosed == 0) return false;
+    std::vector<Vec3> left;
+    for (std::size_t n = 0; n < enclosed.size(); ++n)
+        if (!enclosed[n]) left.push_back(cloud.points[n]);
+    hints = carried(hints, cloud.points, left);
+    cloud.points = std::move(left);
+    return true;
+}
+
+/// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
+void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunContext& run) {
+    const auto judged = [&] {
+        return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
+    };
+    cloud::GivenSides given = judged();
+    if (given.report.used && drop_enclosed(cloud, hints, given)) given = judged();
+    HintsReport& report = cloud.hints = given.report;
+    if (!report.used && cloud::fill_a_solid(cloud.points, cloud.scale.nearest, run)) {
+        cloud.orientation = cloud::orient_filled(cloud.points, cloud.scale);
+        cloud.fills = true;
+        return;
+    }
+    const bool is_certain = report.used && given.torn < kOrientation.few_torn && is_settled(given.orientation);
+    if (!is_certain) {
+        cloud.orientation = orient(cloud.points, cloud.scale, run);
+        cloud.encloses = does_enclose(cloud);
+        const double reach = kOrientation.passed_reach * cloud.scale.spacing;
+        if (report.used && cloud.encloses &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
+                kOrientation.contradicted &&
+            // In narrow folds it is these that are wrong.
+            share_passed(*cloud.orientation.indicator, cloud.points, reach) <=
+                share_passed(*given.orientation.indicator, cloud.points, reach)) {
+            report.used = false;
+            report.why_not = "parts of them are turned as a whole";
+        }
+        if (!report.used && !cloud.encloses) choose_by_views(cloud, reach, run);
+        if (!report.used && cloud.encloses) refine(cloud, run);
+    }
+    if (report.used) {
+        cloud.orientation = std::move(given.orientation);
+        cloud.encloses = true;
+    }
+    report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
+    // Normals of faces tell nothing of the edges between them, beyond which quadrics through one face would go on.
+    if (report.used) cloud::take_directions(*cloud.orientation.indicator, cloud.points, cloud.orientation.normals);
+}
+
+}  // namespace
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) {
+    return orient_cloud(points, {}, run);
+}
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints, const RunContext& run) {
+    CloudOrientation cloud;
+    with_threads(run, [&] {
+        cloud.points = merge_close_points(points, 0);
+        cloud.scale = measure_cloud_scale(cloud.points, run);
+        // Where there are many, some show once others are gone.
+        for (int round = 0; round < kOrientation.stray_rounds; ++round) {
+            const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
+            std::size_t kept = 0;
+            for (std::size_t n = 0; n < stray.size(); ++n)
+                if (!stray[n]) cloud.points[kept++] = cloud.points[n];
+            const std::size_t gone = stray.size() - kept;
+            cloud.stray += gone;
+            cloud.points.resize(kept);
+            if (double(gone) < kOrientation.many_stray * double(stray.size())) break;
+        }
+        choose_orientation(cloud, carried(hints, points, cloud.points), run);
+    });
+    return cloud;
+}
+
+}  // namespace covol

@@ -1,0 +1,103 @@
+#include "cloud/orientation/filled.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/geometry.h"
+#include "base/median.h"
+#include "cloud/indicator/indicator.h"
+#include "cloud/indicator/iteration.h"
+#include "cloud/orientation/heuristics.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr int kMostRadii = 64;
+
+/// Some of the points, evenly: those that lie together follow each other.
+std::vector<Vec3> thinned(const std::vector<Vec3>& points, double spacing) {
+    if (points.size() <= kFilled.most_points) return points;
+    const PointCells cells(points, kOrientation.sample_spacings * spacing);
+    std::vector<Vec3> some;
+    for (std::size_t n = 0; n < kFilled.most_points; ++n)
+        some.push_back(cells.sorted()[n * points.size() / kFilled.most_points]);
+    return some;
+}
+
+struct Neighbourhood {
+    double count = 0;
+    double thickness = 0;  ///< [radii] least standard deviation along any direction
+};
+
+Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radius) {
+    std::vector<PointCells::Range> ranges;
+    cells.find(at, radius, ranges);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    double count = 0;
+    for (const PointCells::Range& range : ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(cells.sorted()[n], at);
+            const Eigen::Vector3d v = Eigen::Vector3d(to[0], to[1], to[2]) / radius;
+            if (v.squaredNorm() > 1) continue;
+            ++count;
+            sum += v;
+            squares += v * v.transpose();
+        }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - sum * sum.transpose() / (count * count),
+                                                              Eigen::EigenvaluesOnly);
+    return {count, std::sqrt(std::max(0.0, axes.eigenvalues()[0]))};
+}
+
+}  // namespace
+
+bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
+    const std::vector<Vec3> some = thinned(points, spacing);
+    const auto all = double(some.size());
+    if (all < 32 * kFilled.least_neighbours || !(spacing > 0)) return false;  // an eighth is four times the first ones
+    const PointCells cells(some, spacing * std::cbrt(double(points.size()) / all));
+    std::vector<Neighbourhood> around(std::min(some.size(), kFilled.samples));
+    // Not every so many: points in rows would be asked at the same place of each row.
+    const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % some.size()]; };
+    double radius = spacing;
+    for (int n = 0; n < kMostRadii; ++n, radius *= kCloudScale.growth) {
+        run.check();
+        tbb::parallel_for(std::size_t(0), around.size(),
+                          [&](std::size_t m) { around[m] = spread_around(cells, at(m), radius); });
+        const auto median_of = [&](auto value) {
+            std::vector<double> values(around.size());
+            std::transform(around.begin(), around.end(), values.begin(), value);
+            return median(std::move(values));
+        };
+        const double count = median_of([](const Neighbourhood& a) { return a.count; });
+        if (count < kFilled.least_neighbours) continue;
+        if (count > all / 8) return true;
+        if (median_of([](const Neighbourhood& a) { return a.thickness; }) < kFilled.least_thickness) return false;
+    }
+    return false;
+}
+
+Orientation orient_filled(const std::vector<Vec3>& points, const CloudScale& scale) {
+    // Of evenly random points a ball of that radius holds eleven others.
+    const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / 11);
+    StackField density = spread(grid_around(points, {}, kFilled.cell_spacings * spacing), points,
+                                std::vector<double>(points.size(), 1.0));
+    std::vector<double> values(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = density.value_at(points[n]); });
+    const double within = median(std::move(values));
+    for (std::vector<float>& level : density.values)
+        for (float& value : level) value = float(double(value) / within);
+    Orientation result;
+    result.indicator = result.screened = make_indicator(std::move(density));
+    result.normals = normals_of(*result.indicator, points, std::numeric_limits<double>::infinity());
+    result.areas.assign(points.size(), spacing * spacing);
+    return result;
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,43 @@
+#include "cloud/orientation/judge.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/indicator/indicator.h"
+#include "cloud/orientation/heuristics.h"
+#include "covol/points.h"
+
+namespace covol::cloud {
+
+double finest_cell(const CloudScale& scale, std::size_t points) {
+    const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.most_sampled));
+    return std::max(kOrientation.cell_spacings * apart, kOrientation.cell_noises * scale.noise);
+}
+
+double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
+    return std::max(finest_cell(scale, points.size()), indicator_side(points) / kOrientation.first_along);
+}
+namespace {
+
+double weighed(const Orientation& o, double weight) {
+    return o.turned + weight * std::max(0.0, o.off_half - kOrientation.off_half);
+}
+
+}  // namespace
+
+double doubt(const Orientation& o) { return weighed(o, kOrientation.off_weight); }
+bool is_settled(const Orientation& o) { return weighed(o, 1) < kGivenSides.few_turned; }
+
+double share_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+    std::vector<char> passed(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const Indicator::Sample at = indicator.at(points[n]);
+        const double slope = std::hypot(at.gradient[0], at.gradient[1], at.gradient[2]);
+        passed[n] = std::abs(at.inside - 0.5) > reach * slope;
+    });
+    return double(std::count(passed.begin(), passed.end(), 1)) / double(points.size());
+}
+
+}  // namespace covol::cloud

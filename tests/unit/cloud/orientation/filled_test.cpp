@@ -1,0 +1,89 @@
+#include "cloud/orientation/filled.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+
+#include "covol/points.h"
+#include "support/clouds.h"
+#include "support/surface_samples.h"
+
+using namespace covol;
+
+namespace {
+
+/// Random points in a shape.
+std::vector<Vec3> within(const test::Solid3& shape, std::size_t count, unsigned seed) {
+    std::vector<Vec3> points;
+    for (unsigned n = 0; points.size() < count; ++n)
+        for (const Vec3& p : test::box_cloud(10000, shape.box, 100 * seed + n))
+            if (points.size() < count && shape.distance(p) < 0) points.push_back(p);
+    return points;
+}
+
+std::vector<Vec3> near(const test::Solid3& shape, std::size_t count, double noise, unsigned seed) {
+    test::SurfaceSample s = shape.sample(count, seed);
+    test::add_noise(s, noise, seed + 10);
+    return s.points;
+}
+
+bool fills(const std::vector<Vec3>& points) { return cloud::fill_a_solid(points, measure_spacing(points).median, {}); }
+
+}  // namespace
+
+TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, whatever their noise and its shape") {
+    for (const unsigned seed : {1, 2}) {
+        CHECK(fills(within(test::ball(1), 10000, seed)));
+        CHECK(fills(within(test::ball(1), 1500, seed)));
+        CHECK(fills(within(test::block({1, 0.6, 0.4}), 8000, seed)));
+        CHECK(fills(within(test::torus(1, 0.35), 12000, seed)));
+        CHECK(fills(within(test::ball(1), 60000, seed)));  // more than are looked at
+        for (const double noise : {0.0, 0.03, 0.1}) {
+            INFO("noise " << noise << ", seed " << seed);
+            CHECK_FALSE(fills(near(test::ball(1), 6000, noise, seed)));
+            CHECK_FALSE(fills(near(test::torus(1, 0.35), 6000, 0.5 * noise, seed)));
+            CHECK_FALSE(fills(near(test::shell(1, 0.5), 8000, 0.5 * noise, seed)));
+            CHECK_FALSE(fills(near(test::block({0.8, 0.5, 0.05}), 6000, 0.3 * noise, seed)));
+            CHECK_FALSE(fills(near(test::table(0.06), 6000, 0.5 * noise, seed)));
+        }
+        CHECK_FALSE(fills(within(test::ball(1), 300, seed)));  // too few to tell
+    }
+    std::vector<Vec3> lattice;
+    for (int n = 0; n < 8000; ++n) lattice.push_back({double(n % 20), double(n / 20 % 20), double(n / 400)});
+    CHECK(fills(lattice));
+    std::vector<Vec3> line;
+    for (int n = 0; n < 2000; ++n) line.push_back({0.01 * n, 0, 0});
+    CHECK_FALSE(fills(line));
+}
+
+TEST_CASE("orient_filled: half the density is where the solid ends") {
+    for (const auto& [name, shape] : {std::pair<std::string, test::Solid3>{"ball", test::ball(1)},
+                                      std::pair<std::string, test::Solid3>{"torus", test::torus(1, 0.4)}}) {
+        const std::vector<Vec3> points = within(shape, 20000, 3);
+        const CloudOrientation cloud = orient_cloud(points);
+        CHECK(cloud.fills);
+        CHECK(cloud.encloses);
+        const Indicator& indicator = *cloud.orientation.indicator;
+        // The volume in which it is above 1/2, by random places.
+        double found = 0, truth = 0;
+        for (const Vec3& p : test::box_cloud(40000, bounding_box(points, 0.2), 4)) {
+            found += indicator.inside(p) > 0.5;
+            truth += shape.distance(p) < 0;
+        }
+        INFO(name << ": " << found / truth << " of the volume");
+        CHECK(found / truth == Approx(1).margin(0.04));
+        // Outward in the outermost layer, about a cell thick.
+        double outward = 0, all = 0;
+        for (std::size_t n = 0; n < cloud.points.size(); ++n) {
+            if (shape.distance(cloud.points[n]) < -0.3 * indicator.cell()) continue;
+            ++all;
+            outward += test::dot(cloud.orientation.normals[n], test::normal_of(shape.distance, cloud.points[n])) > 0;
+        }
+        REQUIRE(all > 500);
+        CHECK(outward > 0.98 * all);
+    }
+}
+
+TEST_CASE("a surface's points, however noisy, are oriented as before") {
+    CHECK_FALSE(orient_cloud(near(test::ball(1), 4000, 0.05, 5)).fills);
+}
