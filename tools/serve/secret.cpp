@@ -16,7 +16,7 @@ std::string random_secret() {
         const ssize_t count = ::getrandom(bytes.data() + filled, bytes.size() - filled, 0);
         if (count < 0 && errno == EINTR) continue;
         if (count <= 0) {
-            throw Error(Errc::Io, std::string("web_server: no random numbers for a secret: ") + std::strerror(errno));
+            throw Error(Errc::Io, std::string("no random numbers for a secret: ") + std::strerror(errno));
         }
         filled += std::size_t(count);
     }

@@ -25,7 +25,7 @@ using asio::ip::tcp;
 namespace {
 
 [[noreturn]] void fail_to_listen(std::uint16_t port, int number) {
-    const std::string what = "web_server: port " + std::to_string(port) + " of 127.0.0.1: ";
+    const std::string what = "port " + std::to_string(port) + " of 127.0.0.1: ";
     if (number == EADDRINUSE) {
         throw Error(Errc::Io, what + "another program listens there: choose another port, or 0 for one that is free",
                     "port");
@@ -59,7 +59,7 @@ int listen_on(std::uint16_t port) {
 
 Options checked(Options options) {
     if (const std::string why = options.why_invalid(); !why.empty()) {
-        throw Error(Errc::InvalidOptions, "web_server: " + why);
+        throw Error(Errc::InvalidOptions, why);
     }
     // It is stronger than X-Frame-Options, which knows no origins.
     options.page_policy += "; frame-ancestors";
@@ -196,7 +196,7 @@ WebServer::WebServer(Options options, Handlers handlers) {
     } catch (const Error&) {
         throw;
     } catch (const std::exception& error) {  // of sockets and threads
-        throw Error(Errc::Io, std::string("web_server: ") + error.what());
+        throw Error(Errc::Io, error.what());
     }
 }
 

@@ -21,7 +21,7 @@ enum class Errc {
 /// The one exception type that covol throws.
 ///
 /// Messages say where, what, what was expected and what was found:
-/// `read_points: cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as
+/// `cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as
 /// option_names.h tells.
 class COVOL_API Error : public std::runtime_error {
 public:

@@ -283,7 +283,7 @@ namespace {
 Evidence assess(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
                 const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
     require_valid(options, "assess_evidence");
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "assess_evidence: expected a surface, got an empty mesh");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "mesh: expected a surface, got an empty one");
     Evidence result;
     with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });
     return result;

@@ -125,8 +125,7 @@ std::vector<int> counted_up(std::vector<int> values, std::size_t count) {
 
 void check_count(const std::vector<Structure>& structures) {
     if (structures.size() >= kContested)
-        throw Error(Errc::InvalidInput,
-                    "make_label_image: expected at most 254 structures, got " + std::to_string(structures.size()));
+        throw Error(Errc::InvalidInput, "structures: expected at most 254, got " + std::to_string(structures.size()));
 }
 
 /// The number of each voxel's structure, from 1; 0: none.

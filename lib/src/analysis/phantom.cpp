@@ -166,8 +166,7 @@ Phantom make_phantom(const PhantomOptions& options) {
     if (found == all.end()) {
         std::string kinds;
         for (const PhantomShape& s : all) kinds += (kinds.empty() ? "" : ", ") + std::string(s.name);
-        throw Error(Errc::InvalidOptions,
-                    "make_phantom: kind: expected one of " + kinds + ", got '" + options.kind + "'", "kind");
+        throw Error(Errc::InvalidOptions, "kind: expected one of " + kinds + ", got '" + options.kind + "'", "kind");
     }
     require_valid(options, "make_phantom");
     const PhantomShape& shape = *found;

@@ -59,15 +59,14 @@ public:
 private:
     void check_input() const {
         require_valid(options_, "separate");
-        if (structures_.empty()) throw Error(Errc::InvalidInput, "separate: expected a structure, got none");
+        if (structures_.empty()) throw Error(Errc::InvalidInput, "structures: expected at least one, got none");
         std::set<std::string> names;
         for (const Structure& s : structures_) {
             if (s.name.empty() || !names.insert(s.name).second)
                 throw Error(Errc::InvalidInput,
-                            "separate: expected unique names, got " + quoted(s.name) + " twice or empty");
+                            "structures: expected unique names, got " + quoted(s.name) + " twice or empty");
             if (!s.surface || s.surface->transform() != structures_.front().surface->transform())
-                throw Error(Errc::InvalidInput, "separate: " + quoted(s.name) + " and " +
-                                                    quoted(structures_.front().name) +
+                throw Error(Errc::InvalidInput, quoted(s.name) + " and " + quoted(structures_.front().name) +
                                                     ": expected grids with one transform");
         }
     }
@@ -103,7 +102,7 @@ private:
                 const double share = double(both) / double(std::min(in_a, in_b));
                 if (share >= options_.nested_share) {
                     if (in_a == in_b)
-                        throw Error(Errc::InvalidInput, "separate: " + quoted(structures_[a].name) + " and " +
+                        throw Error(Errc::InvalidInput, quoted(structures_[a].name) + " and " +
                                                             quoted(structures_[b].name) +
                                                             " are the same solid: " + percent(share) +
                                                             " of their voxels are common; mark each by its own points");
@@ -118,8 +117,8 @@ private:
         for (const StructureOverlap& overlap : report_.overlaps) {
             if (!overlap.inner) continue;
             const std::size_t outer = *overlap.inner == overlap.a ? overlap.b : overlap.a;
-            run_.info("separate: " + quoted(structures_[*overlap.inner].name) + " lies inside " +
-                      quoted(structures_[outer].name) + " and is carved out of it");
+            run_.info(quoted(structures_[*overlap.inner].name) + " lies inside " + quoted(structures_[outer].name) +
+                      " and is carved out of it");
             const FloatGridPtr inner = phi_[*overlap.inner]->deepCopy();
             carved[outer] = carved[outer]->deepCopy();
             openvdb::tools::csgDifference(*carved[outer], *inner);
@@ -210,7 +209,7 @@ private:
             return extract_surface(*u, run_);
         } catch (const Error& error) {
             if (error.code() != Errc::InvalidInput) throw;
-            throw Error(Errc::InvalidInput, "separate: nothing is left of " + quoted(structures_[i].name) +
+            throw Error(Errc::InvalidInput, "nothing is left of " + quoted(structures_[i].name) +
                                                 ": the other structures cover it; mark each by its own points");
         }
     }

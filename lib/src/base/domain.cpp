@@ -87,7 +87,7 @@ Domain make_domain(const WorldBox& box, double voxel_size) {
         // A tolerance keeps a box of exactly n voxels at n in spite of rounding.
         const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
         if (cells > kMaxVoxelsPerAxis)
-            throw Error(Errc::InvalidInput, "make_domain: " + to_text(box) + " has more than 2^30 voxels of size " +
+            throw Error(Errc::InvalidInput, to_text(box) + " has more than 2^30 voxels of size " +
                                                 std::to_string(voxel_size) + " along an axis; use a larger voxel size");
         domain.origin[a] = 0.5 * (box.min[a] + box.max[a]) - 0.5 * (cells - 1) * voxel_size;
         domain.max[a] = static_cast<std::int32_t>(cells) - 1;
@@ -106,8 +106,7 @@ Domain covering(const Domain& lattice, const WorldBox& box) {
         const double last = std::ceil((box.max[a] - lattice.origin[a]) / lattice.voxel_size - 0.5 - slack);
         if (!(first > -kFarthestVoxel && last < kFarthestVoxel))
             throw Error(Errc::InvalidInput,
-                        "covering: " + to_text(box) + " reaches more than 2^23 voxels of size " +
-                            std::to_string(lattice.voxel_size) +
+                        to_text(box) + " reaches more than 2^23 voxels of size " + std::to_string(lattice.voxel_size) +
                             " from the lattice's origin; choose a nearer `lattice_origin`, or a larger `voxel_size`",
                         "lattice_origin");
         domain.min[a] = static_cast<std::int32_t>(first);
@@ -140,7 +139,7 @@ Domain widened(Domain domain, int layers) {
 }
 
 WorldBox bounding_box(const std::vector<Vec3>& points, double margin) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "bounding_box: expected at least one point");
+    if (points.empty()) throw Error(Errc::InvalidInput, "points: expected at least one, got none");
     WorldBox box{points.front(), points.front()};
     for (const Vec3& p : points)
         for (int a = 0; a < 3; ++a) {
@@ -172,8 +171,8 @@ Domain domain_of(const FloatGrid& grid) {
     if (!(h[0] > 0) || !std::isfinite(h[0]) || !origin.isFinite() || !transform.isLinear() ||
         (diagonal - openvdb::Vec3d(h[0])).length() > tolerance || std::abs(h[1] - h[0]) > tolerance ||
         std::abs(h[2] - h[0]) > tolerance)
-        throw Error(Errc::InvalidInput, "domain_of: grid '" + grid.getName() +
-                                            "': expected a transform of one uniform voxel size and a translation");
+        throw Error(Errc::InvalidInput,
+                    "grid '" + grid.getName() + "': expected a transform of one uniform voxel size and a translation");
     Domain d;
     d.voxel_size = h[0];
     d.origin = {origin[0], origin[1], origin[2]};
@@ -188,7 +187,7 @@ Domain domain_of(const FloatGrid& grid) {
         const double first = box.min()[a], last = box.max()[a];
         if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {  // an empty domain is one
             std::ostringstream text;
-            text << "domain_of: grid '" << grid.getName() << "': expected voxels within 2^23 of voxel 0, got " << box;
+            text << "grid '" << grid.getName() << "': expected voxels within 2^23 of voxel 0, got " << box;
             throw Error(Errc::InvalidInput, text.str());
         }
         d.min[a] = box.min()[a] - margin;

@@ -82,7 +82,7 @@ void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outsi
     for (const Vec3& seed : outside)
         if (tree.nearest(seed) <= same * same)
             throw Error(Errc::InvalidInput,
-                        "check_sides: expected each position on one side, got " + to_text(seed) +
+                        "expected each position on one side, got " + to_text(seed) +
                             " inside and outside; take it out of one of `inside` and `outside`",
                         "outside");
 }

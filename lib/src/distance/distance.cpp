@@ -17,13 +17,12 @@ namespace {
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 std::vector<Vec3> to_index_space(const std::vector<Vec3>& points, const Domain& domain) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "compute_distance: expected at least one point, got none");
+    if (points.empty()) throw Error(Errc::InvalidInput, "points: expected at least one, got none");
     std::vector<Vec3> result(points.size());
     for (std::size_t n = 0; n < points.size(); ++n) {
         for (const double c : points[n])
             if (!std::isfinite(c))
-                throw Error(Errc::InvalidInput,
-                            "compute_distance: point " + std::to_string(n) + ": expected finite numbers");
+                throw Error(Errc::InvalidInput, "point " + std::to_string(n) + ": expected finite numbers");
         result[n] = domain.world_to_index(points[n]);
     }
     return result;
@@ -54,7 +53,7 @@ std::unique_ptr<Leaf> make_leaf(const detail::NearestField& field, const detail:
 DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain, const DistanceOptions& options,
                                 const RunContext& run) {
     require_valid(options, "compute_distance");
-    if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "compute_distance: the domain is empty");
+    if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "the domain is empty");
     const std::vector<Vec3> positions = to_index_space(points, domain);
     detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "compute_distance", run);
     const detail::CoordBBox box = detail::box_of(domain);

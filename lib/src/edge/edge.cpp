@@ -243,7 +243,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
                         const RunContext& run) {
     require_valid(options, "detect_edges");
     if (topology.activeVoxelCount() == 0)
-        throw Error(Errc::InvalidInput, "detect_edges: expected active voxels in the band, got none");
+        throw Error(Errc::InvalidInput, "expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
@@ -254,8 +254,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         report.low = range[0], report.high = range[1];
         if (!(report.low < report.high))
             throw Error(Errc::InvalidInput,
-                        "detect_edges: " + image.path() + ": every voxel near the band has the value " +
-                            std::to_string(report.low) +
+                        image.path() + ": every voxel near the band has the value " + std::to_string(report.low) +
                             ", there is no edge to find; check that the points lie on the image's "
                             "structure, or segment with the points alone (`rho = 0`)",
                         "rho");
@@ -291,7 +290,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         else
             report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
-            throw Error(Errc::InvalidInput, "detect_edges: " + image.path() +
+            throw Error(Errc::InvalidInput, image.path() +
                                                 ": constant wherever the band lies, there is no edge to find; check "
                                                 "that the points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);

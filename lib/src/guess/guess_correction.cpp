@@ -101,7 +101,7 @@ std::vector<Vec3> find_crossings(const FloatGrid& guess) {
             points.push_back({w[0], w[1], w[2]});
         }
     }
-    if (points.empty()) throw Error(Errc::InvalidInput, "correct_guess: expected a guess with a surface, got none");
+    if (points.empty()) throw Error(Errc::InvalidInput, "expected a guess with a surface, got none");
     return points;
 }
 
@@ -465,8 +465,7 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
         });
     });
     run.check();
-    if (broken)
-        throw Error(Errc::InvalidInput, "correct_guess: " + mask.path() + ": expected a label image of whole numbers");
+    if (broken) throw Error(Errc::InvalidInput, mask.path() + ": expected a label image of whole numbers");
     result.added = added;
     result.removed = removed;
     result.reached = reached;

@@ -68,8 +68,8 @@ VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi) {
                     for (int c = 0; c < 3; ++c) line += (line.empty() ? "" : ",") + std::to_string(corner[c]);
                 return line;
             };
-            throw Error(Errc::InvalidInput, "read_image: the roi " + text(roi) + " lies outside the image, which is " +
-                                                text(geometry.world_box()));
+            throw Error(Errc::InvalidInput,
+                        "the roi " + text(roi) + " lies outside the image, which is " + text(geometry.world_box()));
         }
         box.min[a] = static_cast<std::int32_t>(std::clamp(std::floor(lo[a]) - 1, 0.0, last));
         box.max[a] = static_cast<std::int32_t>(std::clamp(std::ceil(hi[a]) + 1, 0.0, last));
@@ -150,8 +150,8 @@ Image Image::cropped() const {
 
 Image Image::placed(const ImageGeometry& geometry) const {
     if (geometry.size != geometry_.size)
-        throw Error(Errc::InvalidInput, "placed: " + path_ + ": expected " + detail::size_text(geometry.size) +
-                                            " voxels, got " + detail::size_text(geometry_.size));
+        throw Error(Errc::InvalidInput, path_ + ": expected " + detail::size_text(geometry.size) + " voxels, got " +
+                                            detail::size_text(geometry_.size));
     Image moved = *this;
     moved.geometry_ = geometry;
     return moved;

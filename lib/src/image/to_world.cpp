@@ -23,7 +23,7 @@ Vec3 detail::to_world(PointSpace space, const Vec3& p, const ImageGeometry& geom
 std::vector<Vec3> to_world(const PointCloud& cloud) {
     if (cloud.space != PointSpace::World)
         throw Error(Errc::InvalidInput,
-                    "to_world: " + cloud.source +
+                    cloud.source +
                         ": the points are in an image's own frame, and there is no image; give "
                         "one, or `points_space = world` for points in lengths",
                     "points_space");

@@ -122,7 +122,7 @@ struct Pipe {
     Pipe() {
         int ends[2];
         if (pipe2(ends, O_CLOEXEC) != 0)
-            throw Error(Errc::Io, std::string("read_image: expected a pipe, got: ") + std::strerror(errno));
+            throw Error(Errc::Io, std::string("expected a pipe, got: ") + std::strerror(errno));
         from = ends[0];
         to = moved_up(ends[1]);
     }
@@ -178,8 +178,7 @@ public:
         if (why != 0)
             throw Error(
                 Errc::Io,
-                "read_image: " + program +
-                    ": expected to start covol's program that reads files apart from this one, got: " +
+                program + ": expected to start covol's program that reads files apart from this one, got: " +
                     std::strerror(why) +
                     (why == ENOENT ? "; install covol again" : "; allow more processes and threads, or memory"));
         return process;
@@ -236,7 +235,7 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
     if (batch.slots[n].now() != kBegun)  // that says nothing of the file: libraries make threads where they are loaded
-        throw Error(Errc::Io, "read_image: " + program +
+        throw Error(Errc::Io, program +
                                   ": expected it to read files apart from this program, but it ended before it began; "
                                   "allow more processes and threads, or memory");
     batch.slots[n].set(kCrashed);
@@ -258,7 +257,7 @@ void do_piece(const std::function<void(const PieceAtWork&)>& work, const Orders&
     } catch (const std::bad_alloc&) {
         slot.set(kNoMemory);
     } catch (const std::exception& error) {
-        slot.refuse(Errc::InvalidInput, ("read_image: " + path + ": " + error.what()).c_str());
+        slot.refuse(Errc::InvalidInput, (path + ": " + error.what()).c_str());
     }
 }
 
@@ -277,9 +276,8 @@ SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(de
     if (data_ != nullptr) return;
     if (descriptor >= 0) close(descriptor);
     if (why != EFBIG) throw std::bad_alloc();
-    throw Error(Errc::Io, "read_image: expected " + std::to_string(bytes) +
-                              " bytes of memory that two programs share, got: " + std::strerror(why) +
-                              "; allow larger files (ulimit -f), which that counts as");
+    throw Error(Errc::Io, "expected " + std::to_string(bytes) + " bytes of memory that two programs share, got: " +
+                              std::strerror(why) + "; allow larger files (ulimit -f), which that counts as");
 }
 
 SharedMemory::SharedMemory(Given given) : descriptor_(given.descriptor) {
@@ -356,7 +354,7 @@ double most_seconds_for_pixels(std::uint64_t bytes) {
 
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
-    return Error(Errc::InvalidInput, "read_image: " + path + ": damaged: the " + library + " library cannot read it");
+    return Error(Errc::InvalidInput, path + ": damaged: the " + library + " library cannot read it");
 }
 
 }  // namespace covol::detail

@@ -20,13 +20,13 @@ void write_nanovdb(const std::string& file, const std::string& shown, const std:
         nanovdb::io::writeGrid(out, nanovdb::openToNanoVDB(*grid, nanovdb::StatsMode::All, nanovdb::ChecksumMode::Full),
                                nanovdb::io::Codec::NONE);
     out.close();
-    if (!out) throw Error(Errc::Io, "write_nvdb: " + shown + ": cannot write");
+    if (!out) throw Error(Errc::Io, shown + ": cannot write");
 }
 
 #else
 
 void write_nanovdb(const std::string& /*file*/, const std::string& shown, const std::vector<FloatGridPtr>& /*grids*/) {
-    throw Error(Errc::Unsupported, "write_nvdb: " + shown +
+    throw Error(Errc::Unsupported, shown +
                                        ": this covol was built without NanoVDB's headers (libnanovdb-dev); write .vdb "
                                        "and convert it with nanovdb_convert");
 }

@@ -326,9 +326,8 @@ void check_place(const std::string& path, const FloatGrid& grid) {
     const double farthest = detail::farthest_origin(finest);
     if (coarsest <= detail::kLargestLength && detail::is_within({origin[0], origin[1], origin[2]}, farthest)) return;
     std::ostringstream text;
-    text << "read_vdb: " << path << ": grid '" << grid.getName() << "': expected voxels up to "
-         << detail::kLargestLength << " in size and an origin within " << farthest << " of 0, got " << size << " and "
-         << origin;
+    text << path << ": grid '" << grid.getName() << "': expected voxels up to " << detail::kLargestLength
+         << " in size and an origin within " << farthest << " of 0, got " << size << " and " << origin;
     throw Error(Errc::InvalidInput, text.str());
 }
 
@@ -352,7 +351,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
         copies.push_back(copy);
     }
     detail::write_atomically(path, [&](const std::string& temporary) {
-        with_openvdb(Errc::Io, "write_vdb: " + path + ": cannot write", [&] {
+        with_openvdb(Errc::Io, path + ": cannot write", [&] {
             vdb::io::File file(temporary);
             file.setCompression(flags_of(options.compression) | vdb::io::COMPRESS_ACTIVE_MASK);
             file.setGridStatsMetadataEnabled(true);
@@ -366,8 +365,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
 void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids) {
     check_grids("write_nvdb", path, grids);
     detail::write_atomically(path, [&](const std::string& temporary) {
-        with_openvdb(Errc::Io, "write_nvdb: " + path + ": cannot write",
-                     [&] { detail::write_nanovdb(temporary, path, grids); });
+        with_openvdb(Errc::Io, path + ": cannot write", [&] { detail::write_nanovdb(temporary, path, grids); });
     });
 }
 
@@ -389,16 +387,15 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
             const bool usable = is_float(reader.type(n));
             if (name.empty() ? !usable : !reader.is_named(n, name)) continue;
             if (!usable)
-                throw Error(Errc::InvalidInput, "read_vdb: " + path + ": expected float values in grid '" + name +
-                                                    "', got " + reader.type(n) + "; the file has " +
-                                                    list_grids(reader));
+                throw Error(Errc::InvalidInput, path + ": expected float values in grid '" + name + "', got " +
+                                                    reader.type(n) + "; the file has " + list_grids(reader));
             FloatGridPtr grid = vdb::gridPtrCast<FloatGrid>(reader.read_whole(n));
             if (!grid) throw Error(Errc::InvalidInput, unusable("read_vdb", path));
             check_place(path, *grid);
             return grid;
         }
         const std::string wanted = name.empty() ? "a float grid" : "a grid named '" + name + "'";
-        throw Error(Errc::InvalidInput, "read_vdb: " + path + ": expected " + wanted + ", got " + list_grids(reader));
+        throw Error(Errc::InvalidInput, path + ": expected " + wanted + ", got " + list_grids(reader));
     });
 }
 
@@ -412,8 +409,7 @@ std::vector<VdbGridInfo> list_vdb(const std::string& given) {
         for (std::size_t n = 0; n < reader.size(); ++n)
             if (name.empty() || reader.is_named(n, name)) list.push_back(describe(reader, n));
         if (list.empty() && !name.empty())
-            throw Error(Errc::InvalidInput,
-                        "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));
+            throw Error(Errc::InvalidInput, path + ": expected a grid named '" + name + "', got " + list_grids(reader));
         return list;
     });
 }

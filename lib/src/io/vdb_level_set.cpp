@@ -62,8 +62,8 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
     if (chosen.empty()) chosen = choose_level_set(path, run);
     FloatGridPtr grid = read_vdb(path, chosen);
     if (grid->getGridClass() == openvdb::GRID_FOG_VOLUME)
-        throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
-                                           "': expected a level set, got a fog volume");
+        throw Error(Errc::Unsupported,
+                    path + ": grid '" + grid->getName() + "': expected a level set, got a fog volume");
     if (grid->getGridClass() == openvdb::GRID_LEVEL_SET || grid->background() != 0) return grid;
     const auto [least, most] = range_of(*grid);
     if (least < 0 || !(most > 0)) return grid;

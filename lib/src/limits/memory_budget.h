@@ -7,7 +7,7 @@ namespace covol::detail {
 
 /// Refuses what is sure to take more than run.memory_budget, before it takes any.
 /// @param bytes   that are needed at least
-/// @param what    takes them, with the function's name before it: "read_image: a.zarr: the image"
+/// @param what    takes them: "a.zarr: the image"
 /// @param advice  what to do; options in backticks
 /// @throws Error InvalidOptions
 void require_memory(double bytes, const std::string& what, const char* advice, const RunContext& run);

@@ -22,7 +22,7 @@ public:
     const Painted& of(const PaintedImage& given, const RunContext& run) {
         const auto known = images_.find(&given);
         if (known != images_.end()) return known->second;
-        if (!image_) throw Error(Errc::InvalidInput, "prepare_marks: expected an image that the paint belongs to");
+        if (!image_) throw Error(Errc::InvalidInput, "expected an image that the paint belongs to");
         const std::string who = given.image.path().empty() ? "painted" : given.image.path();
         Painted painted = understand_painted(placed_on(given.image, *image_, force_), given.labels, given.options, run);
         for (const PaintedLabel& label : painted.labels) run.info(who + ": " + label.summary);
@@ -34,8 +34,8 @@ public:
     const PaintedLabel& label_of(const Marks::Paint& paint, const RunContext& run) {
         for (const PaintedLabel& label : of(*paint.image, run).labels)
             if (label.label == paint.label) return label;
-        throw Error(Errc::InvalidInput, "prepare_marks: " + paint.image->image.path() + ": label " +
-                                            std::to_string(paint.label) + " is not there");
+        throw Error(Errc::InvalidInput,
+                    paint.image->image.path() + ": label " + std::to_string(paint.label) + " is not there");
     }
 
 private:
@@ -209,7 +209,7 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     for (const Marks& marks : structures) names.push_back(marks.name);
     std::set<std::string> unique(names.begin(), names.end());
     if (names.empty() || unique.size() < names.size() || (names.size() > 1 && unique.contains("")))
-        throw Error(Errc::InvalidInput, "prepare_marks: expected a name of its own for each of several structures");
+        throw Error(Errc::InvalidInput, "expected a name of its own for each of several structures");
     number_labels(structures);
     const std::vector<std::string> grids = make_grid_names(names);
     Preparer preparer(std::move(structures), image, options, marks_options);

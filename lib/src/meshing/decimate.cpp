@@ -59,7 +59,7 @@ void build(HalfEdges& edges, const TriangleMesh& mesh) {
     for (const Triangle& t : mesh.triangles) {
         const auto corner = [&](int k) { return HalfEdges::VertexHandle(int(t[std::size_t(k)])); };
         if (!edges.add_face(corner(0), corner(1), corner(2)).is_valid())
-            throw Error(Errc::InvalidInput, "decimate: expected a manifold mesh; repair it first");
+            throw Error(Errc::InvalidInput, "expected a manifold mesh; repair it first");
     }
 }
 

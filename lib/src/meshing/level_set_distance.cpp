@@ -133,7 +133,7 @@ std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec
 namespace covol {
 
 FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface, const RunContext& run) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "measure_fit: expected at least one point, got none");
+    if (points.empty()) throw Error(Errc::InvalidInput, "points: expected at least one, got none");
     std::vector<double> distances;
     with_threads(run, [&] { distances = detail::distances_to(surface, points); });
     return detail::statistics_of(std::move(distances));

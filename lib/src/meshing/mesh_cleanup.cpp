@@ -234,7 +234,7 @@ void guarded(const std::function<void()>& work) {
     try {
         work();
     } catch (const CGAL::Failure_exception& e) {
-        throw Error(Errc::InvalidInput, std::string("clean_mesh: the mesh cannot be repaired: ") + e.what());
+        throw Error(Errc::InvalidInput, std::string("the mesh cannot be repaired: ") + e.what());
     }
 }
 
@@ -288,11 +288,11 @@ CleanupReport clean(const Work& work) {
     const RunContext& run = work.run;
     require_valid(options, "clean_mesh");
     if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
-        throw Error(Errc::InvalidOptions,
-                    level_set == nullptr
-                        ? std::string("clean_mesh: adaptive: expected the level set of the mesh, got none")
-                        : "clean_mesh: adaptive: expected at most two voxels, " +
-                              std::to_string(2 * work.voxel_size()) + ", got " + std::to_string(options.adaptive));
+        throw Error(Errc::InvalidOptions, level_set == nullptr
+                                              ? std::string("adaptive: expected the level set of the mesh, got none")
+                                              : "adaptive: expected at most two voxels, " +
+                                                    std::to_string(2 * work.voxel_size()) + ", got " +
+                                                    std::to_string(options.adaptive));
     check_indices(mesh, "clean_mesh");
     CleanupReport report;
     with_threads(run, [&] {

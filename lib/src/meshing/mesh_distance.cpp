@@ -113,8 +113,8 @@ FitStatistics statistics_of(std::vector<double> distances) {
 }  // namespace detail
 
 FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "measure_fit: expected at least one point, got none");
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "measure_fit: the surface has no triangle");
+    if (points.empty()) throw Error(Errc::InvalidInput, "points: expected at least one, got none");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "the surface has no triangle");
     std::vector<double> distances;
     with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
     return detail::statistics_of(std::move(distances));

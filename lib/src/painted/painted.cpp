@@ -54,8 +54,8 @@ std::string count_text(std::size_t count, const char* what) {
 
 [[noreturn]] void bad_value(const Image& labels, const Index3& at) {
     std::ostringstream text;
-    text << "find_painted_labels: " << labels.path() << ": expected whole numbers >= 0, got "
-         << labels.at(at[0], at[1], at[2]) << " at voxel " << to_text(at) << "; is it a label image?";
+    text << labels.path() << ": expected whole numbers >= 0, got " << labels.at(at[0], at[1], at[2]) << " at voxel "
+         << to_text(at) << "; is it a label image?";
     throw Error(Errc::InvalidInput, text.str());
 }
 
@@ -203,8 +203,7 @@ std::vector<LabelName> find_painted_labels(const Image& labels) {
             {label, named != names.end() ? named->second : "label" + std::to_string(label), named != names.end()});
     }
     if (found.empty())
-        throw Error(Errc::InvalidInput, "find_painted_labels: " + labels.path() +
-                                            ": expected painted voxels, got 0 everywhere in " +
+        throw Error(Errc::InvalidInput, labels.path() + ": expected painted voxels, got 0 everywhere in " +
                                             size_text(labels.geometry().size));
     return found;
 }
@@ -219,7 +218,7 @@ Painted understand_painted(const Image& labels, const std::vector<LabelName>& na
         if (options.outside_label != 0 && !boxes.contains(options.outside_label)) {
             std::string list;
             for (const auto& [label, box] : boxes) list += (list.empty() ? "" : ", ") + std::to_string(label);
-            throw Error(Errc::InvalidInput, "understand_painted: " + labels.path() + ": expected the outside label " +
+            throw Error(Errc::InvalidInput, labels.path() + ": expected the outside label " +
                                                 std::to_string(options.outside_label) + " among its labels, got " +
                                                 list);
         }
@@ -256,7 +255,7 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
     if (!own.spacing_known || force) {
         if (own.size == image.size) return labels.placed(image);
         if (!own.spacing_known)
-            throw Error(Errc::InvalidInput, "placed_on: " + labels.path() + ": expected as many voxels as the image, " +
+            throw Error(Errc::InvalidInput, labels.path() + ": expected as many voxels as the image, " +
                                                 size_text(image.size) + ", for the file states no spacing; got " +
                                                 size_text(own.size) +
                                                 "; save it with the image's geometry, as NRRD or NIfTI");
@@ -289,7 +288,7 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
         return text.str();
     };
     throw Error(Errc::InvalidInput,
-                "placed_on: " + labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
+                labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
                     " painted voxels lie outside the image, the first at " + to_text(first) +
                     "; the labels reach from " + box_text(own.world_box()) + ", the image from " +
                     box_text(image.world_box()) + "; check `spacing`, or save the labels with the image's geometry",

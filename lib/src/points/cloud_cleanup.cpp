@@ -174,18 +174,18 @@ std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanu
     require_valid(options, "clean_cloud");
     for (const Vec3& p : points)
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-            throw Error(Errc::InvalidInput, "clean_cloud: expected finite points");
+            throw Error(Errc::InvalidInput, "points: expected finite numbers");
     CloudCleanupReport own;
     own.given = points.size();
     std::vector<Vec3> result;
     try {
         with_threads(run, [&] { result = clean(points, options, run, own); });
     } catch (const CGAL::Failure_exception& e) {
-        throw Error(Errc::Numerical, std::string("clean_cloud: CGAL: ") + e.what());
+        throw Error(Errc::Numerical, std::string("CGAL: ") + e.what());
     }
     own.kept = result.size();
     if (result.empty() && !points.empty())
-        throw Error(Errc::InvalidInput, "clean_cloud: no point is left of " + std::to_string(points.size()));
+        throw Error(Errc::InvalidInput, "no point is left of " + std::to_string(points.size()));
     if (report != nullptr) *report = own;
     run.info(one_line(own, options));
     return result;

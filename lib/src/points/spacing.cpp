@@ -20,7 +20,7 @@ using detail::squared_distance;
 
 std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell) {
     if (!(cell >= 0) || !std::isfinite(cell))
-        throw Error(Errc::InvalidOptions, "merge_close_points: cell: expected >= 0, got " + std::to_string(cell));
+        throw Error(Errc::InvalidOptions, "cell: expected >= 0, got " + std::to_string(cell));
     struct Item {
         Vec3 key;  ///< the cell, or the point itself
         std::size_t index;
@@ -54,10 +54,9 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
 }
 
 std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most) {
-    if (most == 0) throw Error(Errc::InvalidOptions, "order_spatially: most: expected > 0, got 0");
+    if (most == 0) throw Error(Errc::InvalidOptions, "most: expected > 0, got 0");
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
-        throw Error(Errc::InvalidInput,
-                    "order_spatially: expected fewer than 2^32 points, got " + std::to_string(points.size()));
+        throw Error(Errc::InvalidInput, "points: expected fewer than 2^32, got " + std::to_string(points.size()));
     if (points.empty()) return {};
     constexpr int kBits = 10;
     const WorldBox box = bounding_box(points);

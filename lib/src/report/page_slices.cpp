@@ -64,7 +64,7 @@ struct Compressor {
         unsigned long size = 0;
         if (tjCompress2(handle, pixels.data(), width, width, height, TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, quality,
                         TJFLAG_ACCURATEDCT) != 0)
-            throw Error(Errc::InvalidInput, std::string("write_report_page: a slice: ") + tjGetErrorStr2(handle));
+            throw Error(Errc::InvalidInput, std::string("a slice: ") + tjGetErrorStr2(handle));
         return to_base64(bytes, size);
     }
     tjhandle handle;

@@ -131,22 +131,19 @@ Json to_json(const Image& image, const detail::SlicePlan& plan, const Vec3& orig
 
 void check(const ReportPage& page, const ReportPageOptions& options) {
     require_valid(options, "write_report_page");
-    if (page.structures.empty()) throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
+    if (page.structures.empty()) throw Error(Errc::InvalidInput, "structures: expected at least one, got none");
     if (!page.frames.empty() && page.frame >= page.frames.size())
-        throw Error(Errc::InvalidInput, "write_report_page: frame: expected less than " +
-                                            std::to_string(page.frames.size()) + ", the number of frames, got " +
-                                            std::to_string(page.frame));
+        throw Error(Errc::InvalidInput, "frame: expected less than " + std::to_string(page.frames.size()) +
+                                            ", the number of frames, got " + std::to_string(page.frame));
     for (const PageStructure& structure : page.structures)
         if (structure.mesh == nullptr || structure.mesh->empty())
-            throw Error(Errc::InvalidInput,
-                        "write_report_page: " + structure.name + ": expected a mesh with triangles, got none");
+            throw Error(Errc::InvalidInput, structure.name + ": expected a mesh with triangles, got none");
 }
 
 Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPageSummary& summary,
              const RunContext& run) {
     Json facts = Json::parse(page.facts, nullptr, false);
-    if (!facts.is_object())
-        throw Error(Errc::InvalidInput, "write_report_page: facts: expected a JSON object, got something else");
+    if (!facts.is_object()) throw Error(Errc::InvalidInput, "facts: expected a JSON object, got something else");
     Json data{{"covol", version()},
               {"title", safe_text(page.title)},
               {"unit", safe_text(page.unit)},
@@ -202,7 +199,7 @@ ReportPageSummary write_report_page(const std::string& path, const ReportPage& p
              << viewer.substr(script + kData.size());
         summary.bytes = std::uint64_t(std::max<std::streamoff>(0, file.tellp()));
         file.close();
-        if (!file) throw Error(Errc::Io, "write_report_page: " + path + ": cannot write");
+        if (!file) throw Error(Errc::Io, path + ": cannot write");
     });
     return summary;
 }

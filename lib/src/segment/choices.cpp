@@ -201,8 +201,8 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     using pipeline::number;
     const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
     if (distinct.size() < 2)
-        throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
-                                            std::to_string(distinct.size()));
+        throw Error(Errc::InvalidInput,
+                    "expected an image or at least 2 distinct points, got " + std::to_string(distinct.size()));
     const auto nearest = [](double spacing) {
         return VoxelSizeChoice{spacing, "the median distance between neighbouring points"};
     };

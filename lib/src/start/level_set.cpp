@@ -56,7 +56,7 @@ double LevelSet::sample(const Vec3& place) const { return sample(std::span(&plac
 
 LevelSet LevelSet::offset(double distance, const RunContext& run) const {
     if (!std::isfinite(distance))
-        throw Error(Errc::InvalidOptions, "offset: expected a finite distance, got " + detail::number(distance));
+        throw Error(Errc::InvalidOptions, "distance: expected a finite number, got " + detail::number(distance));
     const Domain own = domain();
     FloatGridPtr moved;
     with_threads(run, [&] {

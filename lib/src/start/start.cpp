@@ -145,8 +145,8 @@ bool contains(const ImageGeometry& geometry, const Vec3& world) {
 
 FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius) {
     if (!(radius > 0) || !std::isfinite(radius) || !std::isfinite(length(center)))
-        throw Error(Errc::InvalidOptions, "start_from_sphere: expected a finite center and a radius > 0, got " +
-                                              to_text(center) + " and " + std::to_string(radius));
+        throw Error(Errc::InvalidOptions, "sphere: expected a finite center and a radius > 0, got " + to_text(center) +
+                                              " and " + std::to_string(radius));
     const double reach = radius + kHalfWidthVoxels * domain.voxel_size;
     const WorldBox box{{center[0] - reach, center[1] - reach, center[2] - reach},
                        {center[0] + reach, center[1] + reach, center[2] + reach}};
@@ -157,8 +157,8 @@ FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double 
 FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box) {
     for (int a = 0; a < 3; ++a)
         if (!(box.max[a] > box.min[a]) || !std::isfinite(box.max[a] - box.min[a]))
-            throw Error(Errc::InvalidOptions, "start_from_box: expected a box with a positive extent, got " +
-                                                  to_text(box.min) + " to " + to_text(box.max));
+            throw Error(Errc::InvalidOptions,
+                        "box: expected a positive extent, got " + to_text(box.min) + " to " + to_text(box.max));
     WorldBox wide = box;
     for (int a = 0; a < 3; ++a) {
         wide.min[a] -= kHalfWidthVoxels * domain.voxel_size;

@@ -55,10 +55,10 @@ double usual_half_gap(const std::vector<Vec3>& outside, const detail::KdTree& in
 
 FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
                               const RunContext& run) {
-    if (inside.empty()) throw Error(Errc::InvalidInput, "start_from_seeds: expected seeds inside, got none");
+    if (inside.empty()) throw Error(Errc::InvalidInput, "expected seeds inside, got none");
     if (std::none_of(inside.begin(), inside.end(), [&](const Vec3& seed) { return domain.contains(seed); }))
-        throw Error(Errc::InvalidInput, "start_from_seeds: expected seeds inside the domain, got none of " +
-                                            std::to_string(inside.size()) + " there");
+        throw Error(Errc::InvalidInput,
+                    "expected seeds inside the domain, got none of " + std::to_string(inside.size()) + " there");
     const double h = domain.voxel_size;
     FloatGridPtr field;
     with_threads(run, [&] {

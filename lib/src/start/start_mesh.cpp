@@ -31,7 +31,7 @@ FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
         return openvdb::tools::meshToSignedDistanceField<FloatGrid>(frame->transform(), points, triangles, {},
                                                                     float(kHalfWidthVoxels), float(kHalfWidthVoxels));
     } catch (const openvdb::Exception& e) {
-        throw Error(Errc::InvalidInput, std::string("start_from_mesh: ") + e.what());
+        throw Error(Errc::InvalidInput, std::string("the mesh: ") + e.what());
     }
 }
 
@@ -59,7 +59,7 @@ void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh
     for (const auto& [z, of_slab] : leaves) {
         if (z < z0 || z >= z0 + lattice.size[2]) continue;
         run.check();
-        rows.fill(z - z0, slab, inside, "start_from_mesh: the mesh is not closed");
+        rows.fill(z - z0, slab, inside, "the mesh is not closed");
         tbb::parallel_for(std::size_t(0), of_slab.size(), [&, list = &of_slab](std::size_t n) {
             FloatGrid::TreeType::LeafNodeType& leaf = *(*list)[n];
             for (openvdb::Index at = 0; at < FloatGrid::TreeType::LeafNodeType::SIZE; ++at) {
@@ -94,7 +94,7 @@ TriangleMesh closed_or_refused(const TriangleMesh& mesh, const RunContext& run) 
 }  // namespace
 
 FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh, const RunContext& run) {
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "start_from_mesh: expected at least one triangle, got none");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "mesh: expected at least one triangle, got none");
     FloatGridPtr result;
     with_threads(run, [&] {
         const MeshMeasures measures = measure(mesh);

@@ -120,8 +120,7 @@ SegmentResult solve_structure(const std::optional<Image>& image, const Structure
 StructuresResult segment_structures(const std::optional<Image>& image, std::vector<Marks> marks,
                                     const StructuresOptions& options, const RunContext& run,
                                     const StructureSolver& solve) {
-    if (!image && marks.size() > 1)
-        throw Error(Errc::InvalidInput, "segment_structures: several structures need an image");
+    if (!image && marks.size() > 1) throw Error(Errc::InvalidInput, "several structures need an image");
     SegmentOptions common = options.segment;
     if (!common.voxel_size && !marks.empty()) {
         const VoxelSizeChoice choice = choose_voxel_size(image, marks.front(), common);

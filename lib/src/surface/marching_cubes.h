@@ -70,10 +70,10 @@ public:
         origin_ = choose_mesh_origin(domain_.world_box(), domain_.voxel_size);
         for (int a = 0; a < 3; ++a) domain_.origin[a] -= origin_[a];
         if (!(grid.background() >= isovalue_))
-            throw Error(Errc::InvalidInput,
-                        "extract_mesh: grid '" + grid.getName() + "': expected a background above the isovalue " +
-                            std::to_string(isovalue_) + ", got " + std::to_string(grid.background()) +
-                            "; the surface would not be closed");
+            throw Error(Errc::InvalidInput, "grid '" + grid.getName() + "': expected a background above the isovalue " +
+                                                std::to_string(isovalue_) + ", got " +
+                                                std::to_string(grid.background()) +
+                                                "; the surface would not be closed");
     }
 
     [[nodiscard]] const Vec3& origin() const { return origin_; }
@@ -189,7 +189,7 @@ private:
         blocks_.resize(block_count_ + 2);
         blocks_.back().inside.fill(~std::uint64_t(0));
         if (blocks_.size() > std::numeric_limits<std::uint32_t>::max())
-            throw Error(Errc::Unsupported, "extract_mesh: the grid has more than 2^32 leaves");
+            throw Error(Errc::Unsupported, "the grid has more than 2^32 leaves");
     }
 
     [[nodiscard]] Block tile_block(const Coord& origin) const {
@@ -340,7 +340,7 @@ private:
             if (blocks_[b].vertex_count > 0) check_precision(blocks_[b]);
         }
         if (vertices_ > std::numeric_limits<std::uint32_t>::max())
-            throw Error(Errc::Unsupported, "extract_mesh: the surface has " + std::to_string(vertices_) +
+            throw Error(Errc::Unsupported, "the surface has " + std::to_string(vertices_) +
                                                " vertices, more than 2^32; use a larger voxel size");
     }
 
@@ -351,7 +351,7 @@ private:
     void check_numbers() const {
         if (not_a_number_)
             throw Error(Errc::InvalidInput,
-                        "extract_mesh: grid '" + grid_.getName() + "': a value next to the surface is not finite");
+                        "grid '" + grid_.getName() + "': a value next to the surface is not finite");
     }
 
     /// Meshes hold single-precision coordinates: a voxel has to be many of their steps wide.
@@ -360,7 +360,7 @@ private:
             domain_.index_to_world({double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
         for (const double c : p)
             if (domain_.voxel_size < 16 * std::abs(c) * std::numeric_limits<float>::epsilon())
-                throw Error(Errc::Unsupported, "extract_mesh: coordinates near " + std::to_string(c) +
+                throw Error(Errc::Unsupported, "coordinates near " + std::to_string(c) +
                                                    " are too far from each other for a voxel size of " +
                                                    std::to_string(domain_.voxel_size) +
                                                    " in single precision; take the data in parts");

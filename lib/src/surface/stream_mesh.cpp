@@ -143,7 +143,7 @@ StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext&
                     const std::function<void(const StreamedMesh&)>& begin,
                     const std::function<void(const StreamedMesh&, const detail::MeshPiece&)>& take) {
     if (!std::isfinite(isovalue))
-        throw Error(Errc::InvalidOptions, "stream_mesh: expected a finite isovalue, got " + std::to_string(isovalue));
+        throw Error(Errc::InvalidOptions, "isovalue: expected a finite number, got " + std::to_string(isovalue));
     StreamedMesh made;
     with_threads(run, [&] {
         std::optional<detail::Uncut> whole;
@@ -153,8 +153,7 @@ StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext&
         std::optional<Totals> totals;
         cubes.stream(
             [&](std::uint64_t vertices, std::uint64_t triangles) {
-                if (triangles == 0)
-                    throw NoSurface("stream_mesh: grid '" + surface.getName() + "': no surface at this level");
+                if (triangles == 0) throw NoSurface("grid '" + surface.getName() + "': no surface at this level");
                 made.origin = cubes.origin();
                 made.vertices = vertices;
                 made.triangles = triangles;
@@ -181,7 +180,7 @@ StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, doub
                          const WriteMeshOptions& options, const RunContext& run) {
     require_valid(options, "stream_mesh");
     if (!options.binary || !options.attributes.empty())
-        throw Error(Errc::Unsupported, "stream_mesh: expected a binary file without attributes");
+        throw Error(Errc::Unsupported, "expected a binary file without attributes");
     StreamedMesh made;
     detail::write_atomically(path, [&](const std::string& temporary) {
         std::optional<Writer> writer;

@@ -54,9 +54,8 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     for (const Vec3& seed : options.exterior_seeds) {
         if (!domain.contains(seed)) {
             const WorldBox box = domain.world_box();
-            throw Error(Errc::InvalidInput, "tag_interior: exterior seed " + to_text(seed) +
-                                                ": expected a position in the domain " + to_text(box.min) + " to " +
-                                                to_text(box.max));
+            throw Error(Errc::InvalidInput, "exterior seed " + to_text(seed) + ": expected a position in the domain " +
+                                                to_text(box.min) + " to " + to_text(box.max));
         }
         const Vec3 index = domain.world_to_index(seed);
         Coord voxel;
@@ -65,7 +64,7 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
         const float d = distance.tree().getValue(voxel);
         if (distance.tree().isValueOn(voxel) && !(double(d) > options.tag_distance)) {
             std::ostringstream s;
-            s << "tag_interior: exterior seed " << to_text(seed)
+            s << "exterior seed " << to_text(seed)
               << ": expected further from the points than the tag distance D = " << options.tag_distance
               << ", got d = " << d << "; move the seed to the middle of the cavity, or use a smaller tag distance";
             throw Error(Errc::InvalidInput, s.str());
@@ -94,8 +93,8 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
     // The tube's own values were rounded to float: allow for that.
     if (double(distance.background()) < (tag_distance + kHalfWidthVoxels * h) * (1 - 1e-6)) {
         std::ostringstream s;
-        s << "tag_interior: expected a distance tube of at least D + 3 h = " << tag_distance + kHalfWidthVoxels * h
-          << ", got " << distance.background();
+        s << "expected a distance tube of at least D + 3 h = " << tag_distance + kHalfWidthVoxels * h << ", got "
+          << distance.background();
         throw Error(Errc::InvalidInput, s.str());
     }
     const std::vector<Coord> seeds = seed_voxels(distance, tube.domain, options);
@@ -135,9 +134,8 @@ std::string BandReport::leak() const {
 BandResult tag_interior(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
     require_valid(options, "tag_interior");
     if (distance.tree().leafCount() == 0)
-        throw Error(
-            Errc::InvalidInput,
-            "tag_interior: expected a distance grid with active voxels, got none: no point lies near the domain");
+        throw Error(Errc::InvalidInput,
+                    "expected a distance grid with active voxels, got none: no point lies near the domain");
     BandResult result;
     with_threads(run, [&] { result = make(distance, options, run); });
     return result;

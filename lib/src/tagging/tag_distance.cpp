@@ -25,8 +25,7 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
     for (int a = 0; a < 3; ++a) {
         box.min[a] = std::max(box.min[a], limit.min[a]);
         box.max[a] = std::min(box.max[a], limit.max[a]);
-        if (!(box.max[a] > box.min[a]))
-            throw Error(Errc::InvalidInput, "choose_tag_distance: no point lies in the domain");
+        if (!(box.max[a] > box.min[a])) throw Error(Errc::InvalidInput, "no point lies in the domain");
     }
     return make_domain(box, voxel_size);
 }
@@ -70,7 +69,7 @@ Verdict judge(const Cores& analysis) {
 
 TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
                                       const std::vector<Vec3>& exterior_seeds, const RunContext& run) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "choose_tag_distance: expected at least one point, got none");
+    if (points.empty()) throw Error(Errc::InvalidInput, "points: expected at least one, got none");
     const double h = domain.voxel_size;
     const WorldBox box = bounding_box(points);
     const double extent = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2], h});

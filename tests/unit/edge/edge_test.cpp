@@ -69,7 +69,7 @@ double largest_difference(const Domain& domain, const FloatGrid& g, const DenseF
 
 bool everywhere(const Vec3&) { return true; }
 
-Errc edge_code(const std::function<void()>& call) { return code_of(call, "detect_edges: "); }
+Errc edge_code(const std::function<void()>& call) { return code_of(call); }
 
 }  // namespace
 

@@ -100,11 +100,11 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
 }
 
 TEST_CASE("An error in the program is told of") {
-    const Trial trial = try_one({"refuse", "read_image: a.h5: sheared"});
+    const Trial trial = try_one({"refuse", "a.h5: sheared"});
     CHECK_FALSE(trial.crashed);
     REQUIRE(trial.refused);
     CHECK(trial.refused->code() == Errc::Unsupported);
-    CHECK(std::string(trial.refused->what()) == "read_image: a.h5: sheared");
+    CHECK(std::string(trial.refused->what()) == "a.h5: sheared");
 
     const Trial cut = try_one({"refuse", std::string(1 << 20, 'x')});
     REQUIRE(cut.refused);
@@ -112,7 +112,7 @@ TEST_CASE("An error in the program is told of") {
 
     const Trial other = try_one({"fail"});
     REQUIRE(other.refused);
-    CHECK(std::string(other.refused->what()) == "read_image: fail: a failure");
+    CHECK(std::string(other.refused->what()) == "fail: a failure");
     CHECK_THROWS_AS(try_one({"no memory"}), std::bad_alloc);
 }
 
@@ -149,5 +149,5 @@ TEST_CASE("A file that crashes its library is damaged") {
     const auto error = reading_error(try_one({"abort"}), "a.dcm", "GDCM");
     REQUIRE(error);
     CHECK(error->code() == Errc::InvalidInput);
-    CHECK(std::string(error->what()) == "read_image: a.dcm: damaged: the GDCM library cannot read it");
+    CHECK(std::string(error->what()) == "a.dcm: damaged: the GDCM library cannot read it");
 }

@@ -239,17 +239,16 @@ TEST_CASE("a page without a surface, or with facts that are none, is refused and
     const Scratch scratch;
     ReportPage page;
     const auto write = [&] { (void)write_report_page(scratch.path("p.html"), page); };
-    CHECK(code_of(write, "write_report_page: expected a structure") == Errc::InvalidInput);
+    CHECK(code_of(write, "structures: expected at least one") == Errc::InvalidInput);
     page.structures.push_back({"one", {}, &empty, {}, nullptr});
-    CHECK(code_of(write, "write_report_page: one: expected a mesh") == Errc::InvalidInput);
+    CHECK(code_of(write, "one: expected a mesh") == Errc::InvalidInput);
     page.structures[0].mesh = &mesh;
     page.frames = {"p_t000.html", "p_t001.html"};
     page.frame = 2;
-    CHECK(code_of(write, "write_report_page: frame: expected less than 2, the number of frames, got 2") ==
-          Errc::InvalidInput);
+    CHECK(code_of(write, "frame: expected less than 2, the number of frames, got 2") == Errc::InvalidInput);
     page.frames.clear();
     page.facts = "[1]";
-    CHECK(code_of(write, "write_report_page: facts: expected a JSON object") == Errc::InvalidInput);
+    CHECK(code_of(write, "facts: expected a JSON object") == Errc::InvalidInput);
     page.facts = "{}";
     ReportPageOptions options;
     options.jpeg_quality = 0;

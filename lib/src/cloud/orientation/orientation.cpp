@@ -85,9 +85,9 @@ Orientation best_of(std::vector<Tried> tried, const std::vector<Vec3>& points, c
 
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     if (points.size() < 4)
-        throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
+        throw Error(Errc::InvalidInput, "points: expected at least 4, got " + std::to_string(points.size()));
     if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0))
-        throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+        throw Error(Errc::InvalidInput, "all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.

@@ -134,9 +134,7 @@ private:
     [[nodiscard]] static std::uint64_t file_bytes(const DicomSlice& slice) {
         return decoded_bytes(slice) * slice.file_frames;
     }
-    [[nodiscard]] static std::string unusable(const DicomSlice& slice) {
-        return "read_image: " + slice.path + ": damaged or truncated";
-    }
+    [[nodiscard]] static std::string unusable(const DicomSlice& slice) { return slice.path + ": damaged or truncated"; }
     static void refuse_absurd_size(const DicomSlice& slice) {
         allocate_pixels(slice.path, pixels_of(slice) * slice.file_frames, slice.type, fs::file_size(slice.path));
     }

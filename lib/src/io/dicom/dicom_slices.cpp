@@ -75,7 +75,7 @@ void fill_plain(const DicomHeader& header, std::size_t frames, const std::string
     place.intercept = own.intercept;
     slice.type = slice.decoded_type = rescaled_type(place.type, own.slope, own.intercept, stored);
     if (slice.components > 1 && header.integer(kPlanar).value_or(0) != 0)
-        throw Error(Errc::Unsupported, "read_image: " + slice.path + ": colour planes behind each other");
+        throw Error(Errc::Unsupported, slice.path + ": colour planes behind each other");
 }
 
 /// GDCM rescales all frames alike: by `image`.
@@ -229,7 +229,7 @@ std::vector<std::variant<std::vector<DicomSlice>, Error>> read_dicom_slices(cons
     std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // their places among the files
     for (const std::string& path : paths) {
         run.check();
-        const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
+        const std::string unusable = path + ": damaged, truncated, or not a DICOM image";
         try {
             std::optional<DicomHeader> header = read_dicom_header(path);
             if (!header) throw Error(Errc::InvalidInput, unusable);

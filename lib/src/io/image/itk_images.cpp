@@ -208,7 +208,7 @@ std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name) {
 
 std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run) {
     const std::string end = extension(path);
-    const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a " + end + " file";
+    const std::string unusable = path + ": damaged, truncated, or not a " + end + " file";
     const bool is_meta = end.rfind(".mh", 0) == 0;
     const bool is_nrrd = end == ".nrrd" || end == ".nhdr", is_hdf5 = !is_meta && !is_nrrd;
     std::optional<TextHeader> header;

@@ -62,8 +62,7 @@ public:
         const auto size = load<std::int32_t>(bytes_.data(), false), swapped = load<std::int32_t>(bytes_.data(), true);
         constexpr std::int32_t kVersion2 = 540;
         if (size == kVersion2 || swapped == kVersion2)
-            throw Error(Errc::Unsupported,
-                        "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
+            throw Error(Errc::Unsupported, begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
         swap_ = size != std::int32_t(bytes_.size());
         if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
         for (const auto& [first, count] : {std::pair(nifti::kPixdim, 4), std::pair(nifti::kQuatern, 6 + 12)})
@@ -275,8 +274,7 @@ std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext&
     PixelPlace begin;
     begin.path = path;
     begin.packed = is_packed;
-    const NiftiHeader header(
-        begin, "read_image: " + path + ": damaged, truncated, or not a .nii" + (is_packed ? ".gz" : "") + " file");
+    const NiftiHeader header(begin, path + ": damaged, truncated, or not a .nii" + (is_packed ? ".gz" : "") + " file");
     ImageInfo info;
     const std::optional<PixelPlace> place = nifti_pixels(header, begin, info);
     const std::array<std::uint64_t, 7> sizes = header.sizes();

@@ -198,8 +198,8 @@ private:
     }
 
     [[nodiscard]] Error damaged(const TiffStack::Plane& plane) const {
-        return tiff_->error(Errc::InvalidInput, "read_image: " + stack_.files[plane.file] +
-                                                    ": damaged or truncated at page " + std::to_string(plane.page));
+        return tiff_->error(Errc::InvalidInput,
+                            stack_.files[plane.file] + ": damaged or truncated at page " + std::to_string(plane.page));
     }
 
     /// Makes `file` the open one.

@@ -112,8 +112,7 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
         throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
     // m: not mapped, for pages of packed tiles that were read once would stay in memory
     auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kLeastLimit, 4 * bytes));
-    if (tiff->get() == nullptr)
-        throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
+    if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, path + ": not a usable TIFF file");
     return tiff;
 }
 
@@ -132,8 +131,8 @@ std::vector<TiffPage> list_pages(const std::string& path, const Tiff& tiff) {
         if (TIFFLastDirectory(tiff.get()) != 0) break;
         more = TIFFReadDirectory(tiff.get()) == 1;
         if (!more)
-            throw tiff.error(Errc::InvalidInput, "read_image: " + path + ": damaged or truncated after page " +
-                                                     std::to_string(pages.size() - 1));
+            throw tiff.error(Errc::InvalidInput,
+                             path + ": damaged or truncated after page " + std::to_string(pages.size() - 1));
     }
     return pages;
 }

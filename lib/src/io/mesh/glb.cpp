@@ -287,7 +287,7 @@ void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::
     text.pad(4, ' ');
     const std::uint64_t total = 12 + 8 + text.data().size() + 8 + binary_bytes;
     if (total > std::numeric_limits<std::uint32_t>::max())
-        throw Error(Errc::Unsupported, "write_mesh: the mesh is larger than the 4 GB that .glb can hold; write .ply");
+        throw Error(Errc::Unsupported, "the mesh is larger than the 4 GB that .glb can hold; write .ply");
     out << "glTF";
     out.raw(std::uint32_t(2));
     out.raw(std::uint32_t(total));

@@ -27,11 +27,10 @@ using namespace mesh_io;
 std::string read_file(const std::string& path) {
     std::error_code status;
     const auto size = std::filesystem::file_size(path, status);
-    if (status) throw Error(Errc::Io, "read_mesh: " + path + ": cannot be opened: " + status.message());
+    if (status) throw Error(Errc::Io, path + ": cannot be opened: " + status.message());
     std::ifstream file = open_regular_file(path);
     std::string text(size, '\0');
-    if (!file || !file.read(text.data(), std::streamsize(size)))
-        throw Error(Errc::Io, "read_mesh: " + path + ": cannot be read");
+    if (!file || !file.read(text.data(), std::streamsize(size))) throw Error(Errc::Io, path + ": cannot be read");
     return text;
 }
 
@@ -39,18 +38,18 @@ void check_references(const TriangleMesh& mesh) {
     for (const Face& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, "write_mesh: a triangle refers to vertex " + std::to_string(v) +
-                                                    " of " + std::to_string(mesh.vertices.size()));
+                throw Error(Errc::InvalidInput, "a triangle refers to vertex " + std::to_string(v) + " of " +
+                                                    std::to_string(mesh.vertices.size()));
 }
 
 void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh) {
     const std::string& name = attribute.name;
     if (name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' '; }))
-        throw Error(Errc::InvalidInput, "write_mesh: expected an attribute's name of one word, got '" + name + "'");
+        throw Error(Errc::InvalidInput, "expected an attribute's name of one word, got '" + name + "'");
     if (attribute.values.size() != mesh.vertices.size())
-        throw Error(Errc::InvalidInput,
-                    "write_mesh: attribute " + name + ": expected " + std::to_string(mesh.vertices.size()) +
-                        " values, one for each vertex, got " + std::to_string(attribute.values.size()));
+        throw Error(Errc::InvalidInput, "attribute " + name + ": expected " + std::to_string(mesh.vertices.size()) +
+                                            " values, one for each vertex, got " +
+                                            std::to_string(attribute.values.size()));
 }
 
 Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const WriteMeshOptions& options) {
@@ -79,9 +78,8 @@ Writer writer_of(const std::string& path) {
     const std::string end = detail::extension(path);
     for (const auto& known : kWriters)
         if (known.extension == end) return known.writer;
-    throw Error(
-        Errc::InvalidOptions,
-        "write_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
+    throw Error(Errc::InvalidOptions,
+                path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
 }
 
 void save(const std::string& path, const std::function<void(Output& out)>& write) {
@@ -127,8 +125,8 @@ bool holds_several_meshes(const std::string& path) {
 
 void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes, const WriteMeshOptions& options) {
     if (!holds_several_meshes(path))
-        throw Error(Errc::InvalidOptions, "write_meshes: " + path + ": expected a name that ends in .obj or .glb");
-    if (meshes.empty()) throw Error(Errc::InvalidInput, "write_meshes: " + path + ": expected a mesh, got none");
+        throw Error(Errc::InvalidOptions, path + ": expected a name that ends in .obj or .glb");
+    if (meshes.empty()) throw Error(Errc::InvalidInput, path + ": expected a mesh, got none");
     WriteMeshOptions bare = options;
     bare.attributes.clear();
     std::vector<Prepared> prepared;
@@ -159,9 +157,8 @@ bool is_mesh_name(const std::string& path) {
 TriangleMesh read_mesh(const std::string& path) {
     const std::string end = detail::extension(path);
     if (!is_mesh_name(path))
-        throw Error(
-            Errc::Unsupported,
-            "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
+        throw Error(Errc::Unsupported,
+                    path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
     Source source("read_mesh", path, text);
     const auto built = [&](void (*read)(Source&, Receiver&)) {
@@ -174,7 +171,7 @@ TriangleMesh read_mesh(const std::string& path) {
                         : end == ".stl" ? read_stl(source, text)
                         : end == ".glb" ? read_glb(source, text)
                                         : built(read_off);
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "read_mesh: " + path + ": the file has no triangle");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, path + ": the file has no triangle");
     return mesh;
 }
 

@@ -65,7 +65,7 @@ private:
         data_.clear();
     }
     void check() const {
-        if (!file_) throw Error(Errc::Io, "write_mesh: " + name_ + ": cannot be written");
+        if (!file_) throw Error(Errc::Io, name_ + ": cannot be written");
     }
     template <typename T>
     Output& append(T number) {

@@ -71,7 +71,7 @@ public:
         // An empty stream buffer would be an error.
         if (faces.peek() != std::ifstream::traits_type::eof()) whole << faces.rdbuf();
         whole.close();
-        if (!whole || faces.bad()) throw Error(Errc::Io, "write_mesh: " + name_ + ": cannot be written");
+        if (!whole || faces.bad()) throw Error(Errc::Io, name_ + ": cannot be written");
     }
 
 private:
@@ -91,7 +91,7 @@ std::unique_ptr<MeshStream> MeshStream::open(const std::string& path, const std:
     if (end == ".stl") return std::make_unique<StlStream>(path, name, triangles, comments);
     if (end != ".ply" && end != ".obj")
         throw Error(Errc::InvalidOptions,
-                    "stream_mesh: " + name + ": expected a name that ends in .ply, .stl or .obj, got '" + end + "'");
+                    name + ": expected a name that ends in .ply, .stl or .obj, got '" + end + "'");
     return std::make_unique<IndexedStream>(path, name, end == ".ply", PlyCounts{vertices, triangles}, origin, comments);
 }
 

@@ -349,7 +349,7 @@ void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const s
     // Many readers keep the numbers of vertices as int, and the count of faces too.
     constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
     if (counts.vertices > kMost || counts.triangles > kMost)
-        throw Error(Errc::Unsupported, "write_mesh: PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +
+        throw Error(Errc::Unsupported, "PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +
                                            std::to_string(counts.vertices) + " and " +
                                            std::to_string(counts.triangles) + "; decimate it or use larger voxels");
     out << "ply\nformat " << (binary ? "binary_little_endian" : "ascii") << " 1.0\n";

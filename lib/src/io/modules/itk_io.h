@@ -59,8 +59,7 @@ inline PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase&
         case Component::FLOAT: return PixelType::Float;
         case Component::DOUBLE: return PixelType::Double;
         default:
-            throw Error(Errc::Unsupported, "read_image: " + path +
-                                               ": expected values of 8, 16 or 32 bits, float or double, got " +
+            throw Error(Errc::Unsupported, path + ": expected values of 8, 16 or 32 bits, float or double, got " +
                                                itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType()));
     }
 }

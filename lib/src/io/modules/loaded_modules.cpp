@@ -36,7 +36,7 @@ const Module& load(const std::string& name, const char* formats) {
     void* const entry = library == nullptr ? nullptr : dlsym(library, ("covol_" + name).c_str());
     if (entry == nullptr) {
         const char* const why = dlerror();
-        throw Error(Errc::Io, "read_image: " + path.string() + ": expected covol's module for " + formats +
+        throw Error(Errc::Io, path.string() + ": expected covol's module for " + formats +
                                   " beside libcovol.so, got: " + (why == nullptr ? "no reason" : why) +
                                   "; install covol again, with all the libraries that it depends on");
     }

@@ -296,7 +296,7 @@ std::array<std::int64_t, 3> dense_strides(const Index3& size) {
 }
 
 Error read_error(Errc code, const std::string& path, const std::string& what, const std::string& option) {
-    return {code, "read_image: " + path + ": " + what, option};
+    return {code, path + ": " + what, option};
 }
 
 Error not_finite(const std::string& path, const Index3& voxel) {

@@ -92,7 +92,7 @@ VoxelBox whole_box(const Index3& size);
 /// Strides of voxels that lie behind each other, i fastest.
 std::array<std::int64_t, 3> dense_strides(const Index3& size);
 
-/// An Error whose text begins with "read_image: PATH: ".
+/// An Error whose text begins with "PATH: ".
 Error read_error(Errc code, const std::string& path, const std::string& what, const std::string& option = {});
 
 /// What to throw at a voxel that is NaN or infinite.

@@ -118,9 +118,8 @@ double pcd_value(const std::string& path, const char* data, const PcdField& fiel
     if (field.type == 'I' && field.size == 2) return load<std::int16_t>(data, kSwap);
     if (field.type == 'U' && field.size == 4) return load<std::uint32_t>(data, kSwap);
     if (field.type == 'U' && field.size == 2) return load<std::uint16_t>(data, kSwap);
-    throw Error(Errc::Unsupported, "read_points: " + path + ": field " + quote(field.name) +
-                                       ": expected 4 or 8 bytes of type F, got " + std::to_string(field.size) + " of " +
-                                       field.type);
+    throw Error(Errc::Unsupported, path + ": field " + quote(field.name) + ": expected 4 or 8 bytes of type F, got " +
+                                       std::to_string(field.size) + " of " + field.type);
 }
 
 /// Marc Lehmann's LZF: literal runs and references into what was written. False when damaged.
@@ -275,9 +274,8 @@ PointTable parse_pcd(const std::string& path, const std::string& bytes) {
     else if (header.data == "binary_compressed")
         read_pcd_binary(path, header, unpack_pcd(path, header, lines.rest()), true, table, invalid);
     else
-        throw Error(
-            Errc::Unsupported,
-            "read_points: " + path + ": expected DATA ascii, binary or binary_compressed, got " + quote(header.data));
+        throw Error(Errc::Unsupported,
+                    path + ": expected DATA ascii, binary or binary_compressed, got " + quote(header.data));
     if (header.viewpoint && (header.is_organised || *header.viewpoint != Vec3{0, 0, 0}))
         table.sensor = header.viewpoint;
     table.rule = "points of a PCD (" + header.data + ")";
@@ -292,10 +290,9 @@ PointTable parse_las(const std::string& path, const std::string& content) {
     const int format = bytes.at<std::uint8_t>(104);
     if ((format & 0xC0) != 0)
         throw Error(Errc::Unsupported,
-                    "read_points: " + path +
-                        ": expected LAS, got its compressed form LAZ; unpack it with laszip or pdal translate");
+                    path + ": expected LAS, got its compressed form LAZ; unpack it with laszip or pdal translate");
     if (bytes.at<std::uint8_t>(24) != 1 || minor > 4)
-        throw Error(Errc::Unsupported, "read_points: " + path + ": expected LAS 1.0 to 1.4, got " +
+        throw Error(Errc::Unsupported, path + ": expected LAS 1.0 to 1.4, got " +
                                            std::to_string(bytes.at<std::uint8_t>(24)) + "." + std::to_string(minor));
     const std::uint64_t begin = bytes.at<std::uint32_t>(96), stride = bytes.at<std::uint16_t>(105);
     std::uint64_t count = bytes.at<std::uint32_t>(107);

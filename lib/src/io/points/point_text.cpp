@@ -51,12 +51,10 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 }  // namespace
 
 void fail(const std::string& path, std::size_t line, const std::string& what) {
-    throw Error(Errc::InvalidInput, "read_points: " + path + ":" + std::to_string(line) + ": " + what);
+    throw Error(Errc::InvalidInput, path + ":" + std::to_string(line) + ": " + what);
 }
 
-void fail(const std::string& path, const std::string& what) {
-    throw Error(Errc::InvalidInput, "read_points: " + path + ": " + what);
-}
+void fail(const std::string& path, const std::string& what) { throw Error(Errc::InvalidInput, path + ": " + what); }
 
 double to_coordinate(const std::string& path, std::size_t line, std::string_view field) {
     const std::optional<double> value = to_number(field);

@@ -9,7 +9,7 @@
 /// What the readers of text files of points share.
 namespace covol::detail {
 
-/// @throws Error InvalidInput, "read_points: path:line: what".
+/// @throws Error InvalidInput, "path:line: what".
 [[noreturn]] void fail(const std::string& path, std::size_t line, const std::string& what);
 [[noreturn]] void fail(const std::string& path, const std::string& what);
 

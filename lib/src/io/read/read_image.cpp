@@ -115,7 +115,7 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
     for (int a = 0; a < 3; ++a)
         if (!info.spacing_known[a]) info.geometry.spacing[a] = 1;
     info.geometry.spacing_known = info.spacing_known[0] && info.spacing_known[1] && info.spacing_known[2];
-    detail::check_geometry("read_image: " + path, info.geometry);
+    detail::check_geometry(path, info.geometry);
     warn_of_spacing(path, info, run);
     return info;
 }
@@ -183,7 +183,7 @@ Image read_image(const std::string& path, const ReadImageOptions& options, const
         const std::unique_ptr<ImageFile> file = open_image(path, options, run);
         const ImageInfo info = corrected_info(path, *file, options, run);
         const PixelRequest request = choose_pixels(path, info, options);
-        detail::require_memory(double(file->bytes_to_hold(request)), "read_image: " + path + ": the image",
+        detail::require_memory(double(file->bytes_to_hold(request)), path + ": the image",
                                "choose a part with `roi`, or downsample it", run);
         const detail::Pixels pixels = file->read(request, run);
         image.geometry_ = info.geometry;

@@ -122,8 +122,8 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
     const ImageGeometry& geometry = source.geometry();
     for (int a = 0; a < 3; ++a)
         if (geometry.size[a] < 1 || !(geometry.spacing[a] > 0))
-            throw Error(Errc::InvalidInput, "write_image: " + path + ": expected voxels along every axis, got " +
-                                                detail::size_text(geometry.size));
+            throw Error(Errc::InvalidInput,
+                        path + ": expected voxels along every axis, got " + detail::size_text(geometry.size));
     const std::string extension = detail::extension(path);
     warn_of_losses(path, geometry, run);
     with_threads(run, [&] {
@@ -167,8 +167,7 @@ void check_image_extension(const std::string& path) {
     const std::string extension = detail::extension(detail::without_end_slash(path));
     for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".npy", ".zarr"})
         if (extension == known) return;
-    throw Error(Errc::InvalidOptions,
-                "write_image: " + path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");
+    throw Error(Errc::InvalidOptions, path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");
 }
 
 }  // namespace covol

@@ -170,7 +170,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     const ImageGeometry& g = source.geometry();
     for (const std::int32_t n : g.size)
         if (n > std::numeric_limits<std::int16_t>::max())
-            throw Error(Errc::Unsupported, "write_image: " + path + ": NIfTI-1 holds at most 32767 voxels along an " +
+            throw Error(Errc::Unsupported, path + ": NIfTI-1 holds at most 32767 voxels along an " +
                                                "axis, the image is " + size_text(g.size) +
                                                "; write .nrrd, .mha or .zarr");
     std::string header(352, '\0');
@@ -255,7 +255,7 @@ public:
     }
 
 private:
-    [[noreturn]] void fail() const { throw Error(Errc::Io, "write_image: " + path_ + ": cannot write"); }
+    [[noreturn]] void fail() const { throw Error(Errc::Io, path_ + ": cannot write"); }
     std::string path_;
     std::ofstream file_;
     std::uint64_t size_ = 0;

@@ -69,7 +69,7 @@ void write_tiff(const std::string& path, const PixelSource& source, bool ome, co
     const PixelType type = source.type();
     const bool big = voxel_count(geometry.size) * pixel_bytes(type) > classic_limit;
     Tiff tiff(path, big ? "w8" : "w", 0);
-    const auto failure = [&] { return tiff.error(Errc::Io, "write_image: " + path + ": cannot write"); };
+    const auto failure = [&] { return tiff.error(Errc::Io, path + ": cannot write"); };
     if (tiff.get() == nullptr) throw failure();
     const std::string description = ome ? make_ome_xml(geometry, type) : imagej_description(geometry, source.range());
     const int format = with_pixel_type(type, [](auto pixel) {

@@ -14,7 +14,7 @@ void write_png(const std::string& path, const Picture& picture) {
         png.height = static_cast<png_uint_32>(picture.height);
         png.format = PNG_FORMAT_RGB;
         if (png_image_write_to_file(&png, temporary.c_str(), 0, picture.rgb.data(), 0, nullptr) == 0)
-            throw Error(Errc::Io, "write_png: " + path + ": " + png.message);
+            throw Error(Errc::Io, path + ": " + png.message);
     });
 }
 

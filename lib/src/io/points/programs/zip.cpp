@@ -48,8 +48,7 @@ Entry read_entry(const Bytes& bytes, std::uint64_t at, const std::string& path) 
 std::string inflate(const Entry& entry, std::string_view packed, const std::string& path) {
     std::string content(entry.size, '\0');
     z_stream stream{};
-    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK)
-        throw Error(Errc::Io, "read_points: " + path + ": zlib does not start");
+    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(Errc::Io, path + ": zlib does not start");
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
     stream.avail_in = static_cast<uInt>(packed.size());
     stream.next_out = reinterpret_cast<Bytef*>(content.data());
@@ -64,7 +63,7 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
 /// The entry's packed bytes, which may hold what it says that they do.
 std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
-        throw Error(Errc::Unsupported, "read_points: " + path + ": entry " + quote(entry.name) + " is " + what);
+        throw Error(Errc::Unsupported, path + ": entry " + quote(entry.name) + " is " + what);
     };
     if ((entry.flags & 1) != 0) unsupported("encrypted");
     if (entry.method != 0 && entry.method != 8) unsupported("neither stored nor deflated; pack the archive anew");
@@ -107,7 +106,7 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
         const std::string_view packed = find_packed(bytes, entry, path);
         unpacked += entry.size;
         if (unpacked > most)
-            throw Error(Errc::Unsupported, "read_points: " + path + ": an archive of " + std::to_string(bytes.size()) +
+            throw Error(Errc::Unsupported, path + ": an archive of " + std::to_string(bytes.size()) +
                                                " bytes claims to hold more than " + std::to_string(most) +
                                                ", which no marks do; unpack it, and give its files");
         use(entry.name, unpack(entry, packed, path));
