@@ -285,6 +285,18 @@ class Many(Clouds):
             self.assertGreater(cloud["noise"], cloud["nearest"])
             self.assertNotIn(told, done.stderr)
 
+    def test_points_that_fill_a_solid(self):
+        # 2,000 as well: as marks on a surface they would be folded.
+        for count in 10000, 2000:
+            draw = random.Random(count)
+            filled = [tuple(x * f for x in p) for p in random_sphere(count, 8) for f in [draw.random() ** (1 / 3)]]
+            report = self.report(filled)
+            self.assertTrue(report["cloud"]["fills"])
+            self.assertIn("fill a solid", " ".join(report["warnings"]))
+            self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
+            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.06)
+        self.assertFalse(self.report(random_sphere(6000, 8))["cloud"]["fills"])
+
     def test_folds_are_met(self):
         # On cells that are too fine their walls run into each other, and a quadric through two of them lies between.
         for seed in 1, 2:
@@ -487,6 +499,22 @@ class Open(Clouds):
 
     def test_line(self):
         self.check_layer([(0.02 * n, 0.0, 0.0) for n in range(500)], "lie on a line")
+
+    def test_what_holds_no_surface_is_refused_at_once(self):
+        # Tagging and a flow would find it out in half a minute.
+        draw = random.Random(2)
+        line = [(0.002 * n, 0.001 * n, 0.0) for n in range(6000)]
+        plane = [(draw.uniform(0, 10), draw.uniform(0, 10), 3.0) for _ in range(6000)]
+        for points, says in ((line[:2], "on a line"), (line, "on a line"), (plane[:3], "in a plane"), (plane, "in a plane")):
+            for more in (), ("--model", "paper"):
+                self.assertNotIn("vanished after", self.advice(points, says, *more))  # no step was made
+
+    def test_points_on_a_curve(self):
+        # The closer they lie the finer the voxels would be, whatever they tell of the surface.
+        turns = [2 * math.pi * n / 1500 for n in range(1500)]
+        report = json.loads(self.reconstruct([(3 * math.sin(t) + 6 * math.sin(2 * t), 3 * math.cos(t) - 6 * math.cos(2 * t),
+                                               -3 * math.sin(3 * t)) for t in turns], "--mesh", "s.ply").stdout)
+        self.assertLess(report["mesh"]["triangles"], 1000000)
 
     def test_half_a_sphere(self):
         half = [p for p in random_sphere(400, 1) if p[2] > 0]

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/median.h"
+#include "cloud/orientation/filled.h"
 #include "covol/error.h"
 #include "covol/scan_noise.h"
 #include "segment/heuristics.h"
@@ -59,8 +60,9 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
     }
     const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
     return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance && !has_seeds &&
-           problem.image == nullptr && uses_points(evolve) && points.size() > kAutomatic.most_guess_marks &&
-           can_enclose(points);
+           problem.image == nullptr && uses_points(evolve) && can_enclose(points) &&
+           (points.size() > kAutomatic.most_guess_marks ||
+            cloud::fill_a_solid(points, measure_spacing(points).median, problem.run));
 }
 
 // Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
@@ -176,9 +178,10 @@ Resolved resolve(const Problem& problem) {
         const Timed timed(c.report.seconds.tag);
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
-        // The indicator is all that there is to see of a cloud that encloses nothing.
-        const double h = c.cloud->encloses ? 0 : kAutomatic.view_voxel * c.cloud->orientation.screened->cell();
-        if (h > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
+        // The indicator is all that there is to see of a cloud that encloses nothing, or fills a solid.
+        const auto& seen = c.cloud->orientation.screened;
+        const double h = seen ? kAutomatic.view_voxel * seen->cell() : 0;
+        if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
             remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);
         }
@@ -208,6 +211,15 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     const auto finer = [&](double spacing, double enough) {
         const double times = std::sqrt(double(distinct.size()) / enough);
+        // Points on curves lie closer together than they tell of a surface as large as they are.
+        const WorldBox box = bounding_box(distinct);
+        double area = 0;
+        for (int a = 0; a < 3; ++a)
+            area += 2 * (box.max[a] - box.min[a]) * (box.max[(a + 1) % 3] - box.min[(a + 1) % 3]);
+        if (const double least = std::sqrt(area / kAutomatic.most_box_voxels); least > std::min(times, 1.0) * spacing)
+            return VoxelSizeChoice{least, number(kAutomatic.most_box_voxels) +
+                                              " of them on the sides of the points' box; their median distance is " +
+                                              number(spacing)};
         if (times >= 1) return nearest(spacing);
         return VoxelSizeChoice{times * spacing, "finer than the median distance between neighbouring points, " +
                                                     number(spacing) + ", for there are few"};

@@ -8,9 +8,12 @@
 
 #include "clip/open_ends.h"
 #include "covol/distance.h"
+#include "covol/error.h"
+#include "covol/guess.h"
 #include "covol/start.h"
 #include "segment/heuristics.h"
 #include "segment/solve/fields.h"
+#include "segment/solve/vanished.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
@@ -180,12 +183,24 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
     return start;
 }
 
+/// Points in one plane, on a line or at fewer than four places hold no surface: tagging and a flow would find that out
+/// in half a minute.
+void refuse_flat(const Problem& problem, const Choices& choices, const std::vector<Vec3>& points) {
+    const SegmentOptions& o = problem.options;
+    const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
+    if (problem.image != nullptr || o.contours || o.tag_distance || has_seeds || choices.evolve.max_steps == 0 ||
+        can_enclose(points))
+        return;
+    throw Error(Errc::InvalidInput, "segment: " + detail::why_nothing_held(points, 0, false), "tag_distance");
+}
+
 }  // namespace
 
 StartSurface start_by_tagging(const Problem& problem, const Choices& choices, MarkSets marks,
                               const std::vector<Vec3>& hole_seeds) {
     const RunContext& run = problem.run;
     const double h = choices.h;
+    refuse_flat(problem, choices, marks.attracting);
     Tagger tagger{problem, h, problem.options.exterior_seeds, hole_seeds};
     append(problem.options.outside, tagger.outside);
     if (std::optional<StartSurface> cut = start_from_cut_body(tagger, choices, marks)) return std::move(*cut);
