@@ -5,14 +5,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/geometry.h"
 #include "contours/contour_curve.h"
 #include "contours/heuristics.h"
 
 namespace covol::detail {
 namespace {
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 constexpr std::size_t kMostNodes = 1u << 20;  // of a plane's grid
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/geometry.h"
 #include "covol/error.h"
 #include "covol/page_data.h"
 #include "report/encoding.h"
@@ -23,8 +24,6 @@ Vec3 place_of(const ObliqueRequest& wanted, double x, double y) {
     for (std::size_t a = 0; a < 3; ++a) place[a] = wanted.first[a] + x * wanted.right[a] + y * wanted.down[a];
     return place;
 }
-
-double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
 /// The voxels of a level around some of its own places; they are in the level.
 VoxelBox box_around(const Vec3& low, const Vec3& high, const Index3& size) {
