@@ -28,7 +28,7 @@ class Case(zarr_test.Case):
     def error(self, path, *options):
         return self.run_covol("info", path, *options, code=3).stderr
 
-    def image(self, path, *options):
+    def info_of(self, path, *options):
         return self.report("info", path, *options)["image"]
 
 
@@ -60,8 +60,8 @@ class Plain(Case):
                 with self.subTest(kind=kind, place=place):
                     self.check(f"a.h5:/{place}/{kind}", pixels(kind))
         self.check("a.h5:bool", pixels("u1") > 128)
-        self.assertEqual(self.image("a.h5:/chunks/<f2")["type"], "float")
-        self.assertEqual(self.image("a.h5:/chunks/>i8")["type"], "double")
+        self.assertEqual(self.info_of("a.h5:/chunks/<f2")["type"], "float")
+        self.assertEqual(self.info_of("a.h5:/chunks/>i8")["type"], "double")
 
     def test_filters(self):
         data = np.sort(pixels("<u2"), axis=2)
@@ -189,7 +189,7 @@ class Plain(Case):
         for name in ("chunks", "whole", "ctzyx"):
             for channel in range(2):
                 self.check(f"a.h5:/{name}", data[2, ..., channel], "--channel", channel, "--frame", 2)
-        info = self.image("a.h5:/whole")
+        info = self.info_of("a.h5:/whole")
         self.assertEqual((info["channels"], info["frames"], info["axis_order"], info["spacing"]), (2, 3, "CXYZT", [0.25] * 3))
         self.check("a.h5:/xyz", data[0, ..., 0])
         self.check("a.h5:/ones", data[0, ..., 0])
@@ -209,7 +209,7 @@ class Plain(Case):
                 f[name] = pixels("u1")
                 f[name].attrs.update(attributes)
         for name, spacing, unit in (("element", [1, 2, 3], "um"), ("spacing", [1, 2, 3], "mm"), ("resolution", [4, 4, 30], "nm")):
-            info = self.image(f"a.h5:/{name}")
+            info = self.info_of(f"a.h5:/{name}")
             self.assertEqual((info["spacing"], info["unit"], info["spacing_known"]), (spacing, unit, [True] * 3))
         for name in ("none", "odd", "few", "text"):
             self.assertIn("states no spacing along x, y, z", self.run_covol("info", f"a.h5:/{name}").stderr)
@@ -281,7 +281,7 @@ class Plain(Case):
             image["VoxelType"] = "USHORT"
             image["VoxelData"] = pixels("u2")
             f.create_group("ITKImage/0/MetaData")
-        info = self.image(script)
+        info = self.info_of(script)
         self.assertEqual((info["format"], info["spacing"], info["origin"]), ("HDF5 (ITK's layout)", [1, 2, 3], [4, 5, 6]))
         self.check(script, pixels("u2"))
         self.check("itk.h5:/ITKImage/0/VoxelData", pixels("u2"))
@@ -323,7 +323,7 @@ class Imaris(Case):
     def test_image(self):
         for kind in ("u1", "u2", "f4"):
             data = self.write(kind=kind)
-            info = self.image("a.ims")
+            info = self.info_of("a.ims")
             self.assertEqual((info["format"], info["size"], info["channels"], info["frames"], info["axis_order"]),
                              ("Imaris", [34, 21, 13], 2, 2, "XYZCT"))
             self.assertEqual((info["spacing"], info["origin"], info["unit"]), ([0.5, 0.5, 2], [10.25, -19.75, 5], "um"))
@@ -335,12 +335,12 @@ class Imaris(Case):
 
     def test_levels(self):
         data = self.write()
-        info = self.image("a.ims")
+        info = self.info_of("a.ims")
         self.assertEqual(info["levels"], ["/DataSet/ResolutionLevel 0: 34 x 21 x 13, spacing 0.5 x 0.5 x 2",
                                           "/DataSet/ResolutionLevel 1: 17 x 10 x 6, spacing 1 x 1 x 4",
                                           "/DataSet/ResolutionLevel 2: 8 x 5 x 3, spacing 2 x 2 x 8"])
         path = "a.ims:/DataSet/ResolutionLevel 1"
-        info = self.image(path)
+        info = self.info_of(path)
         # the centre of the first two voxels along each axis
         self.assertEqual((info["spacing"], info["origin"]), ([1, 1, 4], [10.5, -19.5, 6]))
         self.check(path, means(data[1, 0]), "--channel", 0, "--frame", 1)
@@ -348,7 +348,7 @@ class Imaris(Case):
         self.check(path + "/TimePoint 1/Channel 1", means(data[1, 1]))
         self.check(path + "/TimePoint 1/Channel 1/Data", means(data[1, 1]))
         self.check("a.ims:DataSet/ResolutionLevel 2/TimePoint 0/Channel 0/Data", means(means(data[0, 0])))
-        self.assertEqual(self.image("a.ims:DataSet/ResolutionLevel 2/TimePoint 0/Channel 1/Data")["channel_names"], ["stain 1"])
+        self.assertEqual(self.info_of("a.ims:DataSet/ResolutionLevel 2/TimePoint 0/Channel 1/Data")["channel_names"], ["stain 1"])
         self.assertIn("the file has no such dataset", self.error("a.ims:/DataSet/ResolutionLevel 7"))
 
     def test_damaged(self):
@@ -424,7 +424,7 @@ class BigDataViewer(Case):
 
     def test_image(self):
         data = self.write()
-        info = self.image("b.h5")
+        info = self.info_of("b.h5")
         self.assertEqual((info["format"], info["type"], info["channels"], info["frames"]), ("BigDataViewer HDF5", "uint16", 2, 2))
         self.assertEqual((info["spacing"], info["origin"], info["unit"], info["size"]), ([0.4, 0.5, 2], [0, 0, 0], "um", [34, 21, 13]))
         self.assertEqual(info["channel_names"], ["view 0 & more", "view 1 & more"])
@@ -438,7 +438,7 @@ class BigDataViewer(Case):
 
     def test_levels(self):
         data = self.write()
-        info = self.image("b.h5:/t00003/s01/1/cells")
+        info = self.info_of("b.h5:/t00003/s01/1/cells")
         self.assertEqual((info["spacing"], info["origin"]), ([0.8, 1, 4], [0.2, 0.25, 1]))
         self.check("b.h5:/t00003/s01/1/cells", means(data[3, 1]))
         self.assertIn("no such dataset", self.error("b.h5:/t00003/s01/7/cells"))
@@ -456,7 +456,7 @@ class BigDataViewer(Case):
         self.check("b.h5:/t00000/s01", data[0, 1])
         self.write(voxel=("1 1 1", "2 2 2"))
         self.assertIn("expected setups of one voxel size", self.error("b.h5"))
-        self.assertEqual(self.image("b.h5:/t00000/s01")["spacing"], [2, 2, 2])
+        self.assertEqual(self.info_of("b.h5:/t00000/s01")["spacing"], [2, 2, 2])
         self.write()
         with h5py.File(self.path("b.h5"), "a") as f:
             del f["t00003/s01"]

@@ -73,7 +73,7 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
 bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::GivenSides& given) {
     const double reach = kOrientation.passed_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
     const std::vector<char> enclosed =
-        cloud::find_enclosed(cloud.points, given.given, *given.orientation.indicator, reach);
+        cloud::find_enclosed(cloud.points, given.given, *given.orientation.indicator, cloud.scale, reach);
     cloud.enclosed = std::size_t(std::count(enclosed.begin(), enclosed.end(), 1));
     if (cloud.enclosed == 0) return false;
     std::vector<Vec3> left;

@@ -175,12 +175,20 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
 }  // namespace
 
 std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
-                                const Indicator& indicator, double reach) {
-    std::vector<char> enclosed(points.size());
+                                const Indicator& indicator, const CloudScale& scale, double reach) {
+    std::vector<char> alone(points.size()), enclosed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        if (normals[n] == Vec3{0, 0, 0}) return;  // its sides are not known
         const Vec3 away = times(reach, normals[n]);
-        enclosed[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
-                                indicator.inside(minus(points[n], away))}) > kGivenSides.enclosed;
+        alone[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
+                             indicator.inside(minus(points[n], away))}) > kGivenSides.enclosed;
+    });
+    // Noise carries single points into the solid: a wall within it has its points beside each other.
+    const PointCells cells(points, kNear.first_radius * scale.spacing);
+    for_nearest(cells, scale.spacing, kGivenSides.beside, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+        const auto others = std::count_if(near.begin(), near.end(),
+                                          [&](const Neighbour& other) { return alone[cells.order()[other.at]] != 0; });
+        enclosed[point] = alone[point] != 0 && 2 * std::size_t(others) > near.size();
     });
     return enclosed;
 }

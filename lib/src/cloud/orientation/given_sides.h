@@ -21,11 +21,11 @@ struct GivenSides {
                                      double cell, const RunContext& run);
 
 /// For each point whether the solid is there and on both of its sides, as where two walls touch or two bodies run into
-/// each other: no surface passes there, whatever normals say.
-/// @param normals  of either sign
+/// each other: no surface passes there, whatever normals say. Most of the points around it are so, too.
+/// @param normals  of either sign, 0 where a point has none: it is never enclosed
 /// @param reach    distance from a point at which nothing of it is seen in the indicator, world units
 [[nodiscard]] std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
-                                              const Indicator& indicator, double reach);
+                                              const Indicator& indicator, const CloudScale& scale, double reach);
 
 /// Share of the given ones, turned over where all are, that fall in with the orientation's indicator; 0 of none.
 [[nodiscard]] double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given,
