@@ -13,16 +13,11 @@ import tarfile
 import tempfile
 import unittest
 
+from packages_test import run
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("COVOL_BUILD", "build")).resolve()
 C_LIBRARY = r"(linux-vdso|.*/ld-linux-[^/]*|libc|libm|libdl|librt|libpthread|libresolv)\.so\.\d+"
-
-
-def run(*words, **more):
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **more)
-    if done.returncode != 0:
-        raise AssertionError(f"{words} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
-    return done.stdout + done.stderr
 
 
 @unittest.skipUnless(shutil.which("patchelf") and shutil.which("dpkg"), "needs patchelf and dpkg")

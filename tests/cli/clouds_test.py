@@ -62,6 +62,19 @@ class Few(Clouds):
                     share = surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
                     self.assertAlmostEqual(share, 1, delta=within)
 
+    def test_normals_of_few_points_are_not_believed(self):
+        points = random_sphere(200, 1)
+        away = [tuple(c / math.sqrt(sum(x * x for x in p)) for c in p) for p in points]
+        for name, normals in (("inwards", [tuple(-c for c in n) for n in away]), ("upwards", [(0, 0, 1)] * len(points))):
+            with self.subTest(name):
+                path = self.inputs / f"{name}.ply"
+                head = "ply\nformat ascii 1.0\nelement vertex 200\n" + "".join(
+                    f"property float {c}\n" for c in ("x", "y", "z", "nx", "ny", "nz")) + "end_header\n"
+                path.write_text(head + "".join(" ".join(map(str, (*p, *n))) + "\n" for p, n in zip(points, normals)))
+                surface = self.report("reconstruct", path, "-o", "s.vdb")["surface"]
+                self.assertEqual((surface["components"], surface["genus"]), (1, 0))
+                self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.01)
+
     def test_voxels_are_finer_than_few_points_lie_apart(self):
         points, said = random_sphere(1000, 1), []
         for more in ((), ("--model", "paper")):

@@ -11,7 +11,8 @@ import subprocess
 import unittest
 
 from cli_test import COMMANDS, COVOL, Case
-from live_client import Live, Page
+from live_client import Live
+from mark_test import PageCase
 
 SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/data"
 
@@ -62,21 +63,9 @@ class Words(Case):
         self.assertRegex(second, r"^(GCC|Clang) \d+\.\d+.*, (x86_64|aarch64), OpenVDB \d+\.\d+\.\d+")
 
 
-class Demo(Case):
-    def start(self, *words, code=None, **more):
-        program = subprocess.Popen([COVOL, "demo", *words, "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   cwd=self.out, **more)
-        self.addCleanup(self.stop, program)
-        line = program.stdout.readline()
-        self.assertTrue(line.startswith("open http://127.0.0.1:"), line + (program.stderr.read() if not line else ""))
-        return program, Page(line.split()[1])
-
-    def stop(self, program):
-        if program.poll() is None:
-            program.kill()
-        program.wait()
-        program.stdout.close()
-        program.stderr.close()
+class Demo(PageCase):
+    def start(self, *words, **more):
+        return self.serve("demo", *words, **more)
 
     def end(self, program):
         program.send_signal(signal.SIGINT)

@@ -19,26 +19,17 @@ from live_client import Live, Page
 MARKS = sphere_points(25)
 
 
-class MarkCase(Case):
-    def setUp(self):
-        super().setUp()
-        self.stack = self.out / "ball.nrrd"
-        shutil.copy(self.image, self.stack)
+class PageCase(Case):
+    """A program that serves a page."""
 
-    def start(self, *options):
-        """A running program and its page."""
-        program = subprocess.Popen([COVOL, "mark", self.stack, "--no-browser", *map(str, options)], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True, cwd=self.out)
+    def serve(self, *words, **more):
+        """The running program, and its page."""
+        program = subprocess.Popen([COVOL, *map(str, words), "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True, cwd=self.out, **more)
         self.addCleanup(self.stop, program)
         line = program.stdout.readline()
         self.assertTrue(line.startswith("open http://127.0.0.1:"), line + (program.stderr.read() if not line else ""))
         return program, Page(line.split()[1])
-
-    def open(self, page, **options):
-        """The page's WebSocket, closed at the end."""
-        live = Live(page, **options)
-        self.addCleanup(live.close)
-        return live
 
     def stop(self, program):
         if program.poll() is None:
@@ -46,6 +37,23 @@ class MarkCase(Case):
         program.wait()
         program.stdout.close()
         program.stderr.close()
+
+
+class MarkCase(PageCase):
+    def setUp(self):
+        super().setUp()
+        self.stack = self.out / "ball.nrrd"
+        shutil.copy(self.image, self.stack)
+
+    def start(self, *options):
+        """A running program and its page."""
+        return self.serve("mark", self.stack, *options)
+
+    def open(self, page, **options):
+        """The page's WebSocket, closed at the end."""
+        live = Live(page, **options)
+        self.addCleanup(live.close)
+        return live
 
     def marked(self, live, name="nucleus", marks=MARKS):
         structure = live.add_structure(name)

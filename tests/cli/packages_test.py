@@ -20,10 +20,15 @@ BUILD = pathlib.Path(os.environ.get("COVOL_BUILD", "build")).resolve()
 NAMES = ["covol", "libcovol-dev", "python3-covol"]
 
 
-def run(*words, **more):
+def completed(*words, **more):
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **more)
     if done.returncode != 0:
         raise AssertionError(f"{words} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+    return done
+
+
+def run(*words, **more):
+    done = completed(*words, **more)
     return done.stdout + done.stderr
 
 

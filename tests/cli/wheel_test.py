@@ -13,11 +13,12 @@ import os
 import pathlib
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
 import zipfile
+
+from packages_test import completed
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("COVOL_BUILD", "build")).resolve()
@@ -27,10 +28,7 @@ USED = pathlib.Path(__file__).with_name("wheel_used.py")
 
 
 def run(*words, **more):
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **more)
-    if done.returncode != 0:
-        raise AssertionError(f"{words} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
-    return done.stdout
+    return completed(*words, **more).stdout
 
 
 @unittest.skipUnless(shutil.which("patchelf") and shutil.which("dpkg"), "needs patchelf and dpkg")

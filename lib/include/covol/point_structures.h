@@ -3,20 +3,20 @@
 #include <vector>
 
 #include "covol/api.h"
-#include "covol/points.h"
+#include "covol/mark_kinds.h"
 
 namespace covol {
 
 /// The marks of one structure in a file that has several.
 struct StructurePoints {
     std::string name;
-    PointCloud cloud;
+    KindedPoints points;
 };
 
 /// As read_points(), of a file whose marks name their structures; in the order in which the file names them.
 /// @param by  what names them: the column of a table, "group" or "counter" of Fiji's selections, "label" or "node" of
 ///            3D Slicer's markups, "label" of .csl
-/// @throws Error as read_points(); InvalidInput where the file has no such names, or a mark without one.
+/// @throws Error as read_points(); InvalidInput where the file has no such names, a mark without one, or more than 254.
 [[nodiscard]] COVOL_API std::vector<StructurePoints> read_structures_of_points(const std::string& path,
                                                                                const std::string& by,
                                                                                const ReadPointsOptions& options = {});

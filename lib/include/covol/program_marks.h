@@ -20,6 +20,8 @@ struct NamedMark {
 /// @throws Error InvalidOptions (another ending), InvalidInput (for .roi: voxels before the image's first), Io.
 COVOL_API void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks,
                                    const ImageGeometry& geometry);
+/// @throws Error InvalidOptions (an ending that write_program_marks() does not know)
+COVOL_API void check_program_marks(const std::string& path);
 /// The endings, for messages.
 inline constexpr const char* kProgramMarks = ".csv (napari), .mrk.json (3D Slicer) or .roi (Fiji)";
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "covol/api.h"
+#include "covol/mark_kinds.h"
 #include "covol/marks.h"
 
 namespace covol {
@@ -15,6 +16,11 @@ struct ReadMarksOptions {
     bool force_geometry = false;                         ///< of such a mask, as of placed_on()
     std::function<const std::string&()> standard_input;  ///< what the file "-" holds; none: it is a file of that name
 };
+
+/// Adds a file's points: those on the surface as add_points(), the others to the seeds of their side. Says how they
+/// were understood. @throws Error as add_points()
+COVOL_API void add_marks(Marks& marks, const std::string& path, const KindedPoints& points,
+                         const std::optional<ImageGeometry>& image, const RunContext& run = {});
 
 /// Reads the files that `marks` names, and adds what they hold; a guess is read when it is asked for. Says how the
 /// points of each file were understood.

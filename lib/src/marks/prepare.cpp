@@ -111,7 +111,10 @@ private:
             list.insert(list.end(), more.begin(), more.end());
         };
         // Other points have none: then nothing is known.
-        if (marks.points.empty()) marks.hints.normals = network.outward;
+        if (marks.points.empty()) {
+            marks.hints.normals = network.outward;
+            marks.hints.is_outward = true;
+        }
         append(marks.points, network.along);
         append(options.inside, network.inside);
         append(options.outside, network.outside);

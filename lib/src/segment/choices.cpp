@@ -58,9 +58,8 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
         if (problem.image == nullptr) return true;
         throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
     }
-    const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance && !has_seeds &&
-           problem.image == nullptr && uses_points(evolve) && can_enclose(points) &&
+    return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance &&
+           !problem.has_seeds() && problem.image == nullptr && uses_points(evolve) && can_enclose(points) &&
            (points.size() > kAutomatic.most_guess_marks ||
             cloud::fill_a_solid(points, measure_spacing(points).median, problem.run));
 }

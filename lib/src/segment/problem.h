@@ -27,6 +27,10 @@ struct Problem {
     /// The caller's points, and those that contours are densified by.
     [[nodiscard]] MarkSets marks() const;
     [[nodiscard]] bool is_guided() const { return options.model == Model::Guided; }
+    /// Whether places are named that are inside, or outside.
+    [[nodiscard]] bool has_seeds() const {
+        return !options.exterior_seeds.empty() || !options.inside.empty() || !options.outside.empty();
+    }
     /// Between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {
         return options.contours ? options.contours->solid.get() : nullptr;

@@ -27,10 +27,10 @@ constexpr std::size_t kFewestMarks = 4;  // a surface through fewer is any surfa
 constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a person should wait
 
 /// Threads that find surfaces give way to those that answer a page, and to the browser on the same cores.
-class Courtesy : public tbb::task_scheduler_observer {
+class LowerPriority : public tbb::task_scheduler_observer {
 public:
-    explicit Courtesy(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
-    ~Courtesy() override { observe(false); }
+    explicit LowerPriority(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
+    ~LowerPriority() override { observe(false); }
     void on_scheduler_entry(bool /*is_worker*/) override {
         constexpr int kNice = 5;  // a third of the time of others, where there is not enough for all
         static thread_local const int done = ::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);
@@ -129,7 +129,7 @@ struct StudySolver::State {
 
     void work() {
         tbb::task_arena arena;
-        const Courtesy courtesy(arena);
+        const LowerPriority lower(arena);
         std::unique_lock lock(mutex);
         for (;;) {
             changed.wait(lock, [&] { return is_stopping || !waiting.empty(); });

@@ -66,6 +66,10 @@ class Browser:
         chain.w3c_actions.pointer_action.move_to_location(*map(round, spot))
         chain.click().perform()
 
+    def tell_memory(self, program):
+        own, whole = self.memory()
+        print(f"memory: the program {program.peak():.0f} MB at most, the page's process {own:.0f} MB, the browser with all its processes {whole:.0f} MB")
+
     def memory(self):
         """Resident memory of the page's own process and of all of the browser's, MB."""
         own, whole, pid = 0, 0, self.driver.service.process.pid

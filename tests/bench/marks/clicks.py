@@ -6,7 +6,6 @@ All marks but some are set beforehand; each of the others is a click of the mous
 event that the browser got to the frame after the one in which the new outline was drawn.
 """
 import argparse
-import os
 
 import numpy as np
 
@@ -85,11 +84,7 @@ def main():
     parser.add_argument("--clicks", type=int, help="fewer of them than usual")
     parser.add_argument("--picture", help="a histogram")
     options = parser.parse_args()
-    data = os.environ.get("COVOL_DATA")
-    if not data:
-        raise SystemExit("skipped: COVOL_DATA is not set; it names the folder with the images and their truth")
-    structures = {structure.name: structure for structure in truth.structures(data)}
-    structures.update({structure.name: structure for structure in truth.more_structures(data)})
+    structures = truth.by_name()
     results = []
     print("| structure | marks | first: median, 95 % below | refined: median, 95 % below |\n|---|---|---|---|")
     for name, count, clicked, *limits in JOBS:

@@ -97,8 +97,7 @@ def main():
                 print(f"from a click to the first outline {np.median(first):.2f} s (at most {max(first):.2f}), to the refined one {np.median(refined):.2f} s (at most {max(refined):.2f})", flush=True)
             if options.shot:
                 browser.driver.save_screenshot(options.shot)
-            own, whole = browser.memory()
-            print(f"memory: the program {program.peak():.0f} MB at most, the page's process {own:.0f} MB, the browser with all its processes {whole:.0f} MB")
+            browser.tell_memory(program)
         finally:
             program.close()
     finally:

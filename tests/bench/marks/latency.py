@@ -5,7 +5,6 @@
 All marks but six are set and solved; then each of the six is timed, from the action to the message with the surface.
 """
 import argparse
-import os
 import pathlib
 import subprocess
 import sys
@@ -57,11 +56,7 @@ def main():
     parser.add_argument("--covol", default="build/bin/covol")
     parser.add_argument("--only", default="")
     options = parser.parse_args()
-    data = os.environ.get("COVOL_DATA")
-    if not data:
-        raise SystemExit("skipped: COVOL_DATA is not set; it names the folder with the images and their truth")
-    structures = {structure.name: structure for structure in truth.structures(data)}
-    structures.update({structure.name: structure for structure in truth.more_structures(data)})
+    structures = truth.by_name()
     print("| structure | marks | first, median (max) | refined, median (max) |\n|---|---|---|---|")
     for name, count in JOBS:
         if options.only and options.only not in name:

@@ -122,8 +122,7 @@ def main():
                 print(f"from a click to the outline {first:.2f} s, from z to the picture without the mark {undone:.3f} s (medians)", flush=True)
                 if options.shot:
                     browser.driver.save_screenshot(options.shot)
-                own, whole = browser.memory()
-                print(f"memory: the program {program.peak():.0f} MB at most, the page's process {own:.0f} MB, the browser with all its processes {whole:.0f} MB")
+                browser.tell_memory(program)
             finally:
                 program.close()
         finally:

@@ -8,7 +8,6 @@ set where the page suggests one (key n). All clicks are off by up to half a voxe
 """
 import argparse
 import base64
-import os
 import pathlib
 import tempfile
 import time
@@ -202,11 +201,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--shots", help="a folder for pictures of the page at the end")
     options = parser.parse_args()
-    data = os.environ.get("COVOL_DATA")
-    if not data:
-        raise SystemExit("skipped: COVOL_DATA is not set; it names the folder with the images and their truth")
-    structures = {structure.name: structure for structure in truth.structures(data)}
-    structures.update({structure.name: structure for structure in truth.more_structures(data)})
+    structures = truth.by_name()
     print("| structure | clicks | outlines | Dice | 95 % of the border within | expected Dice |\n|---|---|---|---|---|---|")
     for name, clicks, outlines in JOBS:
         if options.only and options.only not in name:

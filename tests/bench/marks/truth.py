@@ -6,6 +6,7 @@ of the image's smallest spacing.
 import dataclasses
 import functools
 import math
+import os
 import pathlib
 import zlib
 
@@ -152,6 +153,14 @@ def more_structures(data):
         parts, _ = ndimage.label(np.isin(values, labels) if labels else values > 0, np.ones((3, 3, 3)))
         body = parts == 1 + np.argmax(np.bincount(parts.ravel())[1:])
         yield Structure(name, images / image, body, spacing_of(images / image), large=body.sum() > 200_000)
+
+
+def by_name():
+    """All structures of the folder that COVOL_DATA names, which must be set."""
+    data = os.environ.get("COVOL_DATA")
+    if not data:
+        raise SystemExit("skipped: COVOL_DATA is not set; it names the folder with the images and their truth")
+    return {structure.name: structure for structure in [*structures(data), *more_structures(data)]}
 
 
 def spacing_of(path):

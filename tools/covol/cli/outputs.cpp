@@ -37,13 +37,6 @@ void check_extension(const std::string& path, const std::vector<std::string>& kn
     throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + list);
 }
 
-void check_marks_ending(const std::string& path) {
-    const std::string end = lower_extension(path);
-    const bool is_slicers = lower_extension(fs::path(path).stem().string()) == ".mrk" && end == ".json";
-    if (end != ".csv" && end != ".roi" && !is_slicers)
-        throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + kProgramMarks);
-}
-
 void check_ending(const std::string& path, OutputKind kind) {
     switch (kind) {
         case OutputKind::Vdb: return check_extension(path, {".vdb"});
@@ -55,7 +48,7 @@ void check_ending(const std::string& path, OutputKind kind) {
         case OutputKind::Page: return check_extension(path, {".html", ".htm"});
         case OutputKind::Scene: return check_extension(path, {".usda"});
         case OutputKind::Table: return check_extension(path, {".csv"});
-        case OutputKind::ProgramMarks: return check_marks_ending(path);
+        case OutputKind::ProgramMarks: return check_program_marks(path);
         case OutputKind::Text: return;
     }
 }

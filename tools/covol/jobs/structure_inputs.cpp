@@ -30,16 +30,16 @@ void add_files(std::vector<Marks>& structures, const std::vector<std::string>& t
     }
 }
 
-using TakeCloud = std::function<void(Marks& owner, const std::string& file, const PointCloud& cloud)>;
+using TakePoints = std::function<void(Marks& owner, const std::string& file, const KindedPoints& points)>;
 
 /// Files whose marks name their structures: hands the marks of each over.
 void share_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
-                 const TakeCloud& take) {
+                 const TakePoints& take) {
     for (const std::string& text : texts) {
         if (text == "-" || !split_name(text).name.empty())
             throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
-        for (const auto& [name, cloud] : read_structures_of_points(text, job.structure_column, job.points.options))
-            take(find_or_add_structure(structures, name), text, cloud);
+        for (const auto& [name, points] : read_structures_of_points(text, job.structure_column, job.points.options))
+            take(find_or_add_structure(structures, name), text, points);
     }
 }
 
@@ -49,13 +49,14 @@ std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::v
                                                    const RunContext& run) {
     std::map<std::string, MarkFiles> files;
     if (job.structure_column.empty()) return files;
-    share_files(job, job.points.paths, structures, [&](Marks& owner, const std::string& file, const PointCloud& cloud) {
-        add_points(owner, cloud, geometry, speaking_for(owner.name, structures.size(), run));
-        files[owner.name].points.push_back(file);
-    });
+    share_files(job, job.points.paths, structures,
+                [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                    add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
+                    files[owner.name].points.push_back(file);
+                });
     share_files(job, job.contours.paths, structures,
-                [&](Marks& owner, const std::string& file, const PointCloud& cloud) {
-                    add_contours(owner, cloud, geometry, speaking_for(owner.name, structures.size(), run));
+                [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                    add_contours(owner, points.cloud, geometry, speaking_for(owner.name, structures.size(), run));
                     files[owner.name].contours.push_back(file);
                 });
     return files;
@@ -101,7 +102,7 @@ std::vector<Marks> structures_of(const SegmentJob& job,
         add_files(structures, job.contours.paths, &MarkFiles::contours);
     } else {
         for (const auto* paths : {&job.points.paths, &job.contours.paths})
-            share_files(job, *paths, structures, [](Marks&, const std::string&, const PointCloud&) {});
+            share_files(job, *paths, structures, [](Marks&, const std::string&, const KindedPoints&) {});
     }
     add_paint(structures, painted);
     for (const std::string& text : job.guess.paths) {

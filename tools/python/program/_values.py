@@ -11,7 +11,7 @@ from . import _files
 from ._errors import Error
 from ._program import Folder, run
 
-_STUB = os.path.join(os.path.dirname(os.path.abspath(__file__)), "__init__.pyi")
+_SIGNATURES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "__init__.pyi")
 
 
 class Call:
@@ -27,8 +27,8 @@ class Call:
 
 
 def list_options():
-    """Of segment() and reconstruct(): (name, type, default), from the package's own stub."""
-    with open(_STUB, encoding="utf-8") as file:
+    """Of segment() and reconstruct(): (name, type, default), as __init__.pyi lists them."""
+    with open(_SIGNATURES, encoding="utf-8") as file:
         text = file.read()
     block = text.split("# options, from covol.options()")[1].split("# end of options")[0]
     found = re.findall(r"^ +(\w+): (.+?) = (.+),$", block, re.M)

@@ -238,6 +238,7 @@ PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const
     std::sort(places.begin(), places.end());
     const detail::KdTree tree(from);
     PointHints result;
+    result.is_outward = hints.is_outward;
     for (const Vec3& p : to) {
         const Vec3 nearest = tree.nearest_point(p);
         const std::size_t n =

@@ -2,12 +2,27 @@
 
 #include "covol/error.h"
 #include "covol/file_kind.h"
-#include "covol/mark_kinds.h"
 #include "covol/mesh_io.h"
 #include "covol/points_text.h"
 #include "covol/vdb_io.h"
 
 namespace covol {
+
+void add_marks(Marks& marks, const std::string& path, const KindedPoints& points,
+               const std::optional<ImageGeometry>& image, const RunContext& run) {
+    const PointCloud cloud = points.of(MarkKind::Surface);
+    if (!points.kinds.empty())
+        for (const MarkKind kind : {MarkKind::Inside, MarkKind::Outside})
+            if (PointCloud seeds = points.of(kind); !seeds.points.empty())
+                (kind == MarkKind::Inside ? marks.inside : marks.outside).push_back(std::move(seeds));
+    if (cloud.points.empty()) return;
+    if (!cloud.lines.empty())
+        run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
+                 " lines, and are taken as loose points here; `contours` joins them along the lines");
+    add_points(marks, cloud, image, run);
+    run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
+             (cloud.rule.empty() ? "" : ", " + cloud.rule));
+}
 
 void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const ReadMarksOptions& options,
                 const RunContext& run) {
@@ -18,20 +33,7 @@ void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const R
                    : read_kinded_points(path, options.points);
     };
     const auto read = [&](const std::string& path) { return read_kinds(path).cloud; };
-    for (const std::string& path : marks.files.points) {
-        const KindedPoints given = read_kinds(path);
-        const PointCloud cloud = given.of(MarkKind::Surface);
-        for (const MarkKind kind : {MarkKind::Inside, MarkKind::Outside})
-            if (PointCloud seeds = given.of(kind); !given.kinds.empty() && !seeds.points.empty())
-                (kind == MarkKind::Inside ? marks.inside : marks.outside).push_back(std::move(seeds));
-        if (cloud.points.empty()) continue;
-        if (!cloud.lines.empty())
-            run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
-                     " lines, and are taken as loose points here; `contours` joins them along the lines");
-        add_points(marks, cloud, image, run);
-        run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
-                 (cloud.rule.empty() ? "" : ", " + cloud.rule));
-    }
+    for (const std::string& path : marks.files.points) add_marks(marks, path, read_kinds(path), image, run);
     for (const std::string& path : marks.files.contours) add_contours(marks, read(path), image, run);
     for (const std::string& path : marks.files.inside) marks.inside.push_back(read(path));
     for (const std::string& path : marks.files.outside) marks.outside.push_back(read(path));

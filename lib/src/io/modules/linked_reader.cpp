@@ -21,10 +21,8 @@ std::string reader_program() {
 namespace covol {
 
 std::vector<ReaderPart> check_reader_parts() {
-    return {{"itk", "NRRD and MetaImage", {}, {}},
-            {"gdcm", "compressed DICOM", {}, {}},
-            {"hdf5", "HDF5", {}, {}},
-            detail::check_reader_program()};
+    using namespace detail;
+    return {{"itk", kOfItk, {}, {}}, {"gdcm", kOfGdcm, {}, {}}, {"hdf5", kOfHdf5, {}, {}}, check_reader_program()};
 }
 
 }  // namespace covol

@@ -22,10 +22,6 @@ fs::path folder_of_modules() {
     return library.parent_path() / "covol-" COVOL_VERSION_STRING;
 }
 
-constexpr const char* kOfItk = "NRRD and MetaImage";
-constexpr const char* kOfGdcm = "compressed DICOM";
-constexpr const char* kOfHdf5 = "HDF5";
-
 fs::path path_of_module(const std::string& name) { return folder_of_modules() / (name + ".so"); }
 
 /// It stays loaded until the program ends: libraries below it have threads and handlers of their own.

@@ -15,6 +15,9 @@ namespace covol::detail {
 /// Where it lies. @throws Error Io where that cannot be said.
 std::string reader_program();
 
+/// What parts are for, in a few words.
+inline constexpr const char *kOfItk = "NRRD and MetaImage", *kOfGdcm = "compressed DICOM", *kOfHdf5 = "HDF5";
+
 /// Whether it is there and may be started.
 ReaderPart check_reader_program();
 

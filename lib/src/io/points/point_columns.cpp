@@ -63,7 +63,7 @@ void append(PointTable& table, const std::string& path, Line& line, const Column
         closed = line.shape != "path" && line.shape != "line";
     }
     add_line(table, line.points, closed, line.name);
-    if (columns.structure) name_structure(table, line.structure);
+    if (columns.structure) name_structure(table, path, line.structure);
 }
 
 /// Gathers the rows of each line, which need not follow each other.
@@ -336,7 +336,7 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
                  "expected a structure's name in the column " + quote(structures_by) + ", got none");
         if (columns.line.empty()) {
             table.points.push_back(point);
-            if (columns.structure) name_structure(table, std::string(fields[*columns.structure]));
+            if (columns.structure) name_structure(table, path, std::string(fields[*columns.structure]));
         } else {
             collector->add(path, lines.number(), fields, point);
         }

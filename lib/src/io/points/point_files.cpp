@@ -111,11 +111,20 @@ void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, c
     table.lines.push_back({begin, table.points.size(), closed, name});
 }
 
-void name_structure(PointTable& table, const std::string& name) {
+void name_structure(PointTable& table, const std::string& path, const std::string& name) {
+    constexpr std::size_t kMost = 254;  // as a label image
     auto& names = table.structures;
-    const auto found = std::find(names.begin(), names.end(), name);
+    const bool is_last = !table.structure.empty() && names[table.structure.back()] == name;
+    const auto found = is_last ? names.begin() + table.structure.back() : std::find(names.begin(), names.end(), name);
     const auto number = std::uint32_t(found - names.begin());
-    if (found == names.end()) names.push_back(name);
+    if (found == names.end()) {
+        if (names.size() == kMost)
+            throw Error(Errc::InvalidInput,
+                        path + ": `structure_column`: expected at most " + std::to_string(kMost) +
+                            " structures, got more; is it another column that names them?",
+                        "structure_column");
+        names.push_back(name);
+    }
     table.structure.resize(table.points.size(), number);
 }
 

@@ -29,7 +29,8 @@ struct PointTable {
 PointTable read_point_table(const std::string& path, const std::string& structures_by = {});
 
 /// The points that belong to no structure yet, the last ones of the table, belong to that of this name.
-void name_structure(PointTable& table, const std::string& name);
+/// @throws Error InvalidInput (more structures than a label image can hold)
+void name_structure(PointTable& table, const std::string& path, const std::string& name);
 
 /// A unit vector; 0 of what is no direction (NaN, zero length), which scanners write where they know none.
 [[nodiscard]] Vec3 normal_of(const Vec3& given);

@@ -62,27 +62,29 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
-/// The points of one of a table's structures, with their lines.
-detail::PointTable part_of(const detail::PointTable& table, std::uint32_t structure) {
-    detail::PointTable part = table;
-    part.points.clear();
-    part.normals.clear();
-    part.lines.clear();
-    std::vector<std::size_t> place;  // of each point, among the structure's
-    for (std::size_t n = 0; n < table.points.size(); ++n) {
+/// A table for each of its structures, with their lines.
+std::vector<detail::PointTable> parts_of(detail::PointTable table) {
+    const std::vector<Vec3> points = std::exchange(table.points, {}), normals = std::exchange(table.normals, {});
+    const std::vector<MarkKind> kinds = std::exchange(table.kinds, {});
+    const std::vector<MarkLine> lines = std::exchange(table.lines, {});
+    const std::vector<std::uint32_t> structure = std::exchange(table.structure, {});
+    std::vector<detail::PointTable> parts(table.structures.size(), table);
+    std::vector<std::size_t> place;  // of each point, among those of its structure
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        detail::PointTable& part = parts[structure[n]];
         place.push_back(part.points.size());
-        if (table.structure[n] != structure) continue;
-        part.points.push_back(table.points[n]);
-        if (!table.normals.empty()) part.normals.push_back(table.normals[n]);
+        part.points.push_back(points[n]);
+        if (!normals.empty()) part.normals.push_back(normals[n]);
+        if (!kinds.empty()) part.kinds.push_back(kinds[n]);
     }
-    place.push_back(part.points.size());
-    for (MarkLine line : table.lines) {
-        if (line.begin >= line.end || table.structure[line.begin] != structure) continue;
+    for (MarkLine line : lines) {  // all of a line's points are of one structure
+        if (line.begin >= line.end) continue;
+        detail::PointTable& part = parts[structure[line.begin]];
+        line.end = place[line.begin] + (line.end - line.begin);
         line.begin = place[line.begin];
-        line.end = place[line.end];
         part.lines.push_back(line);
     }
-    return part;
+    return parts;
 }
 
 PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
@@ -113,6 +115,14 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
     return cloud;
 }
 
+KindedPoints with_kinds(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
+    KindedPoints points;
+    points.kinds = std::move(table.kinds);
+    if (!points.kinds.empty()) table.rule += " with kinds";
+    points.cloud = to_cloud(path, std::move(table), options);
+    return points;
+}
+
 }  // namespace
 
 PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
@@ -121,12 +131,7 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 
 KindedPoints read_kinded_points(const std::string& path, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    detail::PointTable table = detail::read_point_table(path);
-    KindedPoints points;
-    points.kinds = std::move(table.kinds);
-    if (!points.kinds.empty()) table.rule += " with kinds";
-    points.cloud = to_cloud(path, std::move(table), options);
-    return points;
+    return with_kinds(path, detail::read_point_table(path), options);
 }
 
 PointCloud KindedPoints::of(MarkKind kind) const {
@@ -146,10 +151,12 @@ PointCloud KindedPoints::of(MarkKind kind) const {
 std::vector<StructurePoints> read_structures_of_points(const std::string& path, const std::string& by,
                                                        const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    const detail::PointTable table = detail::read_point_table(path, by);
+    detail::PointTable table = detail::read_point_table(path, by);
+    const std::vector<std::string> names = table.structures;
+    std::vector<detail::PointTable> parts = parts_of(std::move(table));
     std::vector<StructurePoints> structures;
-    for (std::size_t n = 0; n < table.structures.size(); ++n)
-        structures.push_back({table.structures[n], to_cloud(path, part_of(table, std::uint32_t(n)), options)});
+    for (std::size_t n = 0; n < parts.size(); ++n)
+        structures.push_back({names[n], with_kinds(path, std::move(parts[n]), options)});
     return structures;
 }
 

@@ -3,23 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "io/write/shortest.h"
 
 namespace covol {
 namespace {
 
-std::string shortest(double value) {
-    std::array<char, 32> digits;
-    return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
-}
+using detail::shortest;
 
 /// A field of a CSV table.
 std::string quoted_field(const std::string& text) {
@@ -75,6 +73,10 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
             low[a] = m == 0 ? marks[m].index[a] : std::min(low[a], marks[m].index[a]);
             high[a] = m == 0 ? marks[m].index[a] : std::max(high[a], marks[m].index[a]);
         }
+    constexpr double kFarthest = 32766;  // pixels: of a signed 16-bit number, and one beyond the last
+    if (high[0] > kFarthest || high[1] > kFarthest)
+        throw Error(Errc::Unsupported, path + ": a selection of Fiji reaches 32766 pixels, got (" + shortest(high[0]) +
+                                           ", " + shortest(high[1]) + "); write .csv or .mrk.json");
     if (low[0] < -0.5 || low[1] < -0.5 || low[2] < -0.5)
         throw Error(Errc::InvalidInput, path + ": expected marks within the image, got voxel (" + shortest(low[0]) +
                                             ", " + shortest(low[1]) + ", " + shortest(low[2]) + ")");
@@ -105,16 +107,18 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
 
 }  // namespace
 
-void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks, const ImageGeometry& geometry) {
+void check_program_marks(const std::string& path) {
     const std::string name = detail::lower(path);
-    if (name.ends_with(".csv"))
-        write_text_file(path, to_napari(marks));
-    else if (name.ends_with(".mrk.json"))
-        write_text_file(path, to_slicer(marks, geometry));
-    else if (name.ends_with(".roi"))
-        write_text_file(path, to_fiji(path, marks));
-    else
-        throw Error(Errc::InvalidOptions, path + ": expected a name ending in " + kProgramMarks);
+    if (!name.ends_with(".csv") && !name.ends_with(".mrk.json") && !name.ends_with(".roi"))
+        throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + kProgramMarks);
+}
+
+void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks, const ImageGeometry& geometry) {
+    check_program_marks(path);
+    const std::string end = detail::extension(path);
+    write_text_file(path, end == ".csv"   ? to_napari(marks)
+                          : end == ".roi" ? to_fiji(path, marks)
+                                          : to_slicer(marks, geometry));
 }
 
 }  // namespace covol

@@ -37,10 +37,8 @@ GuessOptions guess_options(const Problem& problem, double h, const std::vector<V
     options.inside = asked.inside;
     options.outside = asked.outside;
     options.outside.insert(options.outside.end(), asked.exterior_seeds.begin(), asked.exterior_seeds.end());
-    const std::vector<Vec3>& normals = asked.hints.normals;
-    const auto is_direction = [](const Vec3& n) { return n != Vec3{0, 0, 0}; };
-    if (normals.size() == marks.size() && std::all_of(normals.begin(), normals.end(), is_direction))
-        options.normals = normals;
+    // Those of a file may point inwards, or anywhere.
+    if (asked.hints.is_outward && asked.hints.normals.size() == marks.size()) options.normals = asked.hints.normals;
     return options;
 }
 

@@ -187,9 +187,8 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
 /// in half a minute.
 void refuse_flat(const Problem& problem, const Choices& choices, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
-    const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    if (problem.image != nullptr || o.contours || o.tag_distance || has_seeds || choices.evolve.max_steps == 0 ||
-        can_enclose(points))
+    if (problem.image != nullptr || o.contours || o.tag_distance || problem.has_seeds() ||
+        choices.evolve.max_steps == 0 || can_enclose(points))
         return;
     throw Error(Errc::InvalidInput, "segment: " + detail::why_nothing_held(points, 0, false), "tag_distance");
 }

@@ -8,6 +8,8 @@
 #include <random>
 
 #include "covol/mark_kinds.h"
+#include "covol/point_structures.h"
+#include "covol/program_marks.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -132,6 +134,33 @@ TEST_CASE("a column of kinds says which marks lie inside and outside") {
         CHECK(other.of(MarkKind::Inside).points.empty());
         CHECK(other.kinds.empty());
     }
+}
+
+TEST_CASE("marks of several structures keep their kinds; more than a label image holds are refused") {
+    const Scratch scratch;
+    const std::string table =
+        "structure,kind,x,y,z\na,surface,1,2,3\nb,inside,4,5,6\na,outside,7,8,9\nb,surface,3,2,1\n";
+    const auto found = read_structures_of_points(scratch.write("marks.csv", table), "structure");
+    REQUIRE(found.size() == 2);
+    CHECK(found[0].name == "a");
+    CHECK(found[0].points.of(MarkKind::Surface).points == std::vector<Vec3>{{1, 2, 3}});
+    CHECK(found[0].points.of(MarkKind::Outside).points == std::vector<Vec3>{{7, 8, 9}});
+    CHECK(found[1].points.of(MarkKind::Inside).points == std::vector<Vec3>{{4, 5, 6}});
+    CHECK(found[1].points.of(MarkKind::Surface).points == std::vector<Vec3>{{3, 2, 1}});
+
+    std::string many = "x,y,z,cell\n";
+    for (int n = 0; n < 255; ++n) many += "1,2," + std::to_string(n) + ",cell " + std::to_string(n) + "\n";
+    const std::string path = scratch.write("many.csv", many);
+    CHECK_THROWS_WITH(read_structures_of_points(path, "cell"), Catch::Contains("at most 254"));
+}
+
+TEST_CASE("a selection of Fiji holds 16-bit pixels") {
+    const Scratch scratch;
+    const ImageGeometry image;
+    write_program_marks(scratch.path("near.roi"), {{{32000, 3, 1}, "a"}}, image);
+    CHECK_THROWS_WITH(write_program_marks(scratch.path("far.roi"), {{{40000, 3, 1}, "a"}}, image),
+                      Catch::Contains("32766"));
+    CHECK_THROWS_WITH(write_program_marks(scratch.path("far.txt"), {}, image), Catch::Contains(".mrk.json"));
 }
 
 TEST_CASE("contours of slices are ordered, closed lines") {

@@ -85,7 +85,7 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
             }
             if (line.empty()) continue;
             add_line(table, line, true, "plane " + name + ", contour " + std::to_string(n));
-            if (structures_by == "label") name_structure(table, "label " + std::to_string(label));
+            if (structures_by == "label") name_structure(table, path, "label " + std::to_string(label));
         }
     }
     table.order = PointOrder::XYZ;

@@ -53,7 +53,7 @@ public:
     /// @param structures_by  "group", "counter" or empty
     bool add_to(PointTable& table, const std::string& structures_by) const {
         if (!add_marks(table, structures_by == "counter")) return false;
-        if (structures_by == "group") name_structure(table, "group " + std::to_string(group()));
+        if (structures_by == "group") name_structure(table, path_, "group " + std::to_string(group()));
         return true;
     }
 
@@ -146,7 +146,7 @@ private:
         for (std::uint64_t i = 0; i < xy.size(); ++i) {
             const int both = counters != 0 ? bytes_.at<std::int32_t>(counters + 4 * i) : 0, position = both >> 8;
             table.points.push_back({xy[i][0], xy[i][1], position > 0 ? position - 1 : required_slice()});
-            if (by_counter) name_structure(table, "counter " + std::to_string(both & 255));
+            if (by_counter) name_structure(table, path_, "counter " + std::to_string(both & 255));
         }
     }
 

@@ -71,14 +71,14 @@ PointTable read_markups(const std::string& path, const Json& file, const std::st
         const bool by_label = structures_by == "label";
         if (type == "ClosedCurve" || type == "Curve" || type == "Line" || type == "Angle") {
             add_line(table, points, type == "ClosedCurve", name);
-            if (by_label) name_structure(table, labels.front());
+            if (by_label) name_structure(table, path, labels.front());
         } else {
             for (std::size_t n = 0; n < points.size(); ++n) {
                 table.points.push_back(points[n]);
-                if (by_label) name_structure(table, labels[n]);
+                if (by_label) name_structure(table, path, labels[n]);
             }
         }
-        if (structures_by == "node") name_structure(table, name);
+        if (structures_by == "node") name_structure(table, path, name);
         kinds += (kinds.empty() ? "" : ", ") + type;
     }
     constexpr std::size_t kLongest = 80;
@@ -142,7 +142,7 @@ PointTable parse_fcsv(const std::string& path, const std::string& text, const st
         }
         table.points.push_back(point);
         if (structures_by == "label")
-            name_structure(table, std::string(label < fields.size() ? fields[label] : string_view()));
+            name_structure(table, path, std::string(label < fields.size() ? fields[label] : string_view()));
     }
     table.space = to_space(path, system);
     table.rule =
