@@ -3,7 +3,6 @@
 Images that are files are not read here, their paths are given to the program; arrays are written to a temporary folder, which lives
 as long as what was made from it. Results are the program's, to the bit.
 """
-import json
 import os
 import shutil
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from . import _files, _program, _values
 from ._errors import Error
-from ._program import PROGRAM, Folder, run as run_program  # noqa: F401 - PROGRAM is for covol.mark()
+from ._program import PROGRAM, Folder, read_json, run as run_program  # noqa: F401 - PROGRAM is for covol.mark()
 from ._values import Call, Image, LevelSet, Mesh, Points, list_options  # noqa: F401
 from ._version import __version__  # noqa: F401
 
@@ -96,7 +95,7 @@ def run(function, image, structures, painted, init, options, call, lapse):
     def again(count, call):
         made = Folder()
         run_program([*job, f"--suggest={count}", "-o", made.file("surface.vdb"), "--json", made.file("report.json")], call, folder)
-        return _read_json(made.file("report.json"))
+        return read_json(made.file("report.json"))
 
     return _results(folder, image, structures, log, again)
 
@@ -111,7 +110,7 @@ def solve_study(image, study, options, call):
 
 def _results(folder, image, structures, log, again):
     """The results of a run, from its files. @param again  runs it with --suggest"""
-    report = _read_json(folder.file("report.json"))
+    report = read_json(folder.file("report.json"))
     report.setdefault("warnings", [])
     del report["options"]  # with files of the folder
     for name in ("paths", "rules"):
@@ -169,11 +168,6 @@ def _start(value, folder, name):
     return ("vdb:" if isinstance(value, LevelSet) else "mask:") + value._path(folder, name)
 
 
-def _read_json(path):
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
-
-
 def label_image(results, call):
     """Which result is where, from 1 on; 0 outside of all."""
     first = results[0]
@@ -220,7 +214,7 @@ def compare(a, b, label, label_b, call):
     folder = Folder()
     run_program(["compare", _solid(a, folder, "a.nrrd"), _solid(b, folder, "b.nrrd"), "--label", label, "--label-b", label_b, "--json",
                  folder.file("report.json")], call, folder)
-    return _read_json(folder.file("report.json"))["compare"]
+    return read_json(folder.file("report.json"))["compare"]
 
 
 def distances(points, triangles, call):
@@ -231,7 +225,7 @@ def distances(points, triangles, call):
     _files.write_positions(folder.file("points.csv"), places)
     run_program(["compare", triangles._path(folder, "surface.ply"), folder.file("points.csv"), "--json", folder.file("report.json")],
                 call, folder)
-    report = _read_json(folder.file("report.json"))
+    report = read_json(folder.file("report.json"))
     return report["fit"]["points_to_surface"] if "fit" in report else report["points_to_surface"]
 
 

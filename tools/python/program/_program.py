@@ -1,4 +1,5 @@
 """Runs the program covol for the functions of this package: progress, messages, Ctrl-C and errors as they are there."""
+import json
 import os
 import re
 import shutil
@@ -76,6 +77,18 @@ def run(words, call=None, folder=None):
             pass
         raise
     return said
+
+
+def read_json(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def info_of(*words, call=None):
+    """What `covol info` says of a file, as a dict. Raises as run()."""
+    folder = Folder()
+    run(["info", *words, "--json", folder.file("info.json")], call, folder)
+    return read_json(folder.file("info.json"))
 
 
 def error_of(code, message):

@@ -1,7 +1,6 @@
 """Image, Points, Mesh, LevelSet and options, for the functions of _covol.py: arrays and files."""
 import ast
 import difflib
-import json
 import os
 import re
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from . import _files
 from ._errors import Error
-from ._program import Folder, run
+from ._program import Folder, info_of, run
 
 _SIGNATURES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "__init__.pyi")
 
@@ -153,9 +152,7 @@ class Image:
                 raise Error(f"roi: expected two corners, got {roi!r}", "invalid_options", "roi")
             run(["convert", path, own.file("part.nrrd"), *words[1:], "--roi=" + ",".join(repr(float(x)) for x in box.ravel())], call, own)
             made._file, made._folder = [own.file("part.nrrd")], own
-        run(["info", *made._file, "--json", own.file("info.json")], call, own)
-        with open(own.file("info.json"), encoding="utf-8") as file:
-            about = json.load(file)["image"]
+        about = info_of(*made._file, call=call)["image"]
         made.spacing, made.origin, made.unit = tuple(about["spacing"]), tuple(about["origin"]), about.get("unit", "")
         made.direction = np.array(about["direction"], float).reshape(3, 3)
         made.spacing_known = bool(np.all(about.get("spacing_known", True)))
@@ -240,10 +237,7 @@ class Points:
         flags += [f"--points-order={order}"] if order is not None else []
         flags += [f"--points-scale={scale!r}"] if scale != 1 else []
         flags += [f"--points-channels={channels}"] if channels != 1 else []
-        own = Folder()
-        run(["info", path, *flags, "--json", own.file("info.json")], None, own)
-        with open(own.file("info.json"), encoding="utf-8") as file:
-            about = json.load(file).get("points", {})
+        about = info_of(path, *flags).get("points", {})
         made._file, made._flags, made._parts, made._lines, made.normals = path, flags, None, "lines" in about, None
         made.source, made.space, made.rule = path, about.get("space", "world"), about.get("rule", "")
         made._count = about.get("count", 0)
@@ -337,9 +331,7 @@ class Mesh:
     def measure(self):
         """dict: volume, area (world units), components, genus, closed, manifold."""
         own = Folder()
-        run(["info", self._path(own, "mesh.ply"), "--json", own.file("info.json")], None, own)
-        with open(own.file("info.json"), encoding="utf-8") as file:
-            return json.load(file)["mesh"]
+        return info_of(self._path(own, "mesh.ply"))["mesh"]
 
     def save(self, path, *, y_up=None, unit_scale=1.0):
         """Writes .ply, .obj, .stl, .off or .glb, which is y-up unless y_up says otherwise. Raises Error."""
@@ -363,11 +355,8 @@ class LevelSet:
 
     def _about(self):
         if self._facts is None:
-            own = Folder()
             file, grid = (self._source.rsplit(":", 1) + [""])[:2] if ":" in os.path.basename(self._source) else (self._source, "")
-            run(["info", file, "--json", own.file("info.json")], None, own)
-            with open(own.file("info.json"), encoding="utf-8") as text:
-                grids = json.load(text)["grids"]
+            grids = info_of(file)["grids"]
             found = [g for g in grids if g["name"] == grid] or grids
             self._facts = found[0]
         return self._facts
