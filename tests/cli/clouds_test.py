@@ -33,8 +33,11 @@ class Clouds(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.out)
 
     def reconstruct(self, points, *more):
-        write_xyz(self.out / "cloud.xyz", points)
-        return subprocess.run([COVOL, "reconstruct", "cloud.xyz", "-o", "s.vdb", "--quiet", "--json", "-", *more], cwd=self.out,
+        """@param points  or a file of them"""
+        path = points if isinstance(points, pathlib.Path) else self.out / "cloud.xyz"
+        if path is not points:
+            write_xyz(path, points)
+        return subprocess.run([COVOL, "reconstruct", path, "-o", "s.vdb", "--quiet", "--json", "-", *more], cwd=self.out,
                               capture_output=True, text=True, timeout=300)
 
     def surface(self, points, *more):
@@ -64,14 +67,14 @@ class Few(Clouds):
 
     def test_normals_of_few_points_are_not_believed(self):
         points = random_sphere(200, 1)
-        away = [tuple(c / math.sqrt(sum(x * x for x in p)) for c in p) for p in points]
-        for name, normals in (("inwards", [tuple(-c for c in n) for n in away]), ("upwards", [(0, 0, 1)] * len(points))):
+        inwards = [tuple(-c / RADIUS for c in p) for p in points]
+        for name, normals in (("inwards", inwards), ("upwards", [(0, 0, 1)] * len(points))):
             with self.subTest(name):
-                path = self.inputs / f"{name}.ply"
+                path = self.out / f"{name}.ply"
                 head = "ply\nformat ascii 1.0\nelement vertex 200\n" + "".join(
                     f"property float {c}\n" for c in ("x", "y", "z", "nx", "ny", "nz")) + "end_header\n"
                 path.write_text(head + "".join(" ".join(map(str, (*p, *n))) + "\n" for p, n in zip(points, normals)))
-                surface = self.report("reconstruct", path, "-o", "s.vdb")["surface"]
+                surface = self.surface(path)
                 self.assertEqual((surface["components"], surface["genus"]), (1, 0))
                 self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.01)
 
