@@ -4,7 +4,6 @@
 """
 import csv
 import math
-import os
 import shutil
 import struct
 import subprocess
@@ -57,8 +56,17 @@ class Macro(Folder):
     def java(self, text):
         """Runs a macro as from ImageJ's menu: in its batch mode one macro does not see the ROI Manager of another."""
         (self.out / "test.ijm").write_text(text + 'exec("sh", "-c", "kill $PPID");')
-        return subprocess.run(["xvfb-run", "-a", "java", "-Xmx1g", f"-Duser.home={self.out}", "-cp", JAR, "ij.ImageJ", "-macro",
+        self.temporary.mkdir(exist_ok=True)
+        return subprocess.run(["xvfb-run", "-a", "java", "-Xmx1g", f"-Duser.home={self.out}", f"-Djava.io.tmpdir={self.temporary}", "-cp", JAR, "ij.ImageJ", "-macro",
                                self.out / "test.ijm"], capture_output=True, text=True, timeout=90, cwd=self.out)
+
+    @property
+    def temporary(self):
+        """The folder that ImageJ takes for the system's one of temporary files: no other program's files lie there."""
+        return self.out / "temporary"
+
+    def assert_nothing_is_left(self):
+        self.assertEqual([entry.name for entry in self.temporary.glob("covol-*")], [])
 
     def imagej(self, marks, settings="", title="i.tif"):
         """Runs the macro; @return (mask, [(slice, area of its outline)], the table's row)"""
@@ -120,7 +128,7 @@ class Macro(Folder):
         page = self.out / "it's a page.html"
         self.imagej(self.multi_point(), f"\\nvoxel size=2vx\\noptions=--rho 0.5 --quiet\\nreport={page}")
         self.assertGreater(page.stat().st_size, 100_000)
-        self.assertEqual([name for name in os.listdir("/tmp") if name.startswith("covol-1") and os.path.isdir("/tmp/" + name)], [])
+        self.assert_nothing_is_left()
 
     def test_what_is_wrong_is_returned(self):
         program = Path(COVOL).resolve()
@@ -134,6 +142,7 @@ class Macro(Folder):
         done = self.java(text)
         for n, (_, _, says) in enumerate(cases):
             self.assertIn(says, (self.out / f"said{n}.txt").read_text(), done.stdout + done.stderr)
+        self.assert_nothing_is_left()
 
 
 if __name__ == "__main__":

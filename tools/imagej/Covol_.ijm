@@ -41,6 +41,13 @@ function runProgram(words, path) {
     return exec("sh", "-c", "while IFS= read -r word; do set -- \"$@\" \"$word\"; done <\"$0\"; unset LD_LIBRARY_PATH; exec \"$@\" 2>&1", path);
 }
 
+// Deletes a run's own folder, which holds files alone.
+function deleteFolder(folder) {
+    left = getFileList(folder);
+    for (i = 0; i < left.length; i++) ok = File.delete(folder + "/" + left[i]);
+    ok = File.delete(folder);
+}
+
 scripted = lengthOf(getArgument()) > 0;
 wrong = "";
 if (nImages == 0) {
@@ -82,7 +89,7 @@ if (!scripted) {
 }
 
 // A folder that no other run has.
-folder = getDirectory("temp") + "covol-" + getTime() + "-" + floor(1e6 * random());
+folder = getDirectory("temp") + "covol-" + d2s(getTime(), 0) + "-" + floor(1e6 * random());
 File.makeDirectory(folder);
 words = newArray(program, "segment", folder + "/stack.tif");
 if (managed > 0) {
@@ -121,6 +128,7 @@ said = runProgram(words, folder + "/words.txt");
 if (!File.exists(folder + "/mask.tif")) {
     at = indexOf(said, "covol: error: ");
     if (at >= 0) said = substring(said, at + 14);
+    deleteFolder(folder);
     if (!wasBatch) setBatchMode("exit and display");
     if (scripted) return "covol: " + said;
     exit("covol: " + said);
@@ -164,9 +172,7 @@ Table.rename("table.csv", "covol: " + title);
 warnings = split(said, "\n");
 for (i = 0; i < warnings.length; i++)
     if (startsWith(warnings[i], "covol: warning: ")) print(warnings[i]);
-left = getFileList(folder);
-for (i = 0; i < left.length; i++) ok = File.delete(folder + "/" + left[i]);
-ok = File.delete(folder);
+deleteFolder(folder);
 if (report != "" && !scripted) run("URL...", "url=file://" + report);
 showStatus("covol: done");
 return "";
