@@ -47,12 +47,7 @@ struct GuidanceReport {
     double guess_error = 0;      ///< how far off the border the guess lies (rms, a lower estimate)
     double confident_share = 0;  ///< of the area, where the image says more than the guess
     double mean_offset = 0;      ///< by area, outward > 0
-    double max_offset = 0;       ///< of |offset|, in one pass
-    int passes = 0;  ///< times that the image was asked: again where it erred less than the guess; what else stands
-                     ///< here is of the last one
-
-    /// One more pass, which may not have moved anything.
-    COVOL_API void add(const GuidanceReport& pass, bool moved);
+    double max_offset = 0;       ///< of |offset|
 };
 
 struct Guided {

@@ -429,18 +429,6 @@ void Guide::move() {
 
 }  // namespace
 
-void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
-    if (!moved && used) return;
-    const double mean = mean_offset + pass.mean_offset, most = std::max(max_offset, pass.max_offset);
-    const int before = passes;
-    *this = pass;
-    mean_offset = mean;
-    max_offset = most;
-    passes = before + (moved ? 1 : 0);
-    used = moved;
-    if (used) reason.clear();
-}
-
 Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
              const RunContext& run) {
     require_valid(options, "guide");
@@ -452,18 +440,15 @@ Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image
             report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
             return;
         }
-        // Where the image errs less than the guess, what it made of that is the better guess.
-        for (int pass = 0; pass < kGuide.most_passes; ++pass) {
-            GuidanceReport now;
-            Guide surface(result, marks, image, options, now, run);
-            int done = 0;
-            while (done < kGuide.iterations && surface.step(done == 0))
-                run.report("image guidance", (pass + double(++done) / kGuide.iterations) / kGuide.most_passes);
-            result = surface.surface();
-            report.add(now, done > 0);
-            if (done < kGuide.iterations || !(now.image_error < now.guess_error)) break;
+        Guide surface(result, marks, image, options, report, run);
+        int done = 0;
+        while (done < kGuide.iterations && surface.step(done == 0))
+            run.report("image guidance", double(++done) / kGuide.iterations);
+        report.used = done > 0;
+        if (report.used) {
+            report.reason.clear();
+            result = start_from_grid(domain_of(guess), *surface.surface(), run);
         }
-        if (report.used) result = start_from_grid(domain_of(guess), *result, run);
         run.report("image guidance", 1);
     });
     return guided;

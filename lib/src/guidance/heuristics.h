@@ -8,9 +8,7 @@ namespace covol {
 
 /// What the image shows between the marks: guidance.cpp.
 struct GuidanceHeuristics {
-    /// [passes] Each asks the image again, from the result of the one before.
-    int most_passes = heuristic("guidance.most_passes", 3);
-    /// [iterations] Of a pass: normals, and what is inside and outside, are better known the second time.
+    /// [iterations] Normals, and what is inside and outside, are better known the second time.
     int iterations = heuristic("guidance.iterations", 2);
     /// [voxels] To both sides of the surface in which profiles are read.
     double width = heuristic("guidance.width", 14.0);

@@ -151,7 +151,6 @@ Json to_json(const SegmentReport& r) {
     if (r.guidance.used || !r.guidance.reason.empty())
         json["guidance"] = {{"used", r.guidance.used},
                             {"reason", r.guidance.reason},
-                            {"passes", r.guidance.passes},
                             {"feature", to_string(r.guidance.feature.feature)},
                             {"inside", r.guidance.inside},
                             {"border", r.guidance.border},
