@@ -52,23 +52,7 @@ public:
         factor_.compute(projected.bottomRightCorner(rest, rest));
         if (factor_.info() != Eigen::Success)
             throw Error(Errc::Numerical, "guess: the marks' system is singular: do several marks coincide?");
-        Matrix basis = Matrix::Zero(size_, gradients_);
-        basis.bottomRows(gradients_).setIdentity();
-        basis = (qr_.householderQ().adjoint() * basis).eval();
-        whitened_ = basis.bottomRows(rest);
-        constexpr Index kBlock = 64;
-        const Index blocks = (gradients_ + kBlock - 1) / kBlock;
-        tbb::parallel_for(Index(0), blocks, [&](Index b) {
-            auto columns = whitened_.middleCols(b * kBlock, std::min(kBlock, gradients_ - b * kBlock));
-            factor_.matrixL().solveInPlace(columns);
-        });
-        energy_.resize(gradients_, gradients_);
-        tbb::parallel_for(Index(0), blocks, [&](Index b) {
-            const Index from = b * kBlock, count = std::min(kBlock, gradients_ - from);
-            energy_.block(from, from, gradients_ - from, count).noalias() =
-                whitened_.rightCols(gradients_ - from).transpose() * whitened_.middleCols(from, count);
-        });
-        energy_.triangularView<Eigen::StrictlyUpper>() = energy_.transpose();
+        whiten();
     }
 
     [[nodiscard]] const Matrix& energy() const { return energy_; }
@@ -79,7 +63,8 @@ public:
         Vector w = (qr_.householderQ().adjoint() * y).eval().tail(size_ - kPolynomial);
         factor_.matrixL().solveInPlace(w);
         constant = w.squaredNorm();
-        return whitened_.transpose() * w;
+        return inverse_.triangularView<Eigen::Lower>().transpose() * w.tail(gradients_) -
+               projection_.transpose() * (reflected_.transpose() * w);
     }
     /// Weights of the basis functions and of the polynomial.
     void weights(const Vector& values, const Vector& gradients, Vector& basis, Eigen::Vector4d& polynomial) const {
@@ -101,6 +86,58 @@ public:
     [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
 
 private:
+    /// The energy of gradients is |W g|^2, W = L^-1 (Q^T E)', where E has the gradients' unit vectors and ' leaves the
+    /// polynomials' rows out. Q^T E = E - V T^T V^T E in the compact form of its reflections, so that W = [0; S] - X Y:
+    /// S the inverse of the gradients' triangle of L, X = L^-1 V' and Y = T^T V^T E, which have four columns and rows.
+    void whiten() {
+        const Index rest = size_ - kPolynomial;
+        Matrix reflections = qr_.matrixQR();
+        reflections.triangularView<Eigen::StrictlyUpper>().setZero();
+        reflections.diagonal().setOnes();
+        const Eigen::Matrix4d inner = inner_factor(reflections, qr_.hCoeffs());
+        reflected_ = reflections.bottomRows(rest);
+        factor_.matrixL().solveInPlace(reflected_);
+        projection_ = inner.transpose() * reflections.bottomRows(gradients_).transpose();
+
+        const auto triangle = factor_.matrixLLT().bottomRightCorner(gradients_, gradients_);
+        inverse_ = Matrix::Zero(gradients_, gradients_);
+        energy_.resize(gradients_, gradients_);
+        constexpr Index kBlock = 64;
+        const Index blocks = (gradients_ + kBlock - 1) / kBlock;
+        const auto for_each_block = [&](const auto& body) {
+            tbb::parallel_for(Index(0), blocks, [&](Index b) {
+                body(b * kBlock, std::min(kBlock, gradients_ - b * kBlock), gradients_ - b * kBlock);
+            });
+        };
+        for_each_block([&](Index from, Index count, Index below) {
+            auto columns = inverse_.block(from, from, below, count);
+            columns.topRows(count).setIdentity();
+            triangle.bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(columns);
+        });
+        const Matrix mixed = inverse_.transpose() * reflected_.bottomRows(gradients_);  // S^T X
+        const Matrix outer = 0.5 * (reflected_.transpose() * reflected_) * projection_ - mixed.transpose();
+        for_each_block([&](Index from, Index count, Index below) {
+            auto block = energy_.block(from, from, below, count);
+            block.noalias() =
+                inverse_.bottomRightCorner(below, below).transpose() * inverse_.block(from, from, below, count);
+            block.noalias() += projection_.rightCols(below).transpose() * outer.middleCols(from, count);
+            block.noalias() += outer.rightCols(below).transpose() * projection_.middleCols(from, count);
+        });
+        energy_.triangularView<Eigen::StrictlyUpper>() = energy_.transpose();
+    }
+
+    /// T of I - V T V^T, the product of the reflections along V's columns (Schreiber and Van Loan, A storage-efficient
+    /// WY representation for products of Householder transformations, SIAM J. Sci. Stat. Comput. 10, 1989).
+    static Eigen::Matrix4d inner_factor(const Matrix& reflections, const Vector& coefficients) {
+        Eigen::Matrix4d inner = Eigen::Matrix4d::Zero();
+        for (int k = 0; k < kPolynomial; ++k) {
+            inner.col(k).head(k) = -coefficients[k] * (inner.topLeftCorner(k, k) *
+                                                       (reflections.leftCols(k).transpose() * reflections.col(k)));
+            inner(k, k) = coefficients[k];
+        }
+        return inner;
+    }
+
     void fill(const std::vector<Point>& nodes, Index marks) {
         tbb::parallel_for(Index(0), values_, [&](Index j) {
             for (Index i = 0; i < values_; ++i) {
@@ -118,7 +155,8 @@ private:
     }
 
     const Index values_, gradients_, size_;
-    Matrix matrix_, whitened_, energy_;
+    Matrix matrix_, energy_;
+    Matrix inverse_, reflected_, projection_;  ///< S, X and Y of whiten()
     Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, kPolynomial>> qr_;
     Eigen::LLT<Matrix> factor_;
 };
