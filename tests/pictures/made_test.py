@@ -1,0 +1,61 @@
+"""Each page of docs/in shows its picture, and the picture is what tests/pictures/make.py makes now, if not to the bit.
+
+    COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 -m unittest tests/pictures/made_test.py
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+from PIL import Image
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+import make  # noqa: E402
+
+DOCS = HERE.parents[1] / "docs"
+COARSE = (48, 32)  # in which letters and noise do not count
+
+
+def look(path):
+    """Its size, and its grey values in few cells."""
+    with Image.open(path) as picture:
+        return picture.size, np.asarray(picture.convert("L").resize(COARSE, Image.Resampling.BOX), float)
+
+
+class Made(unittest.TestCase):
+    def test_each_page_shows_its_picture(self):
+        pages = sorted(path.stem for path in (DOCS / "in").glob("*.md"))
+        self.assertEqual(pages, sorted(make.NEEDS))
+        for name in pages:
+            self.assertEqual(re.findall(r"pictures/(in_\w+)\.png", (DOCS / f"in/{name}.md").read_text()), [f"in_{name}"])
+
+    def test_a_picture_that_is_none_is_said(self):
+        done = subprocess.run([sys.executable, HERE / "make.py", "out", "houdini"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("no such picture: houdini", done.stderr)
+
+    def compare(self, name):
+        """Its size and its look are those of the picture in docs: nearer to it by far than to any other."""
+        if absent := make.missing(name):
+            self.skipTest(f"SKIPPED: {', '.join(absent)} not installed; see tests/run.sh")
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, HERE / "make.py", folder, name], capture_output=True, text=True, timeout=600)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            made = pathlib.Path(folder) / f"in_{name}.png"
+            kept = {other: DOCS / f"pictures/in_{other}.png" for other in make.NEEDS}
+            size, seen = look(made)
+            np.testing.assert_allclose(size, look(kept[name])[0], rtol=0.1)
+            far = {other: np.abs(seen - look(path)[1]).mean() for other, path in kept.items()}
+        own = far.pop(name)
+        self.assertLess(own, 0.1 * min(far.values()), f"docs/pictures/in_{name}.png is stale: make it anew by tests/pictures/make.py")
+
+
+for name in make.NEEDS:
+    setattr(Made, f"test_{name}", lambda self, name=name: self.compare(name))
+
+if __name__ == "__main__":
+    unittest.main()
