@@ -93,6 +93,20 @@ checks["phantom"] = phantom.shape == truth.shape == (32, 32, 32) and places.shap
 covol.save_mask("labels.nii.gz", np.where(truth > 0, 300, 0), phantom)
 checks["save_mask"] = covol.read_image("labels.nii.gz").array.max() == 300
 
+# A time-lapse: a frame that is none, the body a voxel further along z, and again with marks of its own.
+where = dict(spacing=image.spacing, origin=image.origin)
+further = [np.roll(voxels, n, axis=0) for n in (1, 2)]
+places, step = np.asarray(marks), np.array([0, 0, image.spacing[2]])
+lapse = list(covol.timelapse(iter([voxels, np.zeros((0, 3, 3)), further[0], (further[1], places + 2 * step)]), places, **where))
+checks["time-lapse"] = np.array_equal(lapse[0].mask, by_arrays.mask) and lapse[0].report["surface"] == expected["surface"]
+checks["a frame that fails"] = isinstance(lapse[1], covol.Error) and lapse[1].code == "invalid_input"
+heights = [r.mesh.vertices[:, 2].mean() for r in (lapse[0], *lapse[2:])]
+checks["it is followed"] = np.allclose(np.diff(heights), step[2], atol=0.2 * step[2])
+checks["marks of frames"] = [r.report["input"]["points"]["count"] for r in (lapse[0], *lapse[2:])] == [120, 0, 120]
+both = list(covol.timelapse([voxels, further[0]], {"a": places, "b": {"points": places * 0.6}}, **where))
+checks["structures of frames"] = [list(found) for found in both] == [["a", "b"]] * 2 and set(np.unique(both[1].mask)) == {0, 1, 2}
+checks["no frame succeeds"] = [e.code for e in covol.timelapse([voxels, voxels], places + 1e4, **where)] == ["invalid_input"] * 2
+
 # Errors.
 checks["option that is none"] = raises(TypeError, covol.segment, image, marks, tag_distanc=3)
 checks["bad option"] = error(covol.segment, image, marks, theta=2) == ("invalid_options", "theta")
@@ -100,7 +114,8 @@ checks["bad length"] = error(covol.segment, image, marks, tau="3px") == ("invali
 checks["outside"] = error(covol.segment, image, np.asarray(marks) + 1e4)[0] == "invalid_input"
 checks["no file"] = error(covol.segment, "none.tif", marks)[0] == "io"
 checks["shape"] = error(covol.segment, image, np.zeros((3, 2))) == ("invalid_input", "points")
-checks["unsupported"] = [e.code for e in covol.timelapse([image], marks)] == ["unsupported"]
+seeds = list(covol.timelapse([voxels], {"points": np.asarray(marks), "inside": [np.mean(np.asarray(marks), 0)]}))
+checks["seeds of a time-lapse"] = [e.code for e in seeds] == ["unsupported"]
 checks["read_study"] = error(covol.read_study, "none")[0] == "unsupported"
 
 # Progress, its exceptions, Ctrl-C, the log.

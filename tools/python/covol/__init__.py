@@ -124,15 +124,18 @@ def timelapse(frames, marks=None, **keywords):
     reading = keywords.pop("points_space", None), keywords.pop("points_order", None), keywords.pop("points_scale", 1.0)
     init = keywords.pop("init", None)
     call = _inputs.call(**{key: keywords.pop(key) for key in ("progress", "threads", "memory_limit") if key in keywords})
-    for frame in frames:
+
+    def go(frame):
         image, own = frame if isinstance(frame, tuple) else (frame, None if lapse.started else marks)
         own = {name: (own or {}).get(name) for name in marks} if several else {"": own}
         try:
-            found = _run("timelapse", image, own, (None, 0, "auto"), init, geometry, reading, call, keywords, lapse)
+            return _run("timelapse", image, own, (None, 0, "auto"), init, geometry, reading, call, keywords, lapse)
         except Error as error:
-            yield error
-            continue
-        yield Structures(*found) if several else found[0][0]
+            return error
+
+    # The package that runs the program gives it all frames together.
+    for found in lapse.follow(frames, go) if hasattr(lapse, "follow") else map(go, frames):
+        yield found if isinstance(found, Error) else Structures(*found) if several else found[0][0]
 
 
 def reconstruct(points=None, *, contours=None, inside=None, outside=None, init=None, normals=None, points_space=None,

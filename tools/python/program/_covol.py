@@ -10,15 +10,12 @@ import numpy as np
 
 from . import _files, _program, _values
 from ._errors import Error
+from ._lapse import Frames
 from ._program import PROGRAM, Folder, read_json, run as run_program  # noqa: F401 - PROGRAM is for covol.mark()
 from ._values import Call, Image, LevelSet, Mesh, Points, list_options  # noqa: F401
 from ._version import __version__  # noqa: F401
 
 _WITHOUT = "%s: the package that runs the program covol does not have this; %s"
-
-
-class TimeLapse:
-    started = False
 
 
 class Result:
@@ -70,8 +67,8 @@ class Result:
 
 def run(function, image, structures, painted, init, options, call, lapse):
     """segment(), structures() and reconstruct(): (results, overlaps)."""
-    if function == "timelapse":
-        raise Error(_WITHOUT % ("timelapse", "the command does: covol segment FRAMES... --points MARKS"), "unsupported")
+    if lapse is not None:
+        return lapse.add(image, structures, None if init is None else _start(init, lapse.folder, "init.nrrd"), options, call)
     flags = _values.flags_of(function, options)
     command = "reconstruct" if function == "reconstruct" else "segment"
     if not structures and painted[0] is None:
@@ -97,7 +94,7 @@ def run(function, image, structures, painted, init, options, call, lapse):
         run_program([*job, f"--suggest={count}", "-o", made.file("surface.vdb"), "--json", made.file("report.json")], call, folder)
         return read_json(made.file("report.json"))
 
-    return _results(folder, image, structures, log, again)
+    return _results(folder, read_json(folder.file("report.json")), image, structures, log, again)
 
 
 def solve_study(image, study, options, call):
@@ -105,14 +102,13 @@ def solve_study(image, study, options, call):
     folder = Folder()
     log = run_program(["segment", "--study", study, *_values.flags_of("structures", options), "-o", folder.file("surface.vdb"), "--mesh",
                        folder.file("mesh.ply"), "--mask", folder.file("mask.nrrd"), "--json", folder.file("report.json")], call, folder)
-    return _results(folder, image, {}, log, None)
+    return _results(folder, read_json(folder.file("report.json")), image, {}, log, None)
 
 
-def _results(folder, image, structures, log, again):
+def _results(folder, report, image, structures, log, again):
     """The results of a run, from its files. @param again  runs it with --suggest"""
-    report = read_json(folder.file("report.json"))
     report.setdefault("warnings", [])
-    del report["options"]  # with files of the folder
+    report.pop("options", None)  # with files of the folder
     for name in ("paths", "rules"):
         report.get("input", {}).get("points", {}).pop(name, None)
     entries = report.get("structures")
@@ -127,6 +123,13 @@ def _results(folder, image, structures, log, again):
     overlaps = [(names.index(o["structures"][0]), names.index(o["structures"][1]), o["volume"],
                  names.index(o["inner"]) if "inner" in o else None) for o in report.get("overlaps", [])]
     return results, overlaps
+
+
+class TimeLapse(Frames):
+    """The frames of timelapse()."""
+
+    def found(self, *of_frame):
+        return _results(*of_frame, None)
 
 
 def _marks(own, image):
