@@ -1,6 +1,7 @@
-"""Runs inside Blender: installs the add-on from its zip, segments from an empty's children and from a mesh's vertices, and again.
+"""Runs inside Blender: installs the add-on from its zip, segments from an empty's children and from a mesh's vertices, and again;
+then a time-lapse.
 
-    blender -b --factory-startup --python tests/cli/blender_addon.py -- ADDON.zip IMAGE POINTS.xyz FOLDER
+    blender -b --factory-startup --python tests/cli/blender_addon.py -- ADDON.zip IMAGE POINTS.xyz MOVIE FOLDER
 
 Writes FOLDER/addon.json: {what: whether it holds}, and facts.
 """
@@ -12,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-archive, image, points, folder = (pathlib.Path(word) for word in sys.argv[sys.argv.index("--") + 1:])
+archive, image, points, movie, folder = (pathlib.Path(word) for word in sys.argv[sys.argv.index("--") + 1:])
 checks = {}
 bpy.ops.preferences.addon_install(filepath=str(archive))
 bpy.ops.preferences.addon_enable(module="covol_blender")
@@ -97,6 +98,51 @@ checks["turned with its space"] = np.allclose((turned.min(0) + turned.max(0)) / 
 second = {path.name for path in folder.iterdir()}
 checks["files of the last result are gone"] = len([n for n in second if n.endswith(".vdb")]) == 1 and not first & second & {pathlib.Path(
     bpy.path.abspath(volume.data.filepath)).name}
+
+# A time-lapse: three frames from frame 5 on, each a unit of the image further along x.
+cloud.clear_geometry()
+cloud.from_pydata(places.tolist(), [], [])
+settings.image, settings.is_lapse = str(movie), True
+scene = bpy.context.scene
+scene.frame_set(5)
+bpy.context.view_layer.update()
+checks["a time-lapse runs"] = bpy.ops.covol.segment() == {"FINISHED"} and settings.status.startswith("3 of 3 frames")
+
+
+def local_middle(obj):
+    return np.mean([vertex.co for vertex in obj.data.vertices], 0)
+
+
+def at(frame):
+    """Where the surface and the volume are in a frame of Blender, in the space's units."""
+    scene.frame_set(frame)
+    bpy.context.view_layer.update()
+    box = np.mean(volume_box(volume), 0)
+    return local_middle(surface), (np.linalg.inv(np.array(space.matrix_world)) @ (*box, 1))[:3]
+
+
+seen = {frame: at(frame) for frame in (1, 5, 6, 7, 9)}
+for n, what in enumerate(("the surface", "the volume")):
+    moved = [seen[frame][n] - seen[5][n] for frame in (1, 5, 6, 7, 9)]
+    checks[f"{what} moves with the frames"] = np.allclose(moved, [(0, 0, 0), (0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 0, 0)], atol=0.25)
+checks["both are at one place"] = np.allclose(seen[7][0], seen[7][1], atol=0.5)
+checks["a sequence"] = volume.data.is_sequence and volume.data.frame_duration == 3 and volume.data.frame_start == 5
+checks["figures of the frame"] = surface["covol_volume"] == surface.data["covol_volume"]
+checks["each frame has the material"] = all(len(bpy.data.meshes[name].materials) == 1 for name in surface["covol_meshes"].splitlines())
+series = {path.name for path in folder.iterdir()}
+checks["files of the frames"] = sum(name.endswith(".vdb") for name in series) == sum(name.endswith(".ply") for name in series) == 3
+meshes = len(bpy.data.meshes)
+scene.frame_set(6)
+checks["a time-lapse again"] = bpy.ops.covol.segment() == {"FINISHED"} and len(bpy.data.meshes) == meshes
+settings.image, settings.is_lapse = str(image), False
+bpy.context.view_layer.update()
+checks["one image after it"] = bpy.ops.covol.segment() == {"FINISHED"} and not volume.data.is_sequence
+checks["its meshes and files are gone"] = len(bpy.data.meshes) == meshes - 2 and not series & {path.name for path in folder.iterdir()}
+checks["it stays in other frames"] = np.allclose(at(9)[0], places.mean(0), atol=0.3)
+second = {path.name for path in folder.iterdir()}
+settings.image, settings.is_lapse = "", True
+checks["a time-lapse of no image"] = "choose one" in error(bpy.ops.covol.segment)
+settings.is_lapse = False
 
 # Mistakes are said, and change nothing.
 settings.options = "--no-such-option"

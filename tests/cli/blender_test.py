@@ -11,7 +11,7 @@ import tomllib
 import unittest
 from pathlib import Path
 
-from interchange_test import COVOL, MISSING, Folder
+from interchange_test import CENTRE, COVOL, MISSING, Folder, ball, np, write_um_tiff
 
 SCRIPT = "houdini_free_examples/13_blender.py"
 BLENDER = shutil.which("blender")
@@ -73,16 +73,18 @@ class Addon(Folder):
         root = Path(__file__).resolve().parents[2]
         subprocess.run([sys.executable, root / "tools/plugins/pack.py", "blender", "--output", self.out], check=True, capture_output=True)
         [archive] = self.out.glob("covol_blender-*.zip")
+        # The ball, a unit further along x in each frame.
+        write_um_tiff(self.out / "movie.tif", np.stack([np.uint8(20 + 200 * ball(np.array(CENTRE) + (n, 0, 0))) for n in range(3)]))
         folder = self.out / "addon"
         folder.mkdir()
         environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(self.out / "scripts"), "COVOL": str(Path(COVOL).resolve())}
         done = subprocess.run([BLENDER, "-b", "--factory-startup", "--python-exit-code", "1", "--python", root / "tests/cli/blender_addon.py",
-                               "--", archive, self.private / "i.tif", self.private / "p.xyz", folder],
+                               "--", archive, self.private / "i.tif", self.private / "p.xyz", self.out / "movie.tif", folder],
                               capture_output=True, text=True, timeout=300, env=environment)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         checks = json.loads((folder / "addon.json").read_text())
         self.assertEqual([what for what, holds in checks.items() if not holds], [], done.stdout)
-        self.assertGreater(len(checks), 20)
+        self.assertGreater(len(checks), 30)
 
     def test_the_manifest_of_an_extension(self):
         """By the rules of Blender 4.2's manual; Debian's Blender knows no extensions."""

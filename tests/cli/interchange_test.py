@@ -93,7 +93,7 @@ def sphere(count, centre=CENTRE, radius=RADIUS):
 
 def write_um_tiff(path, pixels):
     tifffile.imwrite(path, pixels, imagej=True, resolution=(1 / SPACING[0], 1 / SPACING[1]),
-                     metadata={"axes": "ZYX", "spacing": SPACING[2], "unit": "um", "mode": "grayscale",
+                     metadata={"axes": "TZYX"[-pixels.ndim:], "spacing": SPACING[2], "unit": "um", "mode": "grayscale",
                                "xorigin": -ORIGIN[0] / SPACING[0], "yorigin": -ORIGIN[1] / SPACING[1],
                                "zorigin": -ORIGIN[2] / SPACING[2]})
 

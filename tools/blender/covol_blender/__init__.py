@@ -4,6 +4,7 @@ import os
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 from mathutils import Matrix, Vector
 
 from . import _process, job
@@ -18,6 +19,8 @@ bl_info = {
     "category": "Import-Export",
 }
 ROLE = "covol_role"  # what an object below the space is: "surface" or "volume"
+MESHES, START = "covol_meshes", "covol_start"  # of a surface: names of its meshes, one for each frame, and the first one's number
+FIGURES = ("volume", "area", "genus")
 TICK = 0.1           # seconds between two looks at a run
 
 
@@ -44,6 +47,8 @@ class Settings(bpy.types.PropertyGroup):
                                      "origin; where it moves, scales and turns, results go with it. Made where there is none")
     scale: bpy.props.FloatProperty(name="Scale", default=0.01, min=1e-9, soft_max=1000,
                                    description="Blender's units for one unit of the image, of a space that is made")
+    is_lapse: bpy.props.BoolProperty(name="Time-lapse", description="All frames of the image, from Blender's current frame on; the marks are of the "
+                                     "first one")
     voxel_size: bpy.props.StringProperty(name="Voxel size", description="In the image's unit, or voxels as in 2vx; empty: automatic")
     options: bpy.props.StringProperty(name="Options", description="Further options of covol segment, --model paper for example")
     folder: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", default="//covol",
@@ -96,26 +101,70 @@ def child_of(space, role, make, context):
     return made
 
 
-def show(context, space, run, columns, faces, report):
-    """Puts a result into the scene: in the objects of the last one, with their materials and modifiers."""
-    surface = child_of(space, "surface", lambda: bpy.data.meshes.new("covol surface"), context)
-    mesh = surface.data
+def fill(mesh, vertices, faces):
     mesh.clear_geometry()
-    mesh.from_pydata(np.stack(columns, 1).tolist(), [], faces.tolist())
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
     mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
     mesh.update()
+
+
+def meshes_of(surface, count):
+    """The surface's meshes, one for each frame, those of the last result first, with the materials of the one that is seen; others go."""
+    shown = surface.data
+    kept = [mesh for mesh in (bpy.data.meshes.get(name) for name in surface.get(MESHES, "").splitlines()) if mesh is not None] or [shown]
+    made = kept[:count] + [shown.copy() for _ in range(count - len(kept))]
+    for mesh in made:
+        mesh.use_fake_user = count > 1  # one that no object shows now is saved, too
+        if mesh is not shown:
+            mesh.materials.clear()
+            for material in shown.materials:
+                mesh.materials.append(material)
+    surface.data = made[0]
+    for mesh in kept[count:]:
+        bpy.data.meshes.remove(mesh)
+    surface[MESHES] = "\n".join(mesh.name for mesh in made)
+    return made
+
+
+@persistent
+def show_frame(scene, _=None):
+    """The surfaces of time-lapses as they are in the scene's frame; before the first and after the last as they are there."""
+    for surface in scene.objects:
+        names = surface.get(MESHES, "").splitlines()
+        if len(names) > 1:
+            n = min(max(scene.frame_current - surface[START], 0), len(names) - 1)
+            mesh = bpy.data.meshes.get(names[n])
+            if mesh is not None and surface.data != mesh:
+                surface.data = mesh
+                for key in FIGURES:
+                    surface[f"covol_{key}"] = mesh[f"covol_{key}"]
+
+
+def show(context, space, run, found):
+    """Puts what a run found into the scene: in the objects of the last one, with their materials and modifiers."""
+    start = context.scene.frame_current
+    surface = child_of(space, "surface", lambda: bpy.data.meshes.new("covol surface"), context)
+    known = next(each for each in found if each is not None)
+    for mesh, each in zip(meshes_of(surface, len(found)), found):
+        known = each or known  # a frame that failed shows the one before
+        fill(mesh, *known[:2])
+        for key in FIGURES:
+            mesh[f"covol_{key}"] = surface[f"covol_{key}"] = known[2]["surface"][key]
+    surface[START] = start
     volume = child_of(space, "volume", lambda: bpy.data.volumes.new("covol volume"), context)
     before = volume.get("covol_files", "").splitlines()
-    volume.data.filepath = str(run.vdb)
-    if not volume.data.grids.load():
-        raise _process.Failed(4, f"{run.vdb}: {volume.data.grids.error_message}")
-    volume["covol_files"] = "\n".join(str(path) for path in (run.vdb, run.ply, run.report))
+    data, first = volume.data, run.at(run.vdb, next(n for n, each in enumerate(found) if each is not None))
+    data.filepath, data.is_sequence = str(first), run.is_lapse
+    if run.is_lapse:  # its files are counted from 0, Blender's frames of a sequence from 1
+        data.frame_start, data.frame_duration, data.frame_offset, data.sequence_mode = start, len(found), -1, "EXTEND"
+    if not data.grids.load():
+        raise _process.Failed(4, f"{first}: {data.grids.error_message}")
+    volume["covol_files"] = "\n".join(map(str, run.files()))
     for path in before:  # of the last result, which nothing shows now
         if os.path.exists(path):
             os.remove(path)
-    for key in ("volume", "area", "genus"):
-        surface[f"covol_{key}"] = report["surface"][key]
-    context.scene.covol.status = job.summary(report)
+    show_frame(context.scene)
+    context.scene.covol.status = job.summary(found)
 
 
 class Segment(bpy.types.Operator):
@@ -139,7 +188,7 @@ class Segment(bpy.types.Operator):
         image = bpy.path.abspath(settings.image) if settings.image else ""
         name = os.path.basename(image).split(".")[0] if image else settings.marks.name
         self._run = job.Job(program_of(context), folder, name, image, places_of(settings.marks, self._space), settings.voxel_size,
-                            settings.options)
+                            settings.options, settings.is_lapse)
 
     def tell(self, event):
         kind, value = event
@@ -149,7 +198,7 @@ class Segment(bpy.types.Operator):
             bpy.context.scene.covol.status = f"{value[0]} {100 * value[1]:.0f} %"
 
     def finish(self, context):
-        show(context, self._space, self._run, *self._run.result())
+        show(context, self._space, self._run, self._run.result())
         self.report({"INFO"}, context.scene.covol.status)
         return {"FINISHED"}
 
@@ -232,7 +281,7 @@ class Panel(bpy.types.Panel):
     def draw(self, context):
         settings, layout = context.scene.covol, self.layout
         layout.use_property_split = True
-        for name in ("image", "marks", "space", "scale", "voxel_size", "options", "folder"):
+        for name in ("image", "marks", "space", "scale", "is_lapse", "voxel_size", "options", "folder"):
             row = layout.row()
             row.enabled = name != "scale" or settings.space is None
             row.prop(settings, name)
@@ -249,9 +298,11 @@ def register():
     for each in CLASSES:
         bpy.utils.register_class(each)
     bpy.types.Scene.covol = bpy.props.PointerProperty(type=Settings)
+    bpy.app.handlers.frame_change_pre.append(show_frame)
 
 
 def unregister():
+    bpy.app.handlers.frame_change_pre.remove(show_frame)
     del bpy.types.Scene.covol
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

@@ -6,22 +6,29 @@ import re
 import shlex
 import tempfile
 
+import numpy as np
+
 from . import _files, _process
+
+
+FRAME = "_{frame:04}"  # of a time-lapse, in the names of its files: the program's pattern, and Python's
 
 
 class Job:
     """A run in a folder, whose outputs have names that no earlier run there has: Blender keeps volumes by their file's name.
 
     Attributes:
-        vdb, ply, report: paths of the outputs.
+        vdb, ply, report: paths of the outputs; of a time-lapse vdb and ply are patterns.
+        is_lapse: whether all frames of the image are segmented.
     """
 
-    def __init__(self, program, folder, name, image, places, voxel_size="", options=""):
+    def __init__(self, program, folder, name, image, places, voxel_size="", options="", is_lapse=False):
         """
         Args:
             image: path, or empty: the places alone, as a cloud.
-            places: (n, 3), x, y, z, in the image's world.
+            places: (n, 3), x, y, z, in the image's world; of a time-lapse in its first frame.
             options: further options, as a shell would have them.
+            is_lapse: all frames of the image, not one.
 
         Raises:
             Failed: what cannot be run is said before anything is started.
@@ -32,34 +39,58 @@ class Job:
             more = shlex.split(options)
         except ValueError as error:
             raise _process.Failed(2, f"further options: {options}: {error}") from None
+        if is_lapse and not image:
+            raise _process.Failed(3, "a time-lapse is of an image: choose one")
         found = _process.find_program(program)
+        self.is_lapse = is_lapse
         self.folder = pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         stem = re.sub(r"\W+", "_", name) or "covol"
         number = 1
-        while (self.folder / f"{stem}_{number}.vdb").exists():
+        while any(self.folder.glob(f"{stem}_{number}[_.]*")):
             number += 1
-        self.vdb, self.ply, self.report = (self.folder / f"{stem}_{number}.{end}" for end in ("vdb", "ply", "json"))
+        frame = FRAME if is_lapse else ""
+        self.vdb, self.ply = (self.folder / f"{stem}_{number}{frame}.{end}" for end in ("vdb", "ply"))
+        self.report = self.folder / f"{stem}_{number}.json"
         self._marks = tempfile.TemporaryDirectory(prefix="covol-blender-")
         marks = os.path.join(self._marks.name, "marks.csv")
         _files.write_positions(marks, places)
         outputs = ["-o", self.vdb, "--density", self.vdb, "--mesh", self.ply, "--json", self.report]
         size = [f"--voxel-size={voxel_size}"] if voxel_size.strip() else []
-        job = ["segment", image, "--points", marks, "--points-space=world"] if image else ["reconstruct", marks]
+        frames = ["--frame=all"] if is_lapse else []
+        job = ["segment", image, *frames, "--points", marks, "--points-space=world"] if image else ["reconstruct", marks]
         self.process = _process.Process(found, [*job, *size, *more, *outputs])
 
+    def at(self, path, frame):
+        """The file of a frame."""
+        return pathlib.Path(str(path).replace(FRAME, FRAME.format(frame=frame)))
+
+    def files(self):
+        """All that was written."""
+        return sorted(self.folder.glob(self.report.stem + "[_.]*"))
+
     def result(self):
-        """Waits for the end: (vertices, faces, report). Raises Failed."""
+        """Waits for the end: [(vertices, faces, report) of each frame], of one image one; None of a frame that failed. Raises Failed."""
         try:
             self.process.result()
+        except _process.Failed:
+            if not self.is_lapse or not self.report.exists():  # else some frames succeeded
+                raise
         finally:
             self._marks.cleanup()
-        columns, faces = _files.read_ply(self.ply)
-        return [columns[name] for name in "xyz"], faces, json.loads(self.report.read_text())
+        report = json.loads(self.report.read_text())
+        return [self._read(n, found) if found.get("status", "ok") == "ok" else None
+                for n, found in enumerate(report["frames"] if self.is_lapse else [report])]
+
+    def _read(self, frame, report):
+        columns, faces = _files.read_ply(self.at(self.ply, frame))
+        return np.stack([columns[name] for name in "xyz"], 1), faces, report
 
 
-def summary(report):
-    """What a panel says of a result, in one line."""
-    surface = report["surface"]
+def summary(found):
+    """What a panel says of result(), in one line: of the last frame, and how many failed."""
+    whole = [each for each in found if each is not None]
+    surface = whole[-1][2]["surface"]
     state = f"closed, genus {surface['genus']}" if surface["closed"] else "not closed"
-    return f"volume {surface['volume']:.5g}, area {surface['area']:.5g}, {state}"
+    frames = f"{len(whole)} of {len(found)} frames; the last: " if len(found) > 1 else ""
+    return frames + f"volume {surface['volume']:.5g}, area {surface['area']:.5g}, {state}"
