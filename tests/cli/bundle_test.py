@@ -2,13 +2,14 @@
 
     COVOL_BUILD=build python3 -m unittest tests/cli/bundle_test.py
 
-tests/bundle_in_clean_root.sh runs it in new Debians without a compiler, which takes minutes.
+tests/in_clean_root.sh runs it in new Debians without a compiler, which takes minutes.
 """
 import os
 import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tarfile
 import tempfile
 import unittest
@@ -57,6 +58,13 @@ class Bundle(unittest.TestCase):
         said = covol("segment", "p.nii.gz", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--report", "s.html")
         self.assertIn("closed, genus 0", said)
         self.assertGreater((self.work / "s.html").stat().st_size, 100_000)
+
+    def test_the_builds_results_to_the_bit(self):
+        """Of images, a cloud and a format of ITK; all jobs take minutes (docs/install.md)."""
+        for part in ("image", "cloud_few", "phantom_box"):
+            said = run(sys.executable, ROOT / "tests/bench/same_bits.py", BUILD / "bin/covol", self.root / "bin/covol", "--only", part, "--work",
+                       self.work / f"bits_{part}")
+            self.assertRegex(said, r"\d+ jobs: 0 differ \[\]; 0 end with an error")
 
     def test_the_doctor_finds_its_own_parts(self):
         root = self.work / "damaged"
