@@ -1,15 +1,22 @@
 #!/usr/bin/env bash
-# Unpacks the bundle in new Debians that have nothing but their base system, and runs it there as a user without rights:
-# version, the quickstart's job, the page of covol mark. As root, with debootstrap; about two minutes a release.
+# From nothing to the page of one's own stack: in new Debians without a compiler, from a file that people are given to the results
+# of the quickstart's job and the page of covol mark, as a user without rights. As root, with debootstrap.
 #
-#     bash tests/bundle_in_clean_root.sh BUNDLE.tar.xz [RELEASE...]      bookworm and trixie by default
+#     bash tests/in_clean_root.sh BUNDLE.tar.xz|COVOL.whl|COVOL.deb [RELEASE...]
 #
-# The mirror is the one that this machine's apt uses, or COVOL_MIRROR.
+# A bundle runs in bookworm and trixie by default, a wheel and a package in bookworm. The clock begins when the new Debian is there,
+# with Python's venv and NumPy for a wheel; what apt-get fetches for a package counts. The mirror is the one that this machine's apt
+# uses, or COVOL_MIRROR.
 set -euo pipefail
-bundle=$(realpath "$1")
+file=$(realpath "$1")
 shift
-releases=("$@")
-(( ${#releases[@]} > 0 )) || releases=(bookworm trixie)
+case $file in
+  *.tar.xz) releases=(bookworm trixie) include=() ;;
+  *.whl) releases=(bookworm) include=(--include=python3-venv,python3-numpy) ;;
+  *.deb) releases=(bookworm) include=() ;;
+  *) echo "$file: expected a bundle (.tar.xz), a wheel (.whl) or a package (.deb)" >&2; exit 2 ;;
+esac
+(( $# > 0 )) && releases=("$@")
 cd "$(dirname "$0")/.."
 mirror=${COVOL_MIRROR:-$(apt-get indextargets --format '$(SITE)' 'Created-By: Packages' | head -1)}
 work=$(mktemp -d /tmp/covol-root-XXXXXX)
@@ -21,24 +28,44 @@ finish() {
 }
 trap finish EXIT
 
+put_there() {
+  case $file in
+    *.tar.xz) xz -dc "$file" | tar x -C "$home"; covol=$(cd "$home" && echo ./covol-*/bin/covol) ;;
+    *.whl)
+      cp "$file" "$home/"
+      as_person "python3 -m venv --system-site-packages venv && venv/bin/pip install --quiet --no-index ./*.whl"
+      covol=venv/bin/covol ;;
+    *.deb)
+      cp "$file" "$root/root/"
+      chroot "$root" apt-get update -qq
+      chroot "$root" sh -c 'DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends /root/*.deb' >"$work/install.log" 2>&1 ||
+        { tail -20 "$work/install.log" >&2; exit 1; }
+      covol=covol ;;
+  esac
+}
+as_person() { chroot "$root" setpriv --reuid person --regid person --clear-groups env -i HOME=/home/person PATH=/usr/bin:/bin bash -c "cd; $1"; }
+
 for release in "${releases[@]}"; do
   root=$work/$release
-  debootstrap --variant=minbase "$release" "$root" "$mirror" >"$work/$release.log" 2>&1 || { tail -5 "$work/$release.log" >&2; exit 1; }
+  debootstrap --variant=minbase "${include[@]}" "$release" "$root" "$mirror" >"$work/$release.log" 2>&1 || { tail -5 "$work/$release.log" >&2; exit 1; }
+  for settings in /etc/apt/apt.conf.d/*proxy* /etc/resolv.conf; do
+    if [[ -e $settings ]]; then mkdir -p "$(dirname "$root$settings")" && cp -L "$settings" "$root$settings"; fi
+  done
   mount -t proc proc "$root/proc"
   chroot "$root" useradd --create-home person
   home=$root/home/person
-  begun=$SECONDS
-  chroot "$root" sh -c 'command -v cc g++ gcc cmake' && { echo "$release: there is a compiler" >&2; exit 1; }
-  xz -dc "$bundle" | tar x -C "$home"
   cp -r houdini_free_examples "$home/"
   chroot "$root" chown -R person: /home/person
-  as_person() { chroot "$root" setpriv --reuid person --regid person --clear-groups env -i HOME=/home/person PATH=/usr/bin:/bin bash -c "cd; $1"; }
-  as_person './covol-*/bin/covol --version'
-  as_person 'd=houdini_free_examples/data; ./covol-*/bin/covol segment $d/celegans_embryo.tif --points $d/celegans_marks.csv \
+  chroot "$root" sh -c 'command -v cc g++ gcc cmake' && { echo "$release: there is a compiler" >&2; exit 1; }
+  begun=$SECONDS
+  put_there
+  echo "$release: installed after $((SECONDS - begun)) s"
+  as_person "$covol --version"
+  as_person "d=houdini_free_examples/data; $covol segment \$d/celegans_embryo.tif --points \$d/celegans_marks.csv \
     --voxel-size 3 -o embryo.vdb --mesh embryo.ply --mask embryo_mask.tif --report embryo.html --quiet && \
-    ./covol-*/bin/covol compare embryo.vdb $d/celegans_check.csv'
+    $covol compare embryo.vdb \$d/celegans_check.csv"
   # The page answers its one address, and nothing else.
-  as_person './covol-*/bin/covol mark houdini_free_examples/data/celegans_embryo.tif study --no-browser >mark.log 2>&1 & program=$!
+  as_person "$covol"' mark houdini_free_examples/data/celegans_embryo.tif study --no-browser >mark.log 2>&1 & program=$!
     trap "kill -INT $program" EXIT
     for n in $(seq 100); do grep -q "http://" mark.log && break; sleep 0.1; done
     [[ $(cat mark.log) =~ http://127.0.0.1:([0-9]+)(/[^[:space:]]*) ]]
@@ -47,5 +74,6 @@ for release in "${releases[@]}"; do
     answer=$(get $port "$path"); refused=$(get $port /)
     echo "page: $answer; without its secret: $refused"
     [[ $answer == *" 200 "* || $answer == *" 30"* ]] && [[ $refused == *" 40"* ]]'
-  echo "== $release, glibc $(chroot "$root" ldd --version | head -1 | grep -o '[0-9.]*$'): unpacked and run after $((SECONDS - begun)) s"
+  chroot "$root" sh -c 'command -v cc g++ gcc cmake' && { echo "$release: a compiler was installed" >&2; exit 1; }
+  echo "== $release, glibc $(chroot "$root" ldd --version | head -1 | grep -o '[0-9.]*$'), $(basename "$file"): from the file to the page in $((SECONDS - begun)) s"
 done
