@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import signal
 import subprocess
 import unittest
@@ -115,6 +116,10 @@ class Doctor(Case):
         self.assertGreater(found["memory"]["free_bytes"], 0)
         self.assertGreater(found["scratch"]["free_bytes"], 0)
         self.assertEqual(pathlib.Path(found["program"]), pathlib.Path(COVOL).resolve())
+        counts = {folder: int(count) for count, folder in re.findall(r"^  (\d+) in (/.*)$", said, re.M)}
+        self.assertEqual(sum(counts.values()), len(found["libraries"]))
+        for folder in counts:  # each counts once
+            self.assertEqual([other for other in counts if other != folder and other.startswith(folder + "/")], [])
         for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: there"):
             self.assertIn(word, said)
 

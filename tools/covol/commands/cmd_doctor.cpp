@@ -1,13 +1,13 @@
 #include <link.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <set>
 #include <thread>
 
+#include "cli/bytes_text.h"
 #include "cli/free_memory.h"
 #include "commands/commands.h"
 #include "covol/evolve.h"
@@ -19,12 +19,6 @@ namespace covol::tool {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string gib(std::uint64_t bytes) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f GiB", double(bytes) / double(1ULL << 30));
-    return text;
-}
 
 std::string variable(const char* name) {
     const char* const value = std::getenv(name);
@@ -42,6 +36,20 @@ std::set<fs::path> loaded_libraries() {
     };
     dl_iterate_phdr(add, &found);
     return found;
+}
+
+/// How many files each folder holds; those of a folder within another one count there.
+std::map<std::string, int> count_by_folder(const std::set<fs::path>& files) {
+    std::set<fs::path> folders;
+    for (const fs::path& file : files) folders.insert(file.parent_path());
+    std::map<std::string, int> counts;
+    for (const fs::path& file : files) {
+        fs::path outermost = file.parent_path();
+        for (fs::path above = outermost; above.has_relative_path(); above = above.parent_path())
+            if (folders.contains(above)) outermost = above;
+        ++counts[outermost.string()];
+    }
+    return counts;
 }
 
 bool is_main(const std::string& name) {
@@ -87,16 +95,16 @@ private:
     }
 
     static Json libraries(Session& session) {
-        std::map<std::string, int> folders;
+        const std::set<fs::path> loaded = loaded_libraries();
         Json list = Json::array();
         std::string main;
-        for (const fs::path& path : loaded_libraries()) {
-            ++folders[path.parent_path().string()];
+        for (const fs::path& path : loaded) {
             list.push_back(path.string());
             if (is_main(path.filename().string())) main += (main.empty() ? "" : ", ") + path.filename().string();
         }
         std::string text = "libraries: " + main;
-        for (const auto& [folder, count] : folders) text += "\n  " + std::to_string(count) + " in " + folder;
+        for (const auto& [folder, count] : count_by_folder(loaded))
+            text += "\n  " + std::to_string(count) + " in " + folder;
         for (const char* const name : {"LD_LIBRARY_PATH", "LD_PRELOAD"})
             if (const std::string value = variable(name); !value.empty())
                 text += std::string("\n  ") + name + " is " + value;
@@ -110,7 +118,7 @@ private:
             session.say("memory: nobody says what is free");
             return {{"free_bytes", nullptr}, {"where", ""}};
         }
-        session.say("memory: " + gib(free->bytes) + " free, says " + free->where);
+        session.say("memory: " + bytes_text(double(free->bytes)) + " free, says " + free->where);
         return {{"free_bytes", free->bytes}, {"where", free->where}};
     }
 
@@ -123,7 +131,7 @@ private:
                          "; set TMPDIR to a folder that can be written");
             return {{"folder", folder.string()}, {"free_bytes", 0}};
         }
-        session.say("temporary files: " + folder.string() + ", " + gib(space.available) + " free");
+        session.say("temporary files: " + folder.string() + ", " + bytes_text(double(space.available)) + " free");
         return {{"folder", folder.string()}, {"free_bytes", space.available}};
     }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "cli/bytes_text.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
 #include "covol/mesh_stream.h"
@@ -135,16 +136,14 @@ std::string about_voxels(std::int64_t count) {
     return "about " + (count < kThousand ? std::to_string(count) : rounded(kThousand) + "000") + " voxels";
 }
 
-std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
-
 /// Whether the mesh has to be streamed. @throws Error where the joined surface takes more than --memory-limit even so
 bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
     if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;
     const auto refuse = [&](double bytes, const std::string& what) {
         throw Error(Errc::InvalidOptions, "bricks: " + what + " of a band of " + about_voxels(plan.active_voxels()) +
-                                              " takes about " + megabytes(bytes) + ", more than the " +
-                                              megabytes(limit) + " of --memory-limit, or that are free");
+                                              " takes about " + bytes_text(bytes) + ", more than the " +
+                                              bytes_text(limit) + " of --memory-limit, or that are free");
     };
     if (memory_of_joined(voxels) > limit)
         refuse(memory_of_joined(voxels), "the joined level set (covol brick can join it on another machine)");
@@ -186,7 +185,7 @@ void tell_plan(const BrickPlan& plan, Session& session) {
             {"largest_brick", largest},
             {"memory_bytes", std::llround(memory)}};
     session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: " + about_voxels(plan.active_voxels()) +
-                ", the largest brick " + about_voxels(largest) + ", which takes about " + megabytes(memory));
+                ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
 }
 
 /// Outputs that were named where the job is planned, which is not where they are made.

@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "cli/bytes_text.h"
 #include "cli/report.h"
 #include "covol/error.h"
 #include "jobs/structure_inputs.h"
@@ -199,13 +200,6 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
         plan_samples(*pilot.surface, *image, kReachVoxels * h, plan);
     }
     return plan;
-}
-
-std::string bytes_text(double bytes) {
-    std::ostringstream text;
-    text << std::fixed << std::setprecision(bytes < 1e9 ? 0 : 1);
-    bytes < 1e9 ? text << bytes / 1e6 << " MB" : text << bytes / 1e9 << " GB";
-    return text.str();
 }
 
 std::string size_text(const Index3& n) {
