@@ -19,7 +19,8 @@ bl_info = {
     "category": "Import-Export",
 }
 ROLE = "covol_role"  # what an object below the space is: "surface" or "volume"
-MESHES, START = "covol_meshes", "covol_start"  # of a surface: names of its meshes, one for each frame, and the first one's number
+MESHES = "covol_meshes"  # of a surface: names of its meshes, one for each frame
+START = "covol_start"    # and the frame of Blender that shows the first
 FIGURES = ("volume", "area", "genus")
 TICK = 0.1           # seconds between two looks at a run
 
