@@ -38,9 +38,9 @@ echo "== results: volume and area over time; the true radius grows from 6 to 7.7
 /usr/bin/python3 - "$out/cell.csv" <<'PYTHON'
 import csv, math, sys
 for row in csv.DictReader(open(sys.argv[1])):
-    radius = (3 * float(row["volume"]) / (4 * math.pi)) ** (1 / 3)
+    radius = (3 * float(row["volume (um^3)"]) / (4 * math.pi)) ** (1 / 3)
     truth = 6 + 0.25 * int(row["frame"])
-    print(f"frame {row['frame']}: radius {radius:.2f} um (true {truth:.2f}), area {float(row['area']):.0f} um^2, "
+    print(f"frame {row['frame']}: radius {radius:.2f} um (true {truth:.2f}), area {float(row['area (um^2)']):.0f} um^2, "
           f"{row['steps']} steps, {float(row['seconds']):.2f} s, {row['status']}")
 PYTHON
 echo "$out/cell_t000.vdb ... cell_t007.vdb, cell_t000.ply ..., cell.csv, cell_t007.png (picture of the last)"

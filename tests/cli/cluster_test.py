@@ -123,7 +123,7 @@ class ManyImages(Case):
         _, rows = self.run_workflow("movie=movie.tif", "marks=marks_{name}.xyz")
         self.assertEqual([row["name"] for row in rows], ["000", "001", "002"])
         for frame, row in enumerate(rows):
-            self.assertAlmostEqual((3 * float(row["volume"]) / (4 * np.pi)) ** (1 / 3), 6 + frame, delta=0.3)
+            self.assertAlmostEqual((3 * float(row["volume (um^3)"]) / (4 * np.pi)) ** (1 / 3), 6 + frame, delta=0.3)
         self.compare("002", "movie.tif", "--frame", "2", "--points", "marks_002.xyz")
 
 

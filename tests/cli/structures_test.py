@@ -115,6 +115,11 @@ class Structures(Case):
         for row, s in zip(rows, structures):
             self.assertAlmostEqual(float(row["volume"]), s["surface"]["volume"], places=3)
             self.assertAlmostEqual(float(row["area"]), s["surface"]["area"], places=3)
+            self.assertTrue(0.8 < float(row["sphericity"]) < 1)
+            # Along x the cap that the other one has is missing.
+            self.assertAlmostEqual(float(row["extent_y"]), 2 * self.RADIUS, delta=0.3)
+            self.assertAlmostEqual(float(row["extent_x"]), self.RADIUS + math.dist(self.LEFT, self.RIGHT) / 2, delta=0.3)
+            self.assertEqual(float(row["centroid_x"]) > 0, s["name"] == "right")
             self.assertEqual(row["genus"], "0")
 
     def test_finer_voxels_come_closer(self):
@@ -305,7 +310,12 @@ class TimeLapse(Case):
             self.assertEqual(frame["input"]["points"]["count"], 1500 if t == 0 else 0)
             self.assertEqual(frame["resolved"]["delta"], 0.5 * H)
             self.check_radius(frame["surface"]["volume"], t)
-            self.assertAlmostEqual(float(row["volume"]), frame["surface"]["volume"], places=3)
+            self.assertAlmostEqual(float(row["volume (um^3)"]), frame["surface"]["volume"], delta=1e-5 * frame["surface"]["volume"])
+            self.assertAlmostEqual(float(row["sphericity"]), 1, delta=0.02)
+            center, radius = self.ball_at(t)
+            for a, name in enumerate("xyz"):
+                self.assertAlmostEqual(float(row[f"centroid_{name} (um)"]), center[a] + self.middle, delta=0.3 * H)
+                self.assertAlmostEqual(float(row[f"extent_{name} (um)"]), 2 * radius, delta=0.7 * H)
         # Where it is, too: the mask's centre of gravity.
         for t in (0, self.FRAMES - 1):
             self.run_covol("mask", f"s_t{t:03d}.vdb", "--like", self.singles[0], "-o", "c.tif")

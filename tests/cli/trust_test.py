@@ -517,7 +517,7 @@ class Roles(Case):
         names = {role: {name for _, name in found} for role, found in roles.items()}
         self.assertEqual(names["conduct"], {"checkpoint", "checkpoint-every", "resume", "help", "help-all", "also-at", "in-frame-of", "<plan|run|join ...>",
                                             "<COMMAND...>", "<OUT_FOLDER>"})
-        self.assertEqual(names["output"], {"output", "mask", "table", "evidence", "suggestions", "mesh", "density", "usda", "fields", "report", "keep-failed", "points", "labels",
+        self.assertEqual(names["output"], {"output", "mask", "rtstruct", "table", "evidence", "suggestions", "mesh", "density", "usda", "fields", "report", "keep-failed", "points", "labels",
                                            "<OUT>"})
         self.assertLessEqual({"points", "contours", "painted", "inside", "outside", "guess", "init", "like", "image", "band", "distance", "edge"}, names["input"])
         self.assertLessEqual({"theta", "rho", "voxel-size", "model", "half", "frame", "exterior-seed", "remove-outliers"}, names["setting"])

@@ -87,6 +87,27 @@ def write_dicom(path, frames, packed):
     ds.save_as(str(path), write_like_original=False)
 
 
+def write_contours(path, implicit):
+    """A structure set with a ROI, two contours and a keyhole."""
+    import pydicom
+    write_dicom(path, 1, False)
+    ds = pydicom.dcmread(str(path))
+    ds.file_meta.TransferSyntaxUID = pydicom.uid.ImplicitVRLittleEndian if implicit else pydicom.uid.ExplicitVRLittleEndian
+    ds.is_implicit_VR = implicit
+    ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = "1.2.840.10008.5.1.4.1.1.481.3"
+    del ds.PixelData
+    roi, contours = pydicom.Dataset(), pydicom.Dataset()
+    roi.ROINumber, roi.ROIName = 1, "a"
+    contours.ReferencedROINumber, contours.ContourSequence = 1, pydicom.Sequence()
+    for text in ("0 0 1 9 0 1 9 9 1", "0 0 2 9 0 2 9 9 2 0 0 2 3 2 2 5 2 2 5 4 2 3 2 2 0 0 2"):
+        contour = pydicom.Dataset()
+        contour.ContourGeometricType, contour.ContourData = "CLOSED_PLANAR", text.split()
+        contour.NumberOfContourPoints = len(text.split()) // 3
+        contours.ContourSequence.append(contour)
+    ds.StructureSetROISequence, ds.ROIContourSequence = pydicom.Sequence([roi]), pydicom.Sequence([contours])
+    ds.save_as(str(path), write_like_original=False)
+
+
 def seeds_of(covol, folder):
     """format -> small valid files, a list of bytes."""
     seeds = {end: [path.read_bytes()] for end, path in mutate.seeds_of(covol, folder).items() if path.is_file()}
@@ -120,6 +141,9 @@ def seeds_of(covol, folder):
     for frames, packed in ((2, False), (1, False), (1, True)):
         write_dicom(folder / "a.dcm", frames, packed)
         seeds.setdefault("dcm", []).append((folder / "a.dcm").read_bytes())
+    for implicit in (False, True):
+        write_contours(folder / "a.dcm", implicit)
+        seeds.setdefault("contours.dcm", []).append((folder / "a.dcm").read_bytes())
     for name in ("h5", "ims"):
         seeds[name] = [(folder / f"a.{name}").read_bytes()]
     values = np.arange(60, dtype="<u2").tobytes()

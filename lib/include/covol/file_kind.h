@@ -24,7 +24,7 @@ enum class FileKind { Vdb, Image, Mesh, Points };
 /// ".seg.nrrd", ".ome.tif", ".ome.tiff", ".ome.zarr".
 [[nodiscard]] COVOL_API std::string long_ending(const std::string& path);
 
-/// 3D Slicer's segmentations, whose label values have names.
+/// Segmentations of 3D Slicer and of DICOM, whose label values have names.
 [[nodiscard]] COVOL_API bool is_segmentation_name(const std::string& path);
 
 /// "vdb", "image", "mesh", "points"

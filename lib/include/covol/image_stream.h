@@ -45,7 +45,7 @@ public:
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
     /// Key/value pairs, for NRRD. Asked before the voxels, too: the later texts may be shorter, not longer.
     [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> metadata() const;
-    /// What the values stand for, for OME-Zarr.
+    /// What the values stand for, for OME-Zarr and DICOM.
     [[nodiscard]] virtual std::vector<NamedLabel> label_names() const;
 
 private:
@@ -60,8 +60,9 @@ private:
 struct WriteImageOptions {
     bool pack = true;  ///< false: .nrrd and .mha with the voxels as they are in memory
     /// The image whose lattice this is, or empty: a NIfTI file keeps its qform and sform and their codes, as long as
-    /// they mean that lattice.
+    /// they mean that lattice; a DICOM segmentation belongs to its patient and study, and refers to its slices.
     std::string like = {};
+    std::optional<int> like_frame = {};  ///< of that image, as ReadImageOptions::frame
 };
 
 template <>
@@ -70,9 +71,9 @@ inline constexpr auto kOptions<WriteImageOptions> = std::tuple{Option{"pack", &W
 /// Writes an image as the other write_image() do, but in boxes of a few MB that are filled and packed in parallel: the
 /// memory does not grow with the image. The file does not depend on the number of threads.
 ///
-/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .zarr is OME-Zarr 0.4 in chunks of 128^3, with levels of half the
-/// size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in tiles of 256 x 256. A folder that is no Zarr
-/// store is never replaced.
+/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .dcm is a DICOM segmentation (of labels alone); .zarr is OME-Zarr
+/// 0.4 in chunks of 128^3, with levels of half the size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF
+/// in tiles of 256 x 256. A folder that is no Zarr store is never replaced.
 /// @throws Error Io, InvalidOptions (ending), Unsupported (larger than the format allows), Cancelled; what the source
 ///               throws. Nothing half-written stays.
 COVOL_API void write_image(const std::string& path, const PixelSource& source, const WriteImageOptions& options = {},

@@ -15,7 +15,7 @@ struct StructurePoints {
 
 /// As read_points(), of a file whose marks name their structures; in the order in which the file names them.
 /// @param by  what names them: the column of a table, "group" or "counter" of Fiji's selections, "label" or "node" of
-///            3D Slicer's markups, "label" of .csl
+///            3D Slicer's markups, "label" of .csl, "roi" of DICOM RT structure sets
 /// @throws Error as read_points(); InvalidInput where the file has no such names, a mark without one, or more than 254.
 [[nodiscard]] COVOL_API std::vector<StructurePoints> read_structures_of_points(const std::string& path,
                                                                                const std::string& by,

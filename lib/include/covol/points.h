@@ -70,12 +70,15 @@ struct PointCloud {
     bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
     std::string source;                    ///< path, for messages
     std::string rule;                      ///< how coordinates were understood, one line for people
+    std::string unit = {};  ///< of lengths, "mm"; empty: nobody says, or the caller gave a scale. to_world() turns it
+                            ///< into the image's
 };
 
 /// Reads, by the name's end:
 /// - .xyz .txt .pts .asc .csv .tsv: columns, by name where there is a header: x, y, z; slice, contour, x_px, y_px;
 ///   napari's points and shapes; Fiji's Results (X, Y, Slice)
 /// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
+/// - .dcm: the contours of a DICOM RT structure set
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
 /// Normals: nx, ny, nz of PLY and of columns, columns 4 to 6 of six without names where all are unit vectors, normal_x,
 /// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is

@@ -4,11 +4,6 @@
 #include "io/pixels/raw_image.h"
 
 namespace covol {
-namespace {
-
-const std::string kUnitNote = "; lengths in ";
-
-}  // namespace
 
 Vec3 detail::to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry) {
     const Vec3& h = geometry.spacing;
@@ -30,14 +25,9 @@ std::vector<Vec3> to_world(const PointCloud& cloud) {
     return cloud.points;
 }
 
-std::string detail::unit_note(const std::string& unit) { return kUnitNote + unit; }
-
 double detail::unit_factor(const PointCloud& cloud, const ImageGeometry& geometry) {
-    const std::size_t note = cloud.rule.rfind(kUnitNote);
-    if (note == std::string::npos) return 1;
-    const std::string unit = cloud.rule.substr(note + kUnitNote.size());
-    const double own = unit_in_metres(unit), other = unit_in_metres(geometry.unit);
-    return own > 0 && other > 0 && unit != geometry.unit ? own / other : 1;
+    const double own = unit_in_metres(cloud.unit), other = unit_in_metres(geometry.unit);
+    return own > 0 && other > 0 && cloud.unit != geometry.unit ? own / other : 1;
 }
 
 Vec3 detail::scaled(PointSpace space, const Vec3& p, double factor) {

@@ -1,15 +1,10 @@
 #pragma once
-#include <string>
-
 #include "covol/points.h"
 
 namespace covol::detail {
 
 /// A position as a cloud has it, in the world. @pre space_after() gave the space
 [[nodiscard]] Vec3 to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry);
-
-/// What a cloud's rule ends with where its file names the unit of its lengths: "; lengths in mm".
-[[nodiscard]] std::string unit_note(const std::string& unit);
 
 /// What lengths of a cloud are multiplied with to become the image's; 1 where one of them names no known unit.
 [[nodiscard]] double unit_factor(const PointCloud& cloud, const ImageGeometry& geometry);

@@ -48,6 +48,7 @@ void check_ending(const std::string& path, OutputKind kind) {
         case OutputKind::Page: return check_extension(path, {".html", ".htm"});
         case OutputKind::Scene: return check_extension(path, {".usda"});
         case OutputKind::Table: return check_extension(path, {".csv"});
+        case OutputKind::StructureSet: return check_extension(path, {".dcm"});
         case OutputKind::ProgramMarks: return check_program_marks(path);
         case OutputKind::Text: return;
     }

@@ -9,7 +9,20 @@
 
 namespace covol::tool {
 
-enum class OutputKind { Vdb, NanoVdb, Image, Mesh, Points, Picture, Page, Scene, Table, Text, ProgramMarks };
+enum class OutputKind {
+    Vdb,
+    NanoVdb,
+    Image,
+    Mesh,
+    Points,
+    Picture,
+    Page,
+    Scene,
+    Table,
+    Text,
+    ProgramMarks,
+    StructureSet
+};
 
 /// The files of one run: checked before the long work, written at its end, and put in place together when all are
 /// there. Where one fails what was there before stays as it was.

@@ -41,6 +41,11 @@ Table& Table::operator<<(double number) {
     return *this << std::string(digits.data(), end);
 }
 
+Table& Table::add_rows(const Table& other) {
+    text_ += other.text_;
+    return *this;
+}
+
 std::vector<std::string> aligned(const std::vector<std::vector<std::string>>& rows) {
     std::vector<std::size_t> widths;
     for (const auto& row : rows) {

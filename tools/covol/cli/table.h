@@ -13,6 +13,8 @@ public:
     Table& operator<<(const char* field) { return *this << std::string(field); }
     Table& operator<<(double number);  ///< nothing for one that is not finite
     Table& operator<<(int number) { return *this << std::to_string(number); }
+    /// Those of another table, whose header is empty.
+    Table& add_rows(const Table& other);
     [[nodiscard]] std::string text() const { return text_ + "\n"; }
 
 private:

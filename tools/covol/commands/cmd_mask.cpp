@@ -26,7 +26,7 @@ struct MaskJob {
                                                          std::vector<int>{label}, is_segmentation_name(output));
         session.report()["mask"] = {{"image", to_json(geometry)}};
         session.outputs().add(output, [this, labels, &session](const std::string& path) {
-            write_image(path, *labels, {!raw, like}, session.run());
+            write_image(path, *labels, {!raw, like, image.options.frame}, session.run());
             const std::uint64_t inside = labels->voxels_written().front();
             session.report()["mask"]["voxels"] = inside;
             session.note(std::to_string(inside) + " voxels inside");
@@ -46,7 +46,7 @@ void add_mask(Session& session) {
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "label image")
         ->required()
-        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.npy|.zarr");
+        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.npy|.zarr|.dcm");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
     command->add_flag("--raw", job->raw, "leave the voxels of .nrrd and .mha unpacked");
     job->image.bind(*command);

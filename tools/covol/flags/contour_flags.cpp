@@ -7,7 +7,8 @@ void ContourFlags::bind(CLI::App& command, bool names) {
     command
         .add_option(
             "--contours", paths,
-            std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections") +
+            std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections, "
+                        "DICOM structure sets") +
                 (names ? "; NAME= as for points" : ""))
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
     bind_options(command, *this, Offered::Always);

@@ -148,8 +148,15 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         sort_output(with_image);
     });
     if (with_image) {
-        command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
-            ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
+        command
+            .add_option(
+                "--mask", mask_path,
+                "label image in the image's own geometry; .seg.nrrd for 3D Slicer, .dcm as a DICOM segmentation")
+            ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr|.dcm");
+        command
+            .add_option("--rtstruct", rtstruct_path,
+                        "contours of the surface on the image's slices, as a DICOM RT structure set")
+            ->type_name("OUT.dcm");
         command.add_option("--table", table_path, "volume, area and fit of each structure and frame, as a table")
             ->type_name("OUT.csv");
         evidence.bind(command);

@@ -1,7 +1,10 @@
 #pragma once
+#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "covol/point_structures.h"
 #include "flags/bindings.h"
 #include "flags/brick_flags.h"
 #include "flags/checkpoint_flags.h"
@@ -15,6 +18,17 @@
 
 namespace covol::tool {
 
+/// Files whose marks name their structures. They are asked for twice, for the names and for the marks, and read once.
+class SharedMarks {
+public:
+    /// @throws as read_structures_of_points()
+    const std::vector<StructurePoints>& read(const std::string& file, const std::string& column,
+                                             const ReadPointsOptions& options);
+
+private:
+    std::map<std::string, std::vector<StructurePoints>> read_;
+};
+
 /// What `segment` and `reconstruct` share: they differ in the image alone.
 struct SegmentJob {
     std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
@@ -22,6 +36,7 @@ struct SegmentJob {
     PointFlags points;
     ContourFlags contours;
     std::string structure_column;  ///< what names each mark's structure, in files of several; empty: files are of one
+    std::shared_ptr<SharedMarks> shared = std::make_shared<SharedMarks>();
     PaintedFlags painted;
     SeedFlags seeds;
     GuessFlags guess;
@@ -35,7 +50,8 @@ struct SegmentJob {
     CheckpointFlags checkpoint;
     FrameChoice frames;
     std::string study;  ///< folder of a study, whose structures join those of the files; empty: none
-    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path, scene_path;
+    std::string output, mask_path, rtstruct_path, mesh_path, density_path, fields_path, table_path, failed_path,
+        page_path, scene_path;
     VdbFlags vdb;
 
     void bind(CLI::App& command, bool with_image);

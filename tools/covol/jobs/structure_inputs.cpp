@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include "covol/file_kind.h"
 #include "covol/point_structures.h"
 #include "covol/study.h"
 #include "covol/study_files.h"
@@ -22,12 +23,12 @@ Marks& owner_of(std::vector<Marks>& structures, const std::string& flag, const s
     return *found;
 }
 
-void add_files(std::vector<Marks>& structures, const std::vector<std::string>& texts,
-               std::vector<std::string> MarkFiles::*kind) {
-    for (const std::string& text : texts) {
-        const Named file = split_name(text);
-        (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
-    }
+/// What names the structures of a file's marks: a column that was asked for, or the ROIs of a DICOM structure set that
+/// got no name; empty where all are of one structure.
+std::string column_of(const SegmentJob& job, const std::string& text) {
+    if (!job.structure_column.empty()) return job.structure_column;
+    const bool names_itself = !job.images.empty() && split_name(text).name.empty() && long_ending(text) == ".dcm";
+    return names_itself ? "roi" : "";
 }
 
 using TakePoints = std::function<void(Marks& owner, const std::string& file, const KindedPoints& points)>;
@@ -36,10 +37,25 @@ using TakePoints = std::function<void(Marks& owner, const std::string& file, con
 void share_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
                  const TakePoints& take) {
     for (const std::string& text : texts) {
+        const std::string column = column_of(job, text);
+        if (column.empty()) continue;
         if (text == "-" || !split_name(text).name.empty())
             throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
-        for (const auto& [name, points] : read_structures_of_points(text, job.structure_column, job.points.options))
+        for (const auto& [name, points] : job.shared->read(text, column, job.points.options))
             take(find_or_add_structure(structures, name), text, points);
+    }
+}
+
+/// Structures of files: those that name them, and those whose marks are of one.
+void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
+               std::vector<std::string> MarkFiles::*kind) {
+    for (const std::string& text : texts) {
+        if (!column_of(job, text).empty()) {
+            share_files(job, {text}, structures, [](Marks&, const std::string&, const KindedPoints&) {});
+            continue;
+        }
+        const Named file = split_name(text);
+        (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
     }
 }
 
@@ -48,7 +64,6 @@ std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::v
                                                    const std::optional<ImageGeometry>& geometry,
                                                    const RunContext& run) {
     std::map<std::string, MarkFiles> files;
-    if (job.structure_column.empty()) return files;
     share_files(job, job.points.paths, structures,
                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
                     add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
@@ -92,18 +107,20 @@ void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const
 
 }  // namespace
 
+const std::vector<StructurePoints>& SharedMarks::read(const std::string& file, const std::string& column,
+                                                      const ReadPointsOptions& options) {
+    const auto known = read_.find(file);
+    if (known != read_.end()) return known->second;
+    return read_.emplace(file, read_structures_of_points(file, column, options)).first->second;
+}
+
 std::vector<Marks> structures_of(const SegmentJob& job,
                                  const std::vector<std::shared_ptr<const PaintedImage>>& painted) {
     std::vector<Marks> structures;
     if (!job.study.empty())
         structures = marks_of(read_study(job.study), open_study_site(job.study, read_study_image(job.study).geometry));
-    if (job.structure_column.empty()) {
-        add_files(structures, job.points.paths, &MarkFiles::points);
-        add_files(structures, job.contours.paths, &MarkFiles::contours);
-    } else {
-        for (const auto* paths : {&job.points.paths, &job.contours.paths})
-            share_files(job, *paths, structures, [](Marks&, const std::string&, const KindedPoints&) {});
-    }
+    add_files(job, job.points.paths, structures, &MarkFiles::points);
+    add_files(job, job.contours.paths, structures, &MarkFiles::contours);
     add_paint(structures, painted);
     for (const std::string& text : job.guess.paths) {
         const Named file = split_name(text);
@@ -130,6 +147,14 @@ std::vector<Marks> structures_of(const SegmentJob& job,
     for (const auto& [name, seed] : job.named_seeds)
         owner_of(structures, "--exterior-seed", name).exterior_seeds.push_back(seed);
     return structures;
+}
+
+bool names_structures(const SegmentJob& job) {
+    const auto names = [&](const std::vector<std::string>& texts) {
+        return std::any_of(texts.begin(), texts.end(),
+                           [&](const std::string& text) { return !column_of(job, text).empty(); });
+    };
+    return !job.structure_column.empty() || names(job.points.paths) || names(job.contours.paths);
 }
 
 std::vector<std::string> names_of(const std::vector<Marks>& structures) {
@@ -166,8 +191,11 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
         const Stopwatch watch;
         read_marks(marks, geometry, reading, own);
         if (const auto own_files = shared.find(marks.name); own_files != shared.end()) {
-            marks.files.points = own_files->second.points;
-            marks.files.contours = own_files->second.contours;
+            const auto append = [](std::vector<std::string>& all, const std::vector<std::string>& some) {
+                all.insert(all.end(), some.begin(), some.end());
+            };
+            append(marks.files.points, own_files->second.points);
+            append(marks.files.contours, own_files->second.contours);
         }
         warn_of_voxels(marks, image, reading.points, own);
         if (!image) thin_points(marks, job.cloud.inputs.options.most_points, own);

@@ -17,6 +17,9 @@ namespace covol::tool {
 [[nodiscard]] std::vector<Marks> structures_of(const SegmentJob& job,
                                                const std::vector<std::shared_ptr<const PaintedImage>>& painted = {});
 
+/// Whether the marks of some file name their structures: --structure-column, and structure sets of DICOM.
+[[nodiscard]] bool names_structures(const SegmentJob& job);
+
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<Marks>& structures);
 
 /// Reads the file of --init; of several structures each gets its own grid of a .vdb.

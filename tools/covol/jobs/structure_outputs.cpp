@@ -9,6 +9,8 @@
 #include "covol/file_kind.h"
 #include "covol/mesh_stream.h"
 #include "covol/program_marks.h"
+#include "covol/slice_contours.h"
+#include "covol/solid_measures.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "jobs/page.h"
@@ -18,7 +20,7 @@ namespace {
 
 /// Whether a label image has a place for the structures' names.
 bool keeps_names(const std::string& path) {
-    for (const char* end : {".nrrd", ".NRRD", ".zarr", ".zarr/"})
+    for (const char* end : {".nrrd", ".NRRD", ".zarr", ".zarr/", ".dcm", ".DCM"})
         if (path.ends_with(end)) return true;
     return false;
 }
@@ -161,22 +163,32 @@ private:
     bool has_names_;
 };
 
-/// @param like  the image
 void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
-                      const std::string& like, const RunContext& run, const Sink& sink) {
+                      const RunContext& run, const Sink& sink) {
     if (path.empty()) return;
     const bool named = !output->structures.front().name.empty();
     const bool has_names = named || is_segmentation_name(path);
-    sink(path, [output, run, has_names, like](const std::string& file) {
+    sink(path, [output, run, has_names](const std::string& file) {
+        const WriteImageOptions options{true, output->image_path, output->frame};
         if (output->structures.size() == 1 && output->structures.front().corrected)
-            return write_image(file, CorrectedLabels(output, has_names), {true, like}, run);
-        write_image(file, LabelImage(solids(*output), output->geometry, output->labels(), has_names), {true, like},
-                    run);
+            return write_image(file, CorrectedLabels(output, has_names), options, run);
+        write_image(file, LabelImage(solids(*output), output->geometry, output->labels(), has_names), options, run);
     });
     if (named && !keeps_names(path))
         sink(labels_path(path), [output, run](const std::string& file) {
             write_text(file, make_itksnap_labels(output->names(), output->labels()), run);
         });
+}
+
+void hand_over_contours(const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
+                        const RunContext& run, const Sink& sink) {
+    sink(path, [output, run](const std::string& file) {
+        std::vector<ContouredStructure> structures;
+        for (const StructureOutput& s : output->structures)
+            structures.push_back({s.shown_name(), structure_color(structures.size()),
+                                  outline_slices(*s.result.surface, output->geometry, run)});
+        write_rt_structures(file, structures, output->geometry, output->image_path, output->frame, run);
+    });
 }
 
 /// What the run is about: the image's name, or the output's.
@@ -262,6 +274,7 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
     if (!job.mask_path.empty() && !structures.front().name.empty() && !keeps_names(job.mask_path))
         outputs.check("--mask", labels_path(tagged(job.mask_path)), OutputKind::Text);
+    outputs.check("--rtstruct", tagged(job.rtstruct_path), OutputKind::StructureSet);
     if (!is_density_in_output(job)) outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
     outputs.check("--report", tagged(job.page_path), OutputKind::Page);
@@ -294,7 +307,8 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
         sink(tagged(job.density_path), [vdb, fogs_of](const std::string& file) { write_vdb(file, fogs_of(), vdb); });
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
     hand_over_meshes(job, output, tagged(job.mesh_path), session, sink);
-    hand_over_labels(output, tagged(job.mask_path), job.images.empty() ? "" : job.images.front(), session.run(), sink);
+    hand_over_labels(output, tagged(job.mask_path), session.run(), sink);
+    hand_over_contours(output, tagged(job.rtstruct_path), session.run(), sink);
     const auto evidence_of = [output] {
         std::vector<EvidenceOf> surfaces;
         for (const StructureOutput& s : output->structures)
@@ -338,9 +352,32 @@ Json to_json(const StructuresOutput& output) {
     return {{"structures", list}, {"overlaps", overlaps}};
 }
 
-std::vector<std::string> result_columns() {
-    return {"structure", "label",   "volume",         "area",         "components", "genus",       "closed", "fit_mean",
-            "fit_p95",   "fit_max", "intensity_mean", "intensity_sd", "steps",      "stop_reason", "seconds"};
+std::vector<std::string> result_columns(const std::string& unit) {
+    const auto of_length = [&](const std::string& name, const std::string& power = "") {
+        return unit.empty() ? name : name + " (" + unit + power + ")";
+    };
+    return {"structure",
+            "label",
+            of_length("volume", "^3"),
+            of_length("area", "^2"),
+            "sphericity",
+            of_length("extent_x"),
+            of_length("extent_y"),
+            of_length("extent_z"),
+            of_length("centroid_x"),
+            of_length("centroid_y"),
+            of_length("centroid_z"),
+            "components",
+            "genus",
+            "closed",
+            of_length("fit_mean"),
+            of_length("fit_p95"),
+            of_length("fit_max"),
+            "intensity_mean",
+            "intensity_sd",
+            "steps",
+            "stop_reason",
+            "seconds"};
 }
 
 std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface, double most_read,
@@ -349,10 +386,14 @@ std::optional<IntensityStatistics> intensity_within(const Image& image, const Fl
     return measure_intensity(image, surface, run);
 }
 
-void add_result(Table& table, const std::string& name, int label, const SegmentReport& r,
-                const std::optional<IntensityStatistics>& intensity) {
-    table << name << label << r.surface.volume << r.surface.area << r.surface.components << r.surface.genus
-          << (r.surface.closed ? "true" : "false");
+void add_result(Table& table, const std::string& name, int label, const SegmentResult& result,
+                const std::optional<IntensityStatistics>& intensity, const RunContext& run) {
+    const SegmentReport& r = result.report;
+    const SolidMeasures solid = measure_solid(*result.surface, run);
+    table << name << label << r.surface.volume << r.surface.area << sphericity(r.surface.volume, r.surface.area);
+    for (std::size_t a = 0; a < 3; ++a) table << solid.box.max[a] - solid.box.min[a];
+    for (std::size_t a = 0; a < 3; ++a) table << solid.centroid[a];
+    table << r.surface.components << r.surface.genus << (r.surface.closed ? "true" : "false");
     if (r.point_count > 0)
         table << r.fit.mean << r.fit.p95 << r.fit.max;
     else

@@ -27,6 +27,8 @@ struct StructureOutput : StructureResult {
 /// All structures of one image, disjoint.
 struct StructuresOutput {
     ImageGeometry geometry;
+    std::string image_path;      ///< empty: without an image
+    std::optional<int> frame;    ///< of that file, where it was chosen
     std::optional<Image> image;  ///< where a report page shows it
     bool is_anatomical = false;  ///< of that image
     std::vector<StructureOutput> structures;
@@ -54,9 +56,10 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
 [[nodiscard]] Json to_json(const StructuresOutput& output);
 
 /// The table's columns for a structure's result, and their values.
-[[nodiscard]] std::vector<std::string> result_columns();
-void add_result(Table& table, const std::string& name, int label, const SegmentReport& report,
-                const std::optional<IntensityStatistics>& intensity);
+/// @param unit  of lengths, which columns name in brackets: "volume (mm^3)"; empty: not known
+[[nodiscard]] std::vector<std::string> result_columns(const std::string& unit);
+void add_result(Table& table, const std::string& name, int label, const SegmentResult& result,
+                const std::optional<IntensityStatistics>& intensity, const RunContext& run);
 
 /// Of an image in chunks none where more voxels than `most_read` would have to be read for it.
 [[nodiscard]] std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface,

@@ -97,7 +97,10 @@ void summarise(const StructuresOutput& output, const SegmentJob& job, Session& s
 StructuresOutput finish(const SegmentJob& job, StructuresResult result, const std::optional<Image>& image,
                         Session& session, const RunContext& run) {
     StructuresOutput output;
-    if (image) output.geometry = image->geometry();
+    if (image) {
+        output.geometry = image->geometry();
+        output.image_path = image->path();
+    }
     if (image && !job.page_path.empty()) {
         output.image = *image;
         output.is_anatomical = is_anatomical(image->path(), job.image.options, run);
@@ -147,9 +150,11 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
             throw;
         }
     };
-    const auto output = std::make_shared<StructuresOutput>(
+    const auto found = std::make_shared<StructuresOutput>(
         finish(job, segment_structures(image, std::move(structures), options, session.run(), solve_or_keep), image,
                session, session.run()));
+    found->frame = reading.frame;
+    const std::shared_ptr<const StructuresOutput> output = found;
     session.report().update(to_json(*output), true);
     if (image) SegmentJob::tell_chunks(*image, session);
     hand_over(job, output, {}, session,
@@ -158,9 +163,9 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     add_to_scene(scene, job, *output, {});
     write_scene(scene, job, session);
     outputs.add(job.table_path, [output, &session](const std::string& file) {
-        Table table(result_columns());
+        Table table(result_columns(output->geometry.unit));
         for (const StructureOutput& s : output->structures)
-            add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report, s.intensity);
+            add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result, s.intensity, session.run());
         write_text(file, table.text(), session.run());
     });
 }

@@ -45,13 +45,15 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
 class FrameRunner {
 public:
     FrameRunner(const SegmentJob& job, Session& session)
-        : job_(job), session_(session), structures_(structures_of(job)), table_(columns()) {}
+        : job_(job), session_(session), structures_(structures_of(job)), rows_({}) {}
 
     void run() {
         if (!job_.painted.paths.empty() || !job_.guess.paths.empty())
             throw UsageError("--painted, --guess: expected one image, got a time-lapse");
-        if (!job_.structure_column.empty())
-            throw UsageError("--structure-column: expected one image, got a time-lapse");
+        if (names_structures(job_))
+            throw UsageError(
+                "--structure-column, structure sets of DICOM: expected one image, got a time-lapse, whose marks have a "
+                "file for each structure");
         frames_ = frames_of(job_);
         check();
         add_starts(job_, structures_, session_.run());
@@ -60,9 +62,9 @@ public:
             go(frame);
         }
         session_.report()["frames"] = reports_;
-        session_.outputs().add(job_.table_path, [text = table_.text(), &run = session_.run()](const std::string& path) {
-            write_text(path, text, run);
-        });
+        Table table(columns());
+        session_.outputs().add(job_.table_path, [text = table.add_rows(rows_).text(), &run = session_.run()](
+                                                    const std::string& path) { write_text(path, text, run); });
         write_scene(scene_, job_, session_);
         if (failed_ == int(frames_.size()))
             throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);
@@ -73,8 +75,8 @@ public:
     }
 
 private:
-    static std::vector<std::string> columns() {
-        std::vector<std::string> names = result_columns();
+    [[nodiscard]] std::vector<std::string> columns() const {
+        std::vector<std::string> names = result_columns(unit_);
         names.insert(names.begin(), "frame");
         names.emplace_back("status");
         return names;
@@ -145,18 +147,18 @@ private:
             report.update(to_json(*output));
             for (std::size_t n = 0; n < output->structures.size(); ++n) {
                 const StructureOutput& s = output->structures[n];
-                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report,
-                           s.intensity);
-                table_ << "ok";
+                add_result(rows_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result,
+                           s.intensity, session_.run());
+                rows_ << "ok";
             }
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) throw;
             fail(who, error);
             const std::string status = "failed: " + with_flags(error.what());
             report["status"] = status;
-            table_.row() << frame.number;
-            for (std::size_t n = 0; n < result_columns().size(); ++n) table_ << "";
-            table_ << status;
+            rows_.row() << frame.number;
+            for (std::size_t n = 0; n < result_columns({}).size(); ++n) rows_ << "";
+            rows_ << status;
         }
         report["wall_seconds"] = watch.seconds();
         reports_.push_back(report);
@@ -174,6 +176,8 @@ private:
         StructuresOutput output =
             finish(job_, lapse_.segment(image, std::move(marks), options, run), image, session_, run);
         SegmentJob::tell_chunks(image, session_);
+        unit_ = image.geometry().unit;
+        output.frame = frame.options.frame;
         return output;
     }
 
@@ -192,7 +196,8 @@ private:
     TimeLapse lapse_;
     Json reports_ = Json::array();
     UsdScene scene_;
-    Table table_;
+    Table rows_;
+    std::string unit_;  ///< of the frames
     int failed_ = 0;
     Errc first_error_ = Errc::InvalidInput;
     std::string first_message_;

@@ -70,9 +70,9 @@ Export make_export(const std::string& format, const StudyState& wanted,
     if (all.structures.empty()) throw Error(Errc::InvalidInput, "the structure has no marks yet");
     const std::string ending = format.substr(format.find('.'));
     if (format == "table.csv") {
-        Table table(result_columns());
+        Table table(result_columns(image.geometry().unit));
         for (const StructureResult& s : all.structures)
-            add_result(table.row(), s.name, s.label, s.result.report, intensity(s));
+            add_result(table.row(), s.name, s.label, s.result, intensity(s), run);
         return {file_name(whole, ending), table.text()};
     }
     return made_of_file(file_name(whole, ending), scratch, run, [&](const std::string& path) {

@@ -15,12 +15,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Objects without an image of their own, which lie beside series: structure sets, plans and treatments, registrations
+/// and segmentations, reports, presentations, documents (PS3.4 B.5).
+bool holds_no_image(const std::string& path) {
+    const std::string own = dicom_class(path);
+    constexpr std::string_view kClasses = "1.2.840.10008.5.1.4.1.1.";
+    if (!own.starts_with(kClasses)) return false;
+    const std::string kind = own.substr(kClasses.size());
+    if (kind == "481.1" || kind == "481.2") return false;  // RT images and doses
+    for (const char* group : {"481.", "66.", "88.", "11.", "104."})
+        if (kind.starts_with(group)) return true;
+    return false;
+}
+
+std::string kind_of_object(const std::string& sop_class) {
+    if (sop_class == kSegmentationStorage)
+        return "a segmentation (SEG), which is written and not read; export it as .nrrd or .nii.gz from the program "
+               "that made it";
+    if (sop_class == kRtStructureSet) return "an RT structure set, whose contours are marks: `contours`";
+    return "SOP class " + sop_class;
+}
+
 /// All usable files of a folder, by series.
 std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folder, const RunContext& run) {
     std::error_code status;
     std::vector<std::string> paths;
     for (const auto& entry : fs::directory_iterator(folder, status))
-        if (entry.is_regular_file(status) && is_dicom(entry.path().string()) && entry.path().filename() != "DICOMDIR")
+        if (entry.is_regular_file(status) && is_dicom(entry.path().string()) && entry.path().filename() != "DICOMDIR" &&
+            !holds_no_image(entry.path().string()))
             paths.push_back(entry.path().string());
     std::sort(paths.begin(), paths.end());
     std::map<std::string, std::vector<DicomSlice>> series;
@@ -190,14 +212,17 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int> frame, const RunContext& run) {
+std::vector<DicomSlice> read_dicom_series(const std::string& path, const RunContext& run) {
     if (!fs::is_directory(path)) {
+        if (holds_no_image(path))
+            throw read_error(Errc::Unsupported, path,
+                             "expected a DICOM image, got an object without one: " + kind_of_object(dicom_class(path)));
         const auto read = read_dicom_slices({path}, run).front();
         if (const Error* error = std::get_if<Error>(&read)) throw Error(*error);
         const auto& own = std::get<std::vector<DicomSlice>>(read);
-        if (own.size() > 1) return std::make_unique<DicomSeries>(path, own, frame);
+        if (own.size() > 1) return own;
         const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
-        return std::make_unique<DicomSeries>(path, list_series(folder, run)[own.front().series], frame);
+        return list_series(folder, run)[own.front().series];
     }
     const auto series = list_series(path, run);
     if (series.empty())
@@ -214,7 +239,11 @@ std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int
                          "expected one DICOM series, got " + std::to_string(series.size()) + ": " + list +
                              "; give the file of the one that is wanted");
     }
-    return std::make_unique<DicomSeries>(path, series.begin()->second, frame);
+    return series.begin()->second;
+}
+
+std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int> frame, const RunContext& run) {
+    return std::make_unique<DicomSeries>(path, read_dicom_series(path, run), frame);
 }
 
 }  // namespace covol::detail

@@ -14,6 +14,8 @@
 #include <string>
 #include <string_view>
 
+#include "io/dicom/dicom_elements.h"
+
 namespace covol::detail {
 namespace {
 
@@ -25,7 +27,6 @@ constexpr int kDeepest = 16;
 
 constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
                                        "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
-constexpr std::string_view kLong[] = {"OB", "OD", "OF", "OL", "OW", "SQ", "UC", "UN", "UR", "UT"};
 
 constexpr std::uint64_t kLongestValue = 1 << 12;
 constexpr std::uint64_t kPreamble = 128;
@@ -155,7 +156,7 @@ private:
         at_ += 2;
         e.vr.assign(vr, 2);
         std::uint32_t reserved = 0;
-        if (is_one_of(e.vr, kLong)) return read_number(2, reserved) && reserved == 0 && read_number(4, e.length);
+        if (is_long_vr(e.vr)) return read_number(2, reserved) && reserved == 0 && read_number(4, e.length);
         return is_one_of(e.vr, kShort) && read_number(2, e.length);
     }
     /// The numbers of the image pixel module fit each other.
@@ -309,6 +310,23 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
     return walker.header();
 }
 
+std::string dicom_class(const std::string& path) {
+    constexpr std::size_t kMeta = 1024;  // the class stands at its beginning
+    std::string begin(kMeta, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(begin.data(), std::streamsize(begin.size()));
+    begin.resize(static_cast<std::size_t>(file.gcount()));
+    constexpr std::string_view kMediaClass("\x02\x00\x02\x00UI", 6);
+    const std::size_t at = begin.find(kMediaClass, kPreamble + 4);
+    if (begin.compare(std::min<std::size_t>(kPreamble, begin.size()), 4, "DICM") != 0 || at == std::string::npos ||
+        at + 8 > begin.size())
+        return {};
+    const auto length = std::size_t(static_cast<unsigned char>(begin[at + 6]));
+    std::string uid = begin.substr(at + 8, length);
+    if (!uid.empty() && uid.back() == '\0') uid.pop_back();
+    return uid;
+}
+
 bool is_dicom(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     std::array<char, kPreamble + 4> begin{};
@@ -323,7 +341,7 @@ bool is_dicom(const std::string& path) {
     const unsigned element = big ? byte(2) * 256U + byte(3) : byte(3) * 256U + byte(2);
     if ((group != 2 && group != 8) || other != 0 || element > 0x60) return false;
     const std::string_view vr(begin.data() + 4, 2);
-    if (is_one_of(vr, kShort) || is_one_of(vr, kLong)) return true;
+    if (is_one_of(vr, kShort) || is_long_vr(vr)) return true;
     return !big && byte(4) < 128 && byte(5) == 0 && byte(6) == 0 && byte(7) == 0;
 }
 

@@ -47,6 +47,13 @@ private:
 /// preamble and the meta group may be missing: the first element then says how the others are written.
 std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
+/// What kind of object a file says to hold in its meta group (a SOP class, PS3.6 A); empty where it says nothing.
+std::string dicom_class(const std::string& path);
+
+/// RT structure sets: contours, no pixels.
+inline constexpr const char* kRtStructureSet = "1.2.840.10008.5.1.4.1.1.481.3";
+inline constexpr const char* kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
+
 /// Whether the file has DICOM's mark behind a preamble, or begins with an element of the groups 0002 or 0008.
 bool is_dicom(const std::string& path);
 

@@ -14,6 +14,7 @@
 namespace covol::detail {
 namespace {
 
+constexpr std::uint32_t kSopClass = 0x00080016, kSopInstance = 0x00080018;
 constexpr std::uint32_t kModality = 0x00080060, kSeriesDescription = 0x0008103E, kThickness = 0x00180050;
 constexpr std::uint32_t kEchoTime = 0x00180081, kEchoNumbers = 0x00180086, kBetweenSlices = 0x00180088;
 constexpr std::uint32_t kTriggerTime = 0x00181060, kImagerSpacing = 0x00181164, kRegionUnitsX = 0x00186024;
@@ -187,6 +188,8 @@ std::vector<DicomSlice> slices_of(const std::string& path, const DicomHeader& he
         DicomSlice slice;
         slice.path = path;
         slice.series = header.text(kSeriesUid);
+        slice.sop_class = header.text(kSopClass);
+        slice.sop_instance = header.text(kSopInstance);
         slice.description = header.text(kModality) + " " + header.text(kSeriesDescription);
         slice.frame = n;
         slice.file_frames = frames;

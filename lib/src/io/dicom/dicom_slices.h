@@ -13,10 +13,11 @@ namespace covol::detail {
 /// One plane of a DICOM file: the file's only one, or one of its frames.
 struct DicomSlice {
     std::string path, series, description;
-    std::size_t frame = 0;         ///< in the file
-    std::size_t file_frames = 1;   ///< how many the file has
-    Index3 size{};                 ///< columns, rows, 1
-    std::array<double, 2> step{};  ///< along columns and rows, in mm; 0: the file does not say
+    std::string sop_class, sop_instance;  ///< what others refer to it by
+    std::size_t frame = 0;                ///< in the file
+    std::size_t file_frames = 1;          ///< how many the file has
+    Index3 size{};                        ///< columns, rows, 1
+    std::array<double, 2> step{};         ///< along columns and rows, in mm; 0: the file does not say
     Vec3 origin{};
     Matrix3 direction{};            ///< the third column is the plane's normal
     bool has_origin = false;        ///< the file says where this plane lies

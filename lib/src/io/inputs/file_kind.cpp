@@ -10,6 +10,7 @@
 #include "covol/mesh_io.h"
 #include "covol/points.h"
 #include "covol/vdb_io.h"
+#include "io/dicom/dicom_header.h"
 
 namespace covol {
 namespace {
@@ -55,6 +56,7 @@ FileKind kind_of_file(const std::string& path) {
         throw Error(Errc::Unsupported, path + ": NanoVDB files are for viewers and are not read; keep the .vdb");
     if (is_one_of(end, kPointEndings) || end == ".laz")
         return FileKind::Points;  // that LAZ is not read, its reader says
+    if (end == ".dcm" && detail::dicom_class(path) == detail::kRtStructureSet) return FileKind::Points;
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;
     return FileKind::Image;
@@ -89,7 +91,9 @@ std::string long_ending(const std::string& path) {
     return std::filesystem::path(name).extension().string();
 }
 
-bool is_segmentation_name(const std::string& path) { return long_ending(path) == ".seg.nrrd"; }
+bool is_segmentation_name(const std::string& path) {
+    return long_ending(path) == ".seg.nrrd" || long_ending(path) == ".dcm";
+}
 
 const char* to_string(FileKind kind) {
     switch (kind) {

@@ -74,6 +74,7 @@ const std::vector<Format>& formats() {
                                           {".json", parse_markups},
                                           {".fcsv", parse_fcsv},
                                           {".csl", parse_sections},
+                                          {".dcm", parse_rt_structures},
                                           {".landmarks", of_one<parse_landmarks>},
                                           {".lmk", of_one<parse_landmarks>},
                                           {".annot", of_one<parse_annotations>},
@@ -144,7 +145,8 @@ PointTable read_point_table(const std::string& path, const std::string& structur
     if (!structures_by.empty() && table.structure.size() != table.points.size())
         throw Error(Errc::InvalidInput,
                     path + ": `structure_column`: expected a table with a column " + quote(structures_by) +
-                        ", Fiji's selections with group or counter, or 3D Slicer's markups with label or node; a " +
+                        ", Fiji's selections with group or counter, 3D Slicer's markups with label or node, or a "
+                        "DICOM RT structure set with roi; a " +
                         extension + " file has no '" + structures_by + "'",
                     "structure_column");
     return table;

@@ -37,6 +37,12 @@ PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// @param structures_by  "label": each label is a structure; empty: there may be only one
 PointTable parse_sections(const std::string& path, const std::string& text, const std::string& structures_by = {});
 
+/// DICOM RT structure sets: contours of ROIs in mm, LPS. Holes that keyholes join to their outline are lines of their
+/// own.
+/// @param structures_by  "roi": each ROI is a structure; empty: there may be only one
+PointTable parse_rt_structures(const std::string& path, const std::string& bytes,
+                               const std::string& structures_by = {});
+
 /// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners are at integers.
 PointTable parse_annotations(const std::string& path, const std::string& text);
 

@@ -87,8 +87,12 @@ std::vector<detail::PointTable> parts_of(detail::PointTable table) {
     return parts;
 }
 
+[[noreturn]] void refuse_nothing(const std::string& path) {
+    throw Error(Errc::InvalidInput, path + ": expected at least one point, got none");
+}
+
 PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
-    if (table.points.empty()) throw Error(Errc::InvalidInput, path + ": expected at least one point, got none");
+    if (table.points.empty()) refuse_nothing(path);
     PointCloud cloud;
     cloud.source = path;
     cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
@@ -109,9 +113,12 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     // Who gives a scale knows better than the file.
     const bool has_lengths = cloud.space != PointSpace::Index && !table.unit.empty();
-    if (has_lengths)
-        cloud.rule += options.scale == 1 ? detail::unit_note(table.unit)
-                                         : ", times a scale that is given, not in " + table.unit + " as the file says";
+    if (has_lengths && options.scale == 1) {
+        cloud.unit = table.unit;
+        cloud.rule += "; lengths in " + table.unit;
+    } else if (has_lengths) {
+        cloud.rule += ", times a scale that is given, not in " + table.unit + " as the file says";
+    }
     return cloud;
 }
 
@@ -152,6 +159,7 @@ std::vector<StructurePoints> read_structures_of_points(const std::string& path, 
                                                        const ReadPointsOptions& options) {
     require_valid(options, "read_points");
     detail::PointTable table = detail::read_point_table(path, by);
+    if (table.points.empty()) refuse_nothing(path);
     const std::vector<std::string> names = table.structures;
     std::vector<detail::PointTable> parts = parts_of(std::move(table));
     std::vector<StructurePoints> structures;

@@ -12,6 +12,7 @@
 #include "covol/image_stream.h"
 #include "files/atomic.h"
 #include "io/chunked/zarr.h"
+#include "io/dicom/dicom_segmentation.h"
 #include "io/pixels/raw_image.h"
 #include "io/write/image_writers.h"
 
@@ -20,7 +21,7 @@ namespace {
 
 using detail::pixel_bytes;
 
-constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif, .ome.tif, .npy or .zarr";
+constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif, .ome.tif, .npy, .zarr or .dcm";
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
@@ -135,6 +136,8 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
             detail::write_atomically(path, [&](const std::string& temporary) {
                 if (extension == ".tif" || extension == ".tiff")
                     detail::write_tiff(temporary, source, is_ome_tiff(path), run);
+                else if (extension == ".dcm")
+                    detail::write_dicom_segmentation(temporary, source, options, run);
                 else
                     detail::write_raw(temporary, extension, source, options, run);
             });
@@ -165,7 +168,7 @@ void write_image(const std::string& path, const ImageGeometry& geometry, const f
 
 void check_image_extension(const std::string& path) {
     const std::string extension = detail::extension(detail::without_end_slash(path));
-    for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".npy", ".zarr"})
+    for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".npy", ".zarr", ".dcm"})
         if (extension == known) return;
     throw Error(Errc::InvalidOptions, path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");
 }

@@ -115,6 +115,22 @@ TEST_CASE("column names that mean voxels are understood as such") {
     CHECK(cloud.space == PointSpace::Index);
 }
 
+TEST_CASE("the unit of a table's lengths is the cloud's, unless a scale is given") {
+    const Scratch scratch;
+    const std::string table = scratch.write("lengths.csv", "x (um),y (um),z (um)\n1,2,3\n");
+    const PointCloud cloud = read_points(table);
+    CHECK(cloud.unit == "um");
+    CHECK(cloud.rule.ends_with("lengths in um"));
+    ImageGeometry in_mm;
+    in_mm.unit = "mm";
+    CHECK(to_world(cloud, in_mm)[0][1] == Approx(0.002));
+    ReadPointsOptions given;
+    given.scale = 10;
+    CHECK(read_points(table, given).unit.empty());
+    CHECK(to_world(read_points(table, given), in_mm)[0][1] == Approx(20));
+    CHECK(read_points(scratch.write("voxels.csv", "x_px,y_px,slice\n1,2,3\n")).unit.empty());
+}
+
 TEST_CASE("a column of kinds says which marks lie inside and outside") {
     const Scratch scratch;
     const std::vector<MarkKind> kinds{MarkKind::Surface, MarkKind::Inside, MarkKind::Outside};

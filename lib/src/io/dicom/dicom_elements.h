@@ -1,0 +1,61 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "covol/fwd.h"
+
+// What DICOM files are written from: PS3.5 7.1, 7.5, and PS3.10 7.1.
+namespace covol::detail {
+
+/// The elements of a file, or of an item of a sequence, by their tags (group << 16 | element).
+class DicomItem {
+public:
+    /// Replaces what is there. @param vr  two letters @param bytes  as they stand in the file; padded here
+    void put(std::uint32_t tag, const char* vr, std::string bytes);
+    /// Numbers of 16 bits.
+    void put_shorts(std::uint32_t tag, const std::vector<std::uint16_t>& values);
+    /// Numbers of 32 bits (VR UL).
+    void put_longs(std::uint32_t tag, const std::vector<std::uint32_t>& values);
+    /// A tag as a value.
+    void put_tag(std::uint32_t tag, std::uint32_t value);
+    /// Numbers as decimal text.
+    void put_decimals(std::uint32_t tag, const std::vector<double>& values);
+    void put_items(std::uint32_t tag, const std::vector<DicomItem>& items);
+    /// Those of another one; they replace what is there.
+    void add(const DicomItem& other);
+
+    /// The elements one after another, little-endian. @param with_vr  explicit VR, else implicit
+    [[nodiscard]] std::string encoded(bool with_vr) const;
+
+private:
+    struct Element {
+        std::string vr, bytes;
+        std::vector<DicomItem> items;  ///< of a sequence
+    };
+    std::map<std::uint32_t, Element> elements_;
+};
+
+/// Whether an explicit VR has a length of 32 bits behind two empty bytes.
+[[nodiscard]] bool is_long_vr(std::string_view vr);
+
+/// One code of a coding scheme, as an item.
+[[nodiscard]] DicomItem dicom_code(const char* value, const char* scheme, const char* meaning);
+
+/// Bytes of Latin-1 (ISO 8859-1), each one letter.
+[[nodiscard]] std::string latin_to_utf8(std::string_view text);
+
+/// A number of at most 16 characters, as VR DS has them.
+[[nodiscard]] std::string decimal_string(double value);
+
+/// A UID of what a text says: the same for the same text. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
+[[nodiscard]] std::string dicom_uid(const std::string& text);
+
+/// Writes a file of one instance, alone in its series; both get UIDs of what the file holds.
+/// @param with_vr  explicit VR, else implicit, in which texts may be longer than 64 KiB
+/// @throws Error Io, Unsupported where elements do not fit into 32 bits.
+void write_dicom_instance(const std::string& path, DicomItem& file, bool with_vr, const std::string& sop_class);
+
+}  // namespace covol::detail
