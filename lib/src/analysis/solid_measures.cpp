@@ -18,7 +18,7 @@ namespace {
 using openvdb::Coord, openvdb::Vec3d;
 
 /// What is inside of some voxels, in voxels of the grid.
-struct Part {
+struct Moments {
     double volume = 0;
     Vec3d moment{0, 0, 0};
     Vec3d low{std::numeric_limits<double>::max()}, high{-std::numeric_limits<double>::max()};
@@ -31,7 +31,7 @@ struct Part {
         low = openvdb::math::minComponent(low, at);
         high = openvdb::math::maxComponent(high, at);
     }
-    void add(const Part& other) {
+    void add(const Moments& other) {
         volume += other.volume;
         moment += other.moment;
         low = openvdb::math::minComponent(low, other.low);
@@ -44,8 +44,8 @@ public:
     explicit LeafMeasure(const FloatGrid& surface)
         : accessor_(surface.getConstAccessor()), h_(surface.voxelSize()[0]) {}
 
-    [[nodiscard]] Part of(const FloatGrid::TreeType::LeafNodeType& leaf) const {
-        Part part;
+    [[nodiscard]] Moments of(const FloatGrid::TreeType::LeafNodeType& leaf) const {
+        Moments part;
         for (auto value = leaf.cbeginValueAll(); value; ++value) {
             const double d = *value / h_;
             const Coord at = value.getCoord();
@@ -72,14 +72,14 @@ private:
 }  // namespace
 
 SolidMeasures measure_solid(const FloatGrid& surface, const RunContext& run) {
-    Part all;
+    Moments all;
     with_threads(run, [&] {
         const openvdb::tree::LeafManager<const FloatGrid::TreeType> leaves(surface.tree());
-        std::vector<Part> parts(leaves.leafCount());
+        std::vector<Moments> parts(leaves.leafCount());
         tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t n) {
             if (!run.cancelled()) parts[n] = LeafMeasure(surface).of(leaves.leaf(n));
         });
-        for (const Part& part : parts) all.add(part);
+        for (const Moments& part : parts) all.add(part);
         // Tiles: boxes that are inside throughout.
         auto tile = surface.cbeginValueAll();
         tile.setMaxDepth(FloatGrid::ValueAllCIter::LEAF_DEPTH - 1);
