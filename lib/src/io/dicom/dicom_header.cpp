@@ -311,7 +311,9 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 }
 
 std::string dicom_class(const std::string& path) {
-    constexpr std::size_t kMeta = 1024;  // the class stands at its beginning
+    std::error_code status;
+    if (!std::filesystem::is_regular_file(path, status)) return {};  // a pipe waits for whoever writes to it
+    constexpr std::size_t kMeta = 1024;                              // the class stands at its beginning
     std::string begin(kMeta, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), std::streamsize(begin.size()));
