@@ -78,6 +78,8 @@ struct FlowHeuristics {
     double leaves_voxels = heuristic("flow.leaves_voxels", 0.25);
     /// [distances between marked slices] How far the image may move the body between contours in one pass.
     double contour_range = heuristic("flow.contour_range", 0.25);
+    /// [passes] Of asking the image between contours, each from the result of the one before.
+    int contour_passes = heuristic("flow.contour_passes", 3);
     /// [voxels] The same of a body that marks and image have shown together: it lies close to where it ends.
     double inferred_range = heuristic("flow.inferred_range", 1.5);
 };
