@@ -84,17 +84,22 @@ class Server:
         return [json.loads(line) for line in lines[1:]]
 
 
+def start_chromium(profile):
+    """The driver of a Chromium without a window. @param profile  a folder of its own"""
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in [*FLAGS, f"--user-data-dir={profile}"]:
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(options=options, service=Service(DRIVER))
+
+
 @unittest.skipUnless(webdriver and CHROMIUM and DRIVER, "SKIPPED: chromium, chromium-driver or python3-selenium is not installed")
 class PageCase(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.profile = tempfile.mkdtemp(prefix="covol-chromium-")
-        options = webdriver.ChromeOptions()
-        options.binary_location = CHROMIUM
-        for argument in [*FLAGS, f"--user-data-dir={cls.profile}"]:
-            options.add_argument(argument)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        cls.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+        cls.driver = start_chromium(cls.profile)
 
     @classmethod
     def tearDownClass(cls):

@@ -35,13 +35,9 @@ class Browser:
     """Chromium without a window."""
 
     def __enter__(self):
-        from mark_page_case import CHROMIUM, DRIVER, FLAGS, Service, webdriver
+        from mark_page_case import start_chromium
         self.profile = tempfile.mkdtemp(prefix="covol-chromium-")
-        options = webdriver.ChromeOptions()
-        options.binary_location = CHROMIUM
-        for argument in [*FLAGS, f"--user-data-dir={self.profile}"]:
-            options.add_argument(argument)
-        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.driver = start_chromium(self.profile)
         return self.driver
 
     def __exit__(self, *_):

@@ -6,7 +6,7 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "cli"))
-from mark_page_case import CHROMIUM, DRIVER, FLAGS, ActionChains, Service, WebDriverWait, webdriver  # noqa: E402
+from mark_page_case import CHROMIUM, DRIVER, ActionChains, WebDriverWait, start_chromium, webdriver  # noqa: E402
 
 
 class Program:
@@ -35,12 +35,8 @@ class Browser:
     def __init__(self):
         if not (webdriver and CHROMIUM and DRIVER):
             raise SystemExit("skipped: chromium, chromium-driver or python3-selenium is not installed")
-        options = webdriver.ChromeOptions()
-        options.binary_location = CHROMIUM
         self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        for argument in [*FLAGS, f"--user-data-dir={self.profile.name}"]:
-            options.add_argument(argument)
-        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.driver = start_chromium(self.profile.name)
 
     def open(self, url):
         self.driver.get(url)

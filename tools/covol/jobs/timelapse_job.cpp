@@ -145,12 +145,12 @@ private:
             add_to_scene(scene_, job_, *output, tag(frame));
             report["status"] = "ok";
             report.update(to_json(*output));
-            for (std::size_t n = 0; n < output->structures.size(); ++n) {
-                const StructureOutput& s = output->structures[n];
-                add_result(rows_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result,
-                           s.intensity, session_.run());
-                rows_ << "ok";
-            }
+            if (!job_.table_path.empty())
+                for (const StructureOutput& s : output->structures) {
+                    add_result(rows_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result,
+                               s.intensity, session_.run());
+                    rows_ << "ok";
+                }
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) throw;
             fail(who, error);
