@@ -30,13 +30,23 @@ constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longe
 class LowerPriority : public tbb::task_scheduler_observer {
 public:
     explicit LowerPriority(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
-    ~LowerPriority() override { observe(false); }
     void on_scheduler_entry(bool /*is_worker*/) override {
         constexpr int kNice = 5;  // a third of the time of others, where there is not enough for all
         static thread_local const int done = ::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);
         (void)done;
     }
 };
+
+/// The threads of all solvers of this process. It is never destroyed: an observer that ends while a thread is still
+/// leaving its arena is not freed by TBB.
+tbb::task_arena& low_priority_arena() {
+    struct Observed {
+        tbb::task_arena arena;
+        LowerPriority lower{arena};
+    };
+    static Observed& observed = *new Observed;
+    return observed.arena;
+}
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -128,8 +138,6 @@ struct StudySolver::State {
     }
 
     void work() {
-        tbb::task_arena arena;
-        const LowerPriority lower(arena);
         std::unique_lock lock(mutex);
         for (;;) {
             changed.wait(lock, [&] { return is_stopping || !waiting.empty(); });
@@ -141,7 +149,7 @@ struct StudySolver::State {
             cancel = false;
             const SegmentOptions how = options;
             lock.unlock();
-            const bool is_done = arena.execute([&] { return solve(job, how); });
+            const bool is_done = low_priority_arena().execute([&] { return solve(job, how); });
             lock.lock();
             running = 0;
             if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it made way for another one
