@@ -12,15 +12,19 @@ namespace covol {
 
 /// What becomes of a surface where no points hold it.
 enum class Holes {
+    Auto,   ///< Open if the points enclose nothing or hold less than half of the surface, else Close
     Close,  ///< it goes on smoothly
     Open,   ///< the mesh ends there; the level set stays closed
     Flat    ///< it is spanned by the flattest patch, in mesh and level set
 };
 template <>
-inline constexpr auto kWords<Holes> = std::array{"close", "open", "flat"};
+inline constexpr auto kWords<Holes> = std::array{"auto", "close", "open", "flat"};
+
+/// Whether a mesh is needed for it, and not a level set alone.
+[[nodiscard]] constexpr bool needs_mesh(Holes policy) { return policy == Holes::Open || policy == Holes::Flat; }
 
 struct HolesOptions {
-    Holes policy = Holes::Close;
+    Holes policy = Holes::Auto;
     /// world units, > 0: a hole is what lies farther from all points; automatic: choose_hole_distance()
     std::optional<double> distance;
 };
@@ -29,7 +33,7 @@ template <>
 inline constexpr auto kOptions<HolesOptions> = std::tuple{
     Option{"holes", &HolesOptions::policy, points_alone(Group::Clouds),
            "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the "
-           "flattest patch spans it, in both"},
+           "flattest patch spans it, in both; auto: it ends if the points enclose nothing, else it goes on"},
     Option{"hole_distance", &HolesOptions::distance, kPositiveLength, points_alone(Group::Clouds),
            "a hole is where the surface lies farther from all points",
            "3 spacings where they are sparse, at least 3vx"}};
@@ -43,7 +47,7 @@ struct BoundaryLoop {
 [[nodiscard]] COVOL_API std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh);
 
 struct HolesReport {
-    Holes policy = Holes::Close;
+    Holes policy = Holes::Close;  ///< what was done, never Auto
     double distance = 0;       ///< as used
     double share = 0;          ///< of the closed surface's area: what was trimmed, or made flat
     double closed_volume = 0;  ///< of segment() alone: of the level set, where the mesh is open and has none; else 0

@@ -49,7 +49,7 @@ struct Orientation {
     std::vector<Vec3> normals;  ///< unit, outward, of the points as they were given; 0 where nothing tells
     std::vector<double> areas;  ///< of the surface that each point stands for, world units squared, from the density
     std::shared_ptr<const Indicator> indicator;  ///< of these
-    std::shared_ptr<const Indicator> screened;   ///< drawn to 1/2 at the points as well; null: quadrics tell more
+    std::shared_ptr<const Indicator> screened;   ///< drawn to 1/2 at the points as well; null: not needed
     double turned = 0;    ///< share of the points whose normal the last iteration turned by more than 90 degrees
     double off_half = 0;  ///< mean of the indicator over the points, less 1/2, absolute
     int iterations = 0;
@@ -100,6 +100,7 @@ struct CloudOrientation {
     std::size_t stray = 0;     ///< points far from all others that lie on no sheet, left out
     std::size_t enclosed = 0;  ///< points that given normals put within the solid, left out
     bool encloses = true;      ///< else the normals are those of what was seen from outside
+    bool has_quadrics = true;  ///< else the surface is that of the screened indicator alone
     bool fills = false;        ///< the points fill a solid: the indicator is their density, half at its border
     HintsReport hints;
 };

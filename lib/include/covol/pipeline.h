@@ -158,7 +158,7 @@ inline constexpr auto kOptions<SegmentOptions> = std::tuple{
                          }},
     Rule<SegmentOptions>{"without_mesh", "false where holes are treated, pieces dropped or another level is wanted",
                          [](const SegmentOptions& o) {
-                             return !o.without_mesh || (o.holes.policy == Holes::Close &&
+                             return !o.without_mesh || (!needs_mesh(o.holes.policy) &&
                                                         o.extract.min_component_volume == 0 && o.extract.isovalue == 0);
                          }}};
 

@@ -178,8 +178,7 @@ Resolved resolve(const Problem& problem) {
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
         // The indicator is all that there is to see of a cloud that encloses nothing, or fills a solid.
-        const auto& seen = c.cloud->orientation.screened;
-        const double h = seen ? kAutomatic.view_voxel * seen->cell() : 0;
+        const double h = c.cloud->has_quadrics ? 0 : kAutomatic.view_voxel * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
             remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);

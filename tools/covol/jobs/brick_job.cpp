@@ -147,7 +147,7 @@ bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& s
     };
     if (memory_of_joined(voxels) > limit)
         refuse(memory_of_joined(voxels), "the joined level set (covol brick can join it on another machine)");
-    if (job.evidence.wanted() || job.given.options.holes.policy != Holes::Close || job.given.has("min_component"))
+    if (job.evidence.wanted() || needs_mesh(job.given.options.holes.policy) || job.given.has("min_component"))
         refuse(memory_of_joined_mesh(voxels),
                "the whole mesh, which --evidence, --suggest, --holes and --min-component need,");
     if (!job.mesh_path.empty() && !can_stream_mesh(job.mesh_path))

@@ -47,7 +47,7 @@ SegmentOptions SegmentJob::resolve(double h) const {
 
 bool SegmentJob::needs_mesh() const {
     return !mesh_path.empty() || !page_path.empty() || !scene_path.empty() || evidence.wanted() ||
-           given.options.holes.policy != Holes::Close || given.has("min_component");
+           covol::needs_mesh(given.options.holes.policy) || given.has("min_component");
 }
 
 void SegmentJob::check_options() const {

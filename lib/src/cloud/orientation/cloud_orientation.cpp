@@ -8,6 +8,7 @@
 #include "cloud/orientation/given_sides.h"
 #include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/judge.h"
+#include "cloud/orientation/propagation.h"
 #include "cloud/orientation/stray.h"
 #include "cloud/orientation/views.h"
 #include "covol/orientation.h"
@@ -45,6 +46,26 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
         o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
+/// Of sheets, as of a scan of one side or from the air: neighbours agree on a side all over, which is the one that most
+/// points are seen from. @return whether they do, and the surface passes no more points
+bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
+    PointHints hints;
+    hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
+                                              cloud::hints_by_views(cloud.points, cloud.scale).to_sensor);
+    cloud::GivenSides sheets =
+        cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
+    if (sheets.report.used) cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
+        fprintf(stderr, "PROP used %d torn %g passed %g own %g foreseen %g\n", int(sheets.report.used), sheets.torn,
+                sheets.report.used ? share_passed(*sheets.orientation.screened, cloud.points, reach) : -1,
+                share_passed(*cloud.orientation.indicator, cloud.points, reach), sheets.report.foreseen);
+    if (!sheets.report.used || sheets.torn > kOrientation.few_torn ||
+        share_passed(*sheets.orientation.screened, cloud.points, reach) >
+            share_passed(*cloud.orientation.indicator, cloud.points, reach))
+        return false;
+    cloud.orientation = std::move(sheets.orientation);
+    return cloud.encloses = true;
+}
+
 /// Of points that enclose nothing as they are oriented.
 /// @param reach  distance at which a surface passes a point by
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
@@ -66,7 +87,9 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
     // Normals waver in the folds of a closed surface, too; but there views pass by most points.
     cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
                      passed < kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
-    if (!cloud.encloses) cloud.orientation = std::move(seen);
+    if (cloud.encloses) return;
+    cloud.orientation = std::move(seen);
+    cloud.has_quadrics = false;
 }
 
 /// Points that given normals put within the solid are on no surface. @return whether there were any
@@ -95,6 +118,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
     if (!report.used && cloud::fill_a_solid(cloud.points, cloud.scale.nearest, run)) {
         cloud.orientation = cloud::orient_filled(cloud.points, cloud.scale);
         cloud.fills = true;
+        cloud.has_quadrics = false;
         return;
     }
     const bool is_certain = report.used && given.torn < kOrientation.few_torn && is_settled(given.orientation);
@@ -111,8 +135,9 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
-        if (!report.used && !cloud.encloses) choose_by_views(cloud, reach, run);
-        if (!report.used && cloud.encloses) refine(cloud, run);
+        if (!report.used && !cloud.encloses && !choose_by_propagation(cloud, reach, run))
+            choose_by_views(cloud, reach, run);
+        if (!report.used && cloud.encloses && !cloud.orientation.screened) refine(cloud, run);
     }
     if (report.used) {
         cloud.orientation = std::move(given.orientation);

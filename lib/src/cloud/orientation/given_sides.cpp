@@ -2,7 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
+#include "cloud/orientation/propagation.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
 #include "points/heuristics.h"
@@ -29,21 +29,11 @@ std::size_t count_told(const std::vector<Vec3>& directions) {
 }
 
 /// Of local planes, on the side of `towards`.
-std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
-                                const CloudScale& scale) {
-    const double radius = kGivenSides.plane_noises * scale.noise / scale.spacing;  // spacings
-    const auto count =
-        std::size_t(std::clamp(M_PI * radius * radius, kGivenSides.least_neighbours, kGivenSides.most_neighbours));
-    const PointCells cells(points, kNear.first_radius * scale.spacing);
-    std::vector<Vec3> normals(points.size());
-    for_nearest(cells, scale.spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        const auto [sum, squares] = moments_of(cells, points[point], near);
-        const double all = double(near.size()) + 1;
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / all - sum * sum.transpose() / (all * all));
-        const Eigen::Vector3d thin = axes.eigenvectors().col(0);
-        const Vec3 normal{thin[0], thin[1], thin[2]};
-        normals[point] = times(dot(normal, towards[point]) < 0 ? -1 : towards[point] == Vec3{0, 0, 0} ? 0 : 1, normal);
-    });
+std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
+                                  const CloudScale& scale) {
+    std::vector<Vec3> normals = plane_normals(points, scale);
+    for (std::size_t n = 0; n < normals.size(); ++n)
+        normals[n] = times(dot(normals[n], towards[n]) < 0 ? -1 : towards[n] == Vec3{0, 0, 0} ? 0 : 1, normals[n]);
     return normals;
 }
 
@@ -220,7 +210,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
         if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
         return result;
     }
-    result.report.from_sensor = use(points, plane_normals(points, hints.to_sensor, scale), scale, cell, result, run);
+    result.report.from_sensor = use(points, normals_towards(points, hints.to_sensor, scale), scale, cell, result, run);
     return result;
 }
 

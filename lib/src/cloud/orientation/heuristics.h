@@ -64,8 +64,6 @@ COVOL_HEURISTICS FilledHeuristics kFilled{};
 struct OrientationHeuristics {
     /// [cells] Of the grid of the density whose gradient is the first guess.
     double first_cells = heuristic("orientation.first_cells", 3.2);
-    /// [cells] The same of a further try, if normals go on turning: tunnels and layers close to each other ask for it.
-    double finer_first_cells = heuristic("orientation.finer_first_cells", 2.25);
     /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of
     /// these.
     double enclosed = heuristic("orientation.enclosed", 0.9);
@@ -84,6 +82,8 @@ struct OrientationHeuristics {
     double off_weight = heuristic("orientation.off_weight", 2);
     /// [cells] Of the lattice on which tries are compared, in those of the first: too fine for walls to run together.
     double strain_cells = heuristic("orientation.strain_cells", 0.67);
+    /// [cells] Of the last try, in those of the first: noise makes the first cells wider than thin walls.
+    double thin_cells = heuristic("orientation.thin_cells", 0.44);
     /// [cells] Of the first lattice, above which the one that was chosen is too coarse for what its normals tell.
     double coarse = heuristic("orientation.coarse", 1.2);
     /// [spacings] Noise below which a surface may be as fine as the tries were compared.
@@ -158,14 +158,21 @@ struct GivenSidesHeuristics {
     double flat = heuristic("given_sides.flat", 0.3);
     /// [cosine] Between normals of one sheet that is torn there.
     double opposite = heuristic("given_sides.opposite", -0.5);
-    /// [noises] Radius of the neighbourhood that a sensor's plane is fitted to.
-    double plane_noises = heuristic("given_sides.plane_noises", 4);
-    /// [points] Fewest in it.
-    double least_neighbours = heuristic("given_sides.least_neighbours", 12);
-    /// [points] Most in it.
-    double most_neighbours = heuristic("given_sides.most_neighbours", 100);
 };
 COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
+
+/// Normals of local planes, and their signs from neighbour to neighbour: propagation.cpp.
+struct PropagationHeuristics {
+    /// [noises] Radius of the neighbourhood that a plane is fitted to.
+    double plane_noises = heuristic("propagation.plane_noises", 4);
+    /// [points] Fewest in it.
+    double fewest = heuristic("propagation.fewest", 12);
+    /// [points] Most in it.
+    double most = heuristic("propagation.most", 100);
+    /// [points] Neighbours that a point may take its sign from.
+    std::size_t neighbours = heuristic("propagation.neighbours", 10);
+};
+COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 
 /// Clouds of one side, by where each point can be seen from: views.cpp.
 struct ViewsHeuristics {

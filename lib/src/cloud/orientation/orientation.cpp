@@ -14,6 +14,7 @@
 #include "cloud/indicator/torn.h"
 #include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/judge.h"
+#include "cloud/orientation/propagation.h"
 #include "covol/error.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
@@ -29,16 +30,10 @@ using cloud::Stage;
 
 /// What is tried until few normals turn.
 struct Try {
-    double cell;      // of those
-    double enclosed;  // on the first lattice
-    double first_guess = kOrientation.first_cells;
+    double cell;         // of those
+    double enclosed;     // on the first lattice
+    bool is_propagated;  // the first guess; else points point away from where the others are
 };
-const Try kTries[] = {{1, kOrientation.enclosed},
-                      {1, kOrientation.surely_enclosed},
-                      {1, kOrientation.enclosed, kOrientation.finer_first_cells},
-                      {0.67, kOrientation.surely_enclosed},
-                      {1.5, kOrientation.surely_enclosed, kOrientation.finer_first_cells},
-                      {0.44, kOrientation.enclosed}};
 
 /// Every few points of those that lie together, and what each stands for.
 struct Sample {
@@ -101,21 +96,30 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
         const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
         std::optional<cloud::Consistency> consistency;
-        std::vector<std::tuple<double, double, double>> lattices;
+        std::vector<std::tuple<double, double, bool>> lattices;
         std::vector<Tried> tried;
-        std::vector<Try> tries(std::begin(kTries), std::end(kTries));
-        if (first > kOrientation.coarse * finest)
-            tries.insert(tries.begin() + 3,
-                         Try{finest / first, kOrientation.surely_enclosed, kOrientation.finer_first_cells});
+        std::vector<Try> tries{{1, kOrientation.enclosed, true},
+                               {1, kOrientation.surely_enclosed, false},
+                               {kOrientation.strain_cells, kOrientation.surely_enclosed, true},
+                               {kOrientation.thin_cells, kOrientation.enclosed, false}};
+        if (first > kOrientation.coarse * finest) tries.push_back({finest / first, kOrientation.surely_enclosed, true});
+        const auto judged = [&](Orientation orientation, std::vector<Vec3> normals) {
+            std::vector<double> off = consistency->off(normals);
+            const double mean_off = std::accumulate(off.begin(), off.end(), 0.0) / double(off.size());
+            return Tried{std::move(orientation), std::move(normals), std::move(off), mean_off};
+        };
+        const std::vector<Vec3> propagated =
+            cloud::propagated_normals(sample.points, scale, scale.spacing * std::sqrt(double(sample.step)));
         for (const Try& attempt : tries) {
             const double tried_cell = cloud::indicator_cell(
                 points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
-            const std::tuple lattice{tried_cell, attempt.enclosed, attempt.first_guess};
+            const std::tuple lattice{tried_cell, attempt.enclosed, attempt.is_propagated};
             if (std::count(lattices.begin(), lattices.end(), lattice) > 0) continue;
             lattices.push_back(lattice);
             Orientation now;
             now.areas = sample.areas;
-            Iteration iteration(sample.points, sample.areas, attempt.first_guess, run);
+            if (attempt.is_propagated) now.normals = propagated;
+            Iteration iteration(sample.points, sample.areas, kOrientation.first_cells, run);
             for (const Stage& stage : {Stage{1.5 * tried_cell, 12, false, attempt.enclosed},
                                        Stage{tried_cell, 8, true, kOrientation.surely_enclosed}})
                 iteration.run(stage, now);
@@ -128,11 +132,14 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                 tried.push_back({std::move(now), std::move(normals), {}});
                 break;
             }
-            if (!consistency)
+            if (!consistency) {
                 consistency.emplace(points, sample.all_areas(), kOrientation.strain_cells * finest, reach, run);
-            std::vector<double> off = consistency->off(normals);
-            const double mean_off = std::accumulate(off.begin(), off.end(), 0.0) / double(off.size());
-            tried.push_back({std::move(now), std::move(normals), std::move(off), mean_off});
+                // Iterated, normals beside thin parts may end on a wrong side on which they did not begin.
+                Orientation as_propagated = now;
+                tried.push_back(
+                    judged(std::move(as_propagated), cloud::propagated_normals(points, scale, scale.spacing)));
+            }
+            tried.push_back(judged(std::move(now), std::move(normals)));
         }
         if (consistency && tried.size() > 1) {
             best = best_of(std::move(tried), points, sample, *consistency, run);

@@ -117,6 +117,27 @@ PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& sca
     return {{}, towards(free_directions(points, kViews.view_spacings * apart(scale)))};
 }
 
+void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
+                  const StackField* start, Orientation& result, const RunContext& run) {
+    WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * apart(scale)));
+    const double cell = fine.indicator().stack().cell();
+    // A view tells the side alone; which way the surface lies its neighbours know better.
+    std::vector<double> screen(points.size());
+    std::size_t against = 0;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        const Vec3 falling = unit(times(-1, result.indicator->at(points[n]).gradient));
+        const bool agrees = dot(falling, result.normals[n]) > 0;
+        against += !agrees;
+        if (agrees) result.normals[n] = falling;
+        screen[n] = agrees && (is_free.empty() || !is_free[n]) ? kViews.screening * result.areas[n] / (cell * cell) : 0;
+    }
+    result.turned = double(against) / double(points.size());
+    if (start != nullptr) fine.start_from(*start);
+    fine.screen(points, screen);
+    solve(fine, points, result, kIndicator.cycles_from_nothing, run);
+    result.screened = make_indicator(fine);
+}
+
 Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     Orientation result;
     const double between = apart(scale);
@@ -132,23 +153,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.layered = std::size_t(std::count(turned.begin(), turned.end(), 1));
     result.indicator = make_indicator(coarse);
     run.check();
-    WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * between));
-    const double cell = fine.indicator().stack().cell();
-    // A view tells the side alone; which way the surface lies its neighbours know better.
-    std::vector<double> screen(points.size());
-    std::size_t against = 0;
-    for (std::size_t n = 0; n < points.size(); ++n) {
-        const Vec3 falling = unit(times(-1, result.indicator->at(points[n]).gradient));
-        const bool agrees = dot(falling, result.normals[n]) > 0;
-        against += !agrees;
-        if (agrees) result.normals[n] = falling;
-        screen[n] = agrees && !turned[n] ? kViews.screening * result.areas[n] / (cell * cell) : 0;
-    }
-    result.turned = double(against) / double(points.size());
-    fine.start_from(coarse.indicator());
-    fine.screen(points, screen);
-    solve(fine, points, result, kIndicator.cycles_from_nothing, run);
-    result.screened = make_indicator(fine);
+    add_screened(points, scale, turned, &coarse.indicator(), result, run);
     return result;
 }
 

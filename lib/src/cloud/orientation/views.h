@@ -1,5 +1,6 @@
 #pragma once
 // Normals of a scan that encloses nothing: what was measured was seen, from outside.
+#include "cloud/poisson/winding_field.h"
 #include "covol/orientation.h"
 
 namespace covol::cloud {
@@ -17,9 +18,16 @@ namespace covol::cloud {
 /// As if each point's sensor had been where it can be seen from; 0 where that is from nowhere, or from all around.
 [[nodiscard]] PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& scale);
 
-/// Normals towards where each point can be seen from, and their indicator, solved for once. `screened` is the indicator
-/// that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface reconstruction, ACM Trans.
-/// Graph. 32(3), 2013): closer to them, with more handles where layers of the scan differ.
+/// Adds the indicator that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface
+/// reconstruction, ACM Trans. Graph. 32(3), 2013): sheets that enclose nothing lie at 1/2 by that alone. Normals take
+/// its directions, each on its own side.
+/// @param is_free  of each point, whether the surface need not pass it; empty: of none
+/// @param start    null: solved for from nothing
+void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
+                  const StackField* start, Orientation& result, const RunContext& run);
+
+/// Normals towards where each point can be seen from, and their indicator, solved for once; add_screened() brings that
+/// closer to the points, with more handles where layers of the scan differ.
 [[nodiscard]] Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale,
                                           const RunContext& run);
 

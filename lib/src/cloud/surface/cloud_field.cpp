@@ -348,13 +348,13 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
 
 /// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
 /// be nodes all through the layer that they fill.
-OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
-    const double most = kBlend.most_noises * cloud.scale.noise;
+OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
+    const double most = kBlend.most_noises * noise;
     points.squares_off.clear();
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
         for (int step = 0; step < kBlend.level_steps; ++step) {
-            const auto [inside, gradient, cell] = cloud.orientation.indicator->at(place);
+            const auto [inside, gradient, cell] = indicator.at(place);
             const double steep = dot(gradient, gradient);
             if (!(steep > 0)) return;
             place = plus(place, times((0.5 - inside) / steep, gradient));
@@ -376,11 +376,12 @@ std::vector<float> squared_distances(const std::vector<Vec3>& points, const Indi
     return squares;
 }
 
-std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
+std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, const Indicator& indicator, double h,
+                                 CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F),
-                               squared_distances(cloud.points, *cloud.orientation.indicator)};
-    std::vector<Quadric> quadrics = quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
-                                                  cloud.scale.spacing, report.bare_nodes, run);
+                               squared_distances(cloud.points, indicator)};
+    std::vector<Quadric> quadrics = quadrics_over(near_level(points, indicator, cloud.scale.noise), points,
+                                                  kBlend.node_voxels * h, cloud.scale.spacing, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);
@@ -410,7 +411,7 @@ CloudField::CloudField(const CloudOrientation& cloud, double h, CloudReport& rep
     report.indicator_cell = cloud.orientation.indicator->cell();
     report.turned = cloud.orientation.turned;
     pieces_ = std::make_unique<const Pieces>(
-        cloud.orientation.screened ? std::vector<Quadric>{} : quadrics_of(cloud, h, report, run), h);
+        cloud.has_quadrics ? quadrics_of(cloud, *indicator_, h, report, run) : std::vector<Quadric>{}, h);
 }
 
 CloudField::~CloudField() = default;

@@ -103,9 +103,10 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     };
     TopologyOf topology{Complexity(field, run), least, cloud.points, run};
     if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
-    topology.hold(field, *orientation.indicator, report);
+    topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
+                  report);
     // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
-    if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
+    if (topology.own.all > 1 && cloud.has_quadrics && is_open(field, cloud, run))
         topology.hold(
             field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),
             report);

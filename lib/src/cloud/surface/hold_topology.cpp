@@ -148,10 +148,14 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
         if (value.isVoxelValue()) compare(value.getCoord());
     for (auto value = rough.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
-    // What lies between the two surfaces, far from both, is active in neither.
-    for (std::size_t n = 0; n < found.size(); ++n)  // NOLINT(modernize-loop-convert): it grows meanwhile
+    // What lies between the two surfaces, far from both, is active in neither. If they are more than a voxel apart on
+    // the mean they are not two versions of one surface: each may close a scan of one side in its own way.
+    const auto layer = std::size_t(double(target.activeVoxelCount()) / (2 * kHalfWidthVoxels));
+    for (std::size_t n = 0; n < found.size(); ++n) {
+        if (found.size() > layer) return 0;
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
+    }
     // The deepest first: what is left in the end, to keep two fronts apart, are the narrowest places.
     const FloatGrid::Ptr depth = depth_of(found, target, run);
     auto depth_at = depth->getConstAccessor();

@@ -12,6 +12,7 @@ namespace covol::cloud {
 /// topology preserving level set method, IEEE PAMI 25, 2003). Inside is 6-connected, outside 18-connected, as
 /// extract_mesh() joins voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is
 /// narrowest. Both are active near their surface and signed everywhere.
+/// Nothing is changed if the two surfaces lie more than a voxel apart on the mean.
 /// @return the number of voxels that keep rough's sign; their value is small
 /// @throws Error Cancelled
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run);

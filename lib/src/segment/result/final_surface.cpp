@@ -79,6 +79,13 @@ struct Maker {
     /// A surface that points alone hold may have holes between them.
     [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
 
+    /// Points that enclose nothing, such as a scan from the air: what closes their surface is made up.
+    /// @pre share_without_points was measured
+    [[nodiscard]] bool is_open_scan() const {
+        constexpr double kHalf = 0.5;  // a sheet that is closed by another as large
+        return (choices.cloud && !choices.cloud->encloses) || made.share_without_points > kHalf;
+    }
+
     /// How much of the surface no point holds, and what becomes of that.
     void treat_holes() {
         const HolesOptions& asked = options().holes;
@@ -87,13 +94,14 @@ struct Maker {
         const double slack = kFinal.rim_slack * std::min(automatic, distance);
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.share_without_points = measure_share_beyond(made.mesh, made.distance_to_points, distance);
-        holes.policy = asked.policy;
+        const Holes policy = asked.policy != Holes::Auto ? asked.policy : is_open_scan() ? Holes::Open : Holes::Close;
+        holes.policy = policy;
         holes.distance = distance;
-        if (asked.policy == Holes::Close) return;
-        const auto treat = asked.policy == Holes::Open ? trim_holes : flatten_holes;
+        if (policy == Holes::Close) return;
+        const auto treat = policy == Holes::Open ? trim_holes : flatten_holes;
         TreatedHoles treated = treat(made.mesh, made.distance_to_points, distance, slack, run());
         holes = std::move(treated.report);
-        if (asked.policy == Holes::Open) {
+        if (policy == Holes::Open) {
             const double volume = measure(made.mesh).volume;
             made.mesh = std::move(treated.mesh);
             if (holes.share > 0) {
@@ -112,13 +120,14 @@ struct Maker {
         std::string lengths;
         for (std::size_t n = 0; n < holes.loops.size() && n < kLoopsToTell; ++n)
             lengths += (n > 0 ? ", " : "") + number(holes.loops[n].length);
-        made.report.remarks.choose("holes", to_string(holes.policy),
-                                   holes.loops.empty()
-                                       ? "none: all of the surface is within " + number(holes.distance) + " of points"
-                                       : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
-                                             (holes.loops.size() > kLoopsToTell ? ", ..." : "") +
-                                             (holes.policy == Holes::Open ? "; the level set stays closed" : ""),
-                                   run());
+        made.report.remarks.choose(
+            "holes", to_string(holes.policy),
+            (options().holes.policy == Holes::Auto ? "the points hold one side of something; " : std::string()) +
+                (holes.loops.empty() ? "none: all of the surface is within " + number(holes.distance) + " of points"
+                                     : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
+                                           (holes.loops.size() > kLoopsToTell ? ", ..." : "") +
+                                           (holes.policy == Holes::Open ? "; the level set stays closed" : "")),
+            run());
     }
 
     void measure_without_mesh() {

@@ -217,13 +217,12 @@ private:
     }
 
     void find_holes() {
-        if (surface_.share_without_points <= kFinal.warn_without_points) return;
         const HolesReport& holes = surface_.holes;
+        // What ends where the points end is right; the choice of it is told where it is made.
+        if (surface_.share_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
         warn(number(std::round(1000 * surface_.share_without_points) / 10) + " % of the surface lie farther than " +
              number(holes.distance) + " from every point: " +
-             (holes.policy == Holes::Close  ? "there curvature alone closes it"
-              : holes.policy == Holes::Flat ? "there flat patches close it"
-                                            : "there the mesh is open, the level set closed by curvature alone"));
+             (holes.policy == Holes::Flat ? "there flat patches close it" : "there curvature alone closes it"));
     }
 
     const Problem& problem_;
