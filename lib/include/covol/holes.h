@@ -48,9 +48,9 @@ struct BoundaryLoop {
 
 struct HolesReport {
     Holes policy = Holes::Close;  ///< what was done, never Auto
-    double distance = 0;       ///< as used
-    double share = 0;          ///< of the closed surface's area: what was trimmed, or made flat
-    double closed_volume = 0;  ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
+    double distance = 0;          ///< as used
+    double share = 0;             ///< of the closed surface's area: what was trimmed, or made flat
+    double closed_volume = 0;     ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
     std::size_t dropped_pieces = 0;   ///< between holes, too small to stay
     std::vector<BoundaryLoop> loops;  ///< of the holes
 };

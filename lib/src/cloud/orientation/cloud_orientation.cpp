@@ -55,9 +55,6 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
     cloud::GivenSides sheets =
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     if (sheets.report.used) cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
-        fprintf(stderr, "PROP used %d torn %g passed %g own %g foreseen %g\n", int(sheets.report.used), sheets.torn,
-                sheets.report.used ? share_passed(*sheets.orientation.screened, cloud.points, reach) : -1,
-                share_passed(*cloud.orientation.indicator, cloud.points, reach), sheets.report.foreseen);
     if (!sheets.report.used || sheets.torn > kOrientation.few_torn ||
         share_passed(*sheets.orientation.screened, cloud.points, reach) >
             share_passed(*cloud.orientation.indicator, cloud.points, reach))

@@ -9,6 +9,7 @@
 #include "cloud/surface/hold_topology.h"
 #include "covol/clip.h"
 #include "covol/compare.h"
+#include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "covol/start.h"
 #include "holes/share_beyond.h"
@@ -82,8 +83,8 @@ struct Maker {
     /// Points that enclose nothing, such as a scan from the air: what closes their surface is made up.
     /// @pre share_without_points was measured
     [[nodiscard]] bool is_open_scan() const {
-        constexpr double kHalf = 0.5;  // a sheet that is closed by another as large
-        return (choices.cloud && !choices.cloud->encloses) || made.share_without_points > kHalf;
+        // A sheet is closed by another one that is as large, or larger.
+        return (choices.cloud && !choices.cloud->encloses) || made.share_without_points > 0.5;
     }
 
     /// How much of the surface no point holds, and what becomes of that.
@@ -95,11 +96,18 @@ struct Maker {
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.share_without_points = measure_share_beyond(made.mesh, made.distance_to_points, distance);
         const Holes policy = asked.policy != Holes::Auto ? asked.policy : is_open_scan() ? Holes::Open : Holes::Close;
-        holes.policy = policy;
+        holes.policy = Holes::Close;
         holes.distance = distance;
         if (policy == Holes::Close) return;
         const auto treat = policy == Holes::Open ? trim_holes : flatten_holes;
-        TreatedHoles treated = treat(made.mesh, made.distance_to_points, distance, slack, run());
+        TreatedHoles treated;
+        try {
+            treated = treat(made.mesh, made.distance_to_points, distance, slack, run());
+        } catch (const Error& error) {
+            // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
+            if (asked.policy == Holes::Auto && error.code() == Errc::InvalidInput) return;
+            throw;
+        }
         holes = std::move(treated.report);
         if (policy == Holes::Open) {
             const double volume = measure(made.mesh).volume;
