@@ -335,6 +335,72 @@ class Many(Clouds):
         self.assertFalse((self.out / "s.vdb").exists())
 
 
+class Scenes(Clouds):
+    """Seen from one side: the mesh ends where the points do, without being asked for."""
+
+    @staticmethod
+    def on_rectangle(draw, count, corner, u, v):
+        for _ in range(count):
+            a, b = draw.random(), draw.random()
+            yield tuple(c + a * x + b * y for c, x, y in zip(corner, u, v))
+
+    def check_open(self, points, area, components, rims):
+        done = self.reconstruct(points, "--mesh", "m.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertEqual(report["holes"]["policy"], "open")
+        self.assertNotIn("from every point", done.stderr)
+        self.assertEqual((report["surface"]["closed"], report["surface"]["components"]), (False, components))
+        self.assertEqual(len(report["holes"]["loops"]), rims)
+        self.assertAlmostEqual(report["surface"]["area"] / area, 1, delta=0.05)
+        self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.1 * report["resolved"]["voxel_size"])
+        self.assertLess(report["fit"]["marks_off"]["count"], 0.002 * len(points))
+
+    def test_front_of_a_house(self):
+        # Windows are set back by 0.3; a winding number alone makes hundreds of pieces of it.
+        draw = random.Random(4)
+        density, depth, points, area = 120, 0.3, [], 12 * 6.0
+
+        def add(corner, u, v, size):
+            points.extend(self.on_rectangle(draw, int(density * size), corner, u, v))
+
+        windows = [(1.2 + 3.6 * i, 1.0 + 2.6 * j) for i in range(3) for j in range(2)]
+        for p in self.on_rectangle(draw, int(density * area), (0, 0, 0), (12, 0, 0), (0, 0, 6)):
+            if not any(x < p[0] < x + 1.6 and z < p[2] < z + 1.4 for x, z in windows):
+                points.append(p)
+        for x, z in windows:
+            add((x, depth, z), (1.6, 0, 0), (0, 0, 1.4), 1.6 * 1.4)
+            for side in (0, 1):
+                add((x + 1.6 * side, 0, z), (0, depth, 0), (0, 0, 1.4), depth * 1.4)
+                add((x, 0, z + 1.4 * side), (1.6, 0, 0), (0, depth, 0), depth * 1.6)
+            area += 2 * depth * (1.6 + 1.4)
+        self.check_open(points, area, 1, 1)
+
+    def test_ground_roofs_and_crowns(self):
+        # Parts that hang in the air above each other, each open below.
+        draw = random.Random(5)
+        points = [(x, y, math.sin(0.2 * x)) for x, y in ((draw.uniform(0, 40), draw.uniform(0, 40)) for _ in range(12000))]
+        for x in (6, 24):
+            for side in (-1, 1):
+                points += self.on_rectangle(draw, 450, (x, 20 + 4 * side, 8), (12, 0, 0), (0, -4 * side, 2.5))
+        for x, y in ((10, 34), (30, 6)):
+            for _ in range(430):
+                v = [draw.gauss(0, 1) for _ in range(3)]
+                r = math.sqrt(sum(c * c for c in v))
+                points.append((x + 3 * v[0] / r, y + 3 * v[1] / r, 6 + 3 * abs(v[2]) / r))
+        ground = 40 * sum(math.hypot(1, 0.2 * math.cos(0.2 * (n + 0.5) / 100)) / 100 for n in range(4000))
+        area = ground + 4 * 12 * math.hypot(4, 2.5) + 2 * 2 * math.pi * 9
+        self.check_open(points, area, 5, 5)
+
+    def test_a_leaf(self):
+        draw = random.Random(6)
+        points = [(x, y, 0.3 * x * x) for x, y in ((draw.uniform(-1, 1), draw.uniform(-1, 1)) for _ in range(4000))]
+        area = 2 * sum(math.hypot(1, 0.6 * (n + 0.5) / 1000) / 1000 for n in range(-1000, 1000))
+        self.check_open(points, area, 1, 1)
+        closed = json.loads(self.reconstruct(points, "--mesh", "m.ply", "--holes", "close").stdout)
+        self.assertTrue(closed["surface"]["closed"])
+
+
 class Holes(Clouds):
     """What becomes of the surface where no points are."""
 

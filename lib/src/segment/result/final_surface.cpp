@@ -4,6 +4,7 @@
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "cloud/surface/hold_topology.h"
@@ -80,11 +81,25 @@ struct Maker {
     /// A surface that points alone hold may have holes between them.
     [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
 
-    /// Points that enclose nothing, such as a scan from the air: what closes their surface is made up.
-    /// @pre share_without_points was measured
-    [[nodiscard]] bool is_open_scan() const {
-        // A sheet is closed by another one that is as large, or larger.
-        return (choices.cloud && !choices.cloud->encloses) || made.share_without_points > 0.5;
+    /// What is left of the mesh if it ends where points are missing, or what spans that; none if the mesh stays closed.
+    std::optional<TreatedHoles> treated_holes(double distance, double slack) const {
+        const auto trimmed = [&] { return trim_holes(made.mesh, made.distance_to_points, distance, slack, run()); };
+        switch (options().holes.policy) {
+            case Holes::Close: return {};
+            case Holes::Open: return trimmed();
+            case Holes::Flat: return flatten_holes(made.mesh, made.distance_to_points, distance, slack, run());
+            case Holes::Auto: break;
+        }
+        if (made.share_without_points <= kFinal.warn_without_points) return {};
+        try {
+            TreatedHoles open = trimmed();
+            // What closes a sheet is as large as the sheet itself, or larger.
+            if ((choices.cloud && !choices.cloud->encloses) || open.report.share > 0.5) return open;
+        } catch (const Error& error) {
+            // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
+            if (error.code() != Errc::InvalidInput) throw;
+        }
+        return {};
     }
 
     /// How much of the surface no point holds, and what becomes of that.
@@ -95,29 +110,19 @@ struct Maker {
         const double slack = kFinal.rim_slack * std::min(automatic, distance);
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.share_without_points = measure_share_beyond(made.mesh, made.distance_to_points, distance);
-        const Holes policy = asked.policy != Holes::Auto ? asked.policy : is_open_scan() ? Holes::Open : Holes::Close;
-        holes.policy = Holes::Close;
         holes.distance = distance;
-        if (policy == Holes::Close) return;
-        const auto treat = policy == Holes::Open ? trim_holes : flatten_holes;
-        TreatedHoles treated;
-        try {
-            treated = treat(made.mesh, made.distance_to_points, distance, slack, run());
-        } catch (const Error& error) {
-            // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
-            if (asked.policy == Holes::Auto && error.code() == Errc::InvalidInput) return;
-            throw;
-        }
-        holes = std::move(treated.report);
-        if (policy == Holes::Open) {
+        std::optional<TreatedHoles> treated = treated_holes(distance, slack);
+        if (!treated) return;
+        holes = std::move(treated->report);
+        if (holes.policy == Holes::Open) {
             const double volume = measure(made.mesh).volume;
-            made.mesh = std::move(treated.mesh);
+            made.mesh = std::move(treated->mesh);
             if (holes.share > 0) {
                 holes.closed_volume = volume;
                 relax();
             }
         } else if (holes.share > 0) {
-            replace_by(treated.mesh);
+            replace_by(treated->mesh);
         }
         if (holes.share > 0) made.distance_to_points = measure_distances(made.mesh, points, run());
         tell_of_holes();
