@@ -345,7 +345,7 @@ class Scenes(Clouds):
             yield tuple(c + a * x + b * y for c, x, y in zip(corner, u, v))
 
     def check_open(self, points, area, components, rims):
-        done = self.reconstruct(points, "--mesh", "m.ply")
+        done = self.reconstruct(points, "--mesh", "m.obj")
         self.assertEqual(done.returncode, 0, done.stderr)
         report = json.loads(done.stdout)
         self.assertEqual(report["holes"]["policy"], "open")
@@ -391,6 +391,12 @@ class Scenes(Clouds):
         ground = 40 * sum(math.hypot(1, 0.2 * math.cos(0.2 * (n + 0.5) / 100)) / 100 for n in range(4000))
         area = ground + 4 * 12 * math.hypot(4, 2.5) + 2 * 2 * math.pi * 9
         self.check_open(points, area, 5, 5)
+        # All look at the sky, from where they were seen: the roofs hide no ground from below.
+        lines = [line.split() for line in (self.out / "m.obj").read_text().splitlines()]
+        places = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
+        triangles = [[places[int(corner.split("/")[0]) - 1] for corner in words[1:]] for words in lines if words[:1] == ["f"]]
+        up = sum((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0 for a, b, c in triangles)
+        self.assertGreater(up, 0.98 * len(triangles))
 
     def test_a_leaf(self):
         draw = random.Random(6)

@@ -74,7 +74,7 @@ struct Orientation {
 struct PointHints {
     std::vector<Vec3> normals;    ///< unit
     std::vector<Vec3> to_sensor;  ///< unit: from the point to where it was seen from
-    bool is_outward = false;      ///< the normals are known to point outwards, by sections of the body
+    bool is_outward = false;      ///< the normals are known to point outwards, as those of sections
 };
 /// Those of `from` for the points `to` that are left of them, or were made from them: each has those of the nearest.
 [[nodiscard]] COVOL_API PointHints carried(const PointHints& hints, const std::vector<Vec3>& from,

@@ -85,6 +85,12 @@ Vec3 KdTree::nearest_point(const Vec3& query) const {
     return *search.at;
 }
 
+const Vec3* KdTree::nearest_within(const Vec3& query, double distance) const {
+    Search search{query, distance * distance, false};
+    descend(0, points_.size(), search);
+    return search.at;
+}
+
 double KdTree::nearest_other(const Vec3& query) const {
     Search search{query, std::numeric_limits<double>::infinity(), true};
     descend(0, points_.size(), search);

@@ -21,6 +21,8 @@ public:
     [[nodiscard]] double nearest(const Vec3& query) const;
     /// The nearest one. @pre there is one
     [[nodiscard]] Vec3 nearest_point(const Vec3& query) const;
+    /// The nearest one that is closer than `distance`; null: none is.
+    [[nodiscard]] const Vec3* nearest_within(const Vec3& query, double distance) const;
     /// Squared distance from one of the points to the nearest other one.
     [[nodiscard]] double nearest_other(const Vec3& query) const;
 

@@ -141,6 +141,16 @@ Choices with_flow(const Problem& problem, Choices c) {
     return c;
 }
 
+/// Of the indicator's surface, nearly: a plane of any direction passes 1.5 cells per cell of its area on the mean.
+double area_of(const Indicator& indicator) {
+    double squares = 0;
+    indicator.crossed([&](const WorldBox& box) {
+        const double side = box.max[0] - box.min[0];
+        squares += side * side;
+    });
+    return squares / 1.5;
+}
+
 }  // namespace
 
 Resolved resolve(const Problem& problem) {
@@ -183,9 +193,22 @@ Resolved resolve(const Problem& problem) {
             c.h = h;
             remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);
         }
+        // What closes the surface of a scan may be far larger than what the points lie on.
+        const double area =
+            area_of(c.cloud->orientation.screened ? *c.cloud->orientation.screened : *c.cloud->orientation.indicator);
+        const double least = std::sqrt(area / (kAutomatic.most_facets * double(c.cloud->points.size())));
+        if (least > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
+            c.h = least;
+            remarks.choose(
+                "voxel_size", number(least),
+                "finer ones would be more than " + number(kAutomatic.most_facets) + " of the surface for each point",
+                run);
+        }
     }
     points = merged(points, c.h, run);
-    c.measured_marks = options.contours ? problem.given : points;
+    // Points of walls within the body are told of as such, and lie on no surface.
+    const bool are_enclosed = c.cloud && c.cloud->enclosed > 0;
+    c.measured_marks = options.contours ? problem.given : are_enclosed ? c.cloud->points : points;
     if (c.start == StartMethod::Tagged) c.start = guess_or_tag(problem, points, remarks);
     if (problem.image == nullptr && c.start == StartMethod::Tagged)
         points = without_noise(std::move(points), c.h, remarks, run);

@@ -20,6 +20,8 @@ struct AutomaticHeuristics {
     double most_box_voxels = heuristic("automatic.most_box_voxels", 3e5);
     /// [cells of the indicator] Voxel size of a cloud that encloses nothing, or fills a solid.
     double view_voxel = heuristic("automatic.view_voxel", 0.5);
+    /// [voxels] Of the surface for each point, at most: of clouds on closed surfaces 4 to 8.
+    double most_facets = heuristic("automatic.most_facets", 20);
     /// [noises] Voxel size of a cloud, at least.
     double cloud_noise = heuristic("automatic.cloud_noise", 0.6);
     /// [voxels] Seeds closer than this are one position.

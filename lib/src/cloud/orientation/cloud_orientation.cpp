@@ -51,7 +51,8 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
-                                              cloud::hints_by_views(cloud.points, cloud.scale).to_sensor);
+                                              cloud::towards_sky(cloud.points, cloud.scale));
+    hints.is_outward = true;
     cloud::GivenSides sheets =
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     if (sheets.report.used) cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
@@ -68,18 +69,6 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = share_passed(*cloud.orientation.indicator, cloud.points, reach);
     const bool mostly_bare = share_bare(cloud) > kOrientation.mostly_bare;
-    if (mostly_bare && passed > 0) {
-        // What closes a scan of one side is larger than the scan, and turns parts of it; where they were seen from
-        // tells.
-        cloud::GivenSides seen = cloud::given_sides(cloud.points, cloud::hints_by_views(cloud.points, cloud.scale),
-                                                    cloud.scale, first_cell(cloud.scale, cloud.points), run);
-        if (seen.report.used && share_passed(*seen.orientation.indicator, cloud.points, reach) <
-                                    std::min(passed, kOrientation.many_passed)) {
-            cloud.orientation = std::move(seen.orientation);
-            cloud.encloses = true;
-            return;
-        }
-    }
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals waver in the folds of a closed surface, too; but there views pass by most points.
     cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&

@@ -50,10 +50,11 @@ public:
     }
 
     /// Share of those told that each half foresees of the other; all are turned over where most point inwards.
-    double foreseen(HintsReport& report) {
+    /// @param is_outward  they are known not to
+    double foreseen(HintsReport& report, bool is_outward) {
         std::vector<char> all(points_.size(), 1);
         listen(all);
-        report.inward = mean_at(field_, points_) < 0;
+        report.inward = !is_outward && mean_at(field_, points_) < 0;
         if (report.inward)
             for (Vec3& n : voice_.normals) n = times(-1, n);
         std::size_t agree = 0;
@@ -136,11 +137,11 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
 }
 
 /// @param given  normals; @return whether they are used
-bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const CloudScale& scale, double cell,
-         GivenSides& result, const RunContext& run) {
+bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool is_outward, const CloudScale& scale,
+         double cell, GivenSides& result, const RunContext& run) {
     result.given = given;
     Jury jury(points, given, scale, run);
-    result.report.foreseen = jury.foreseen(result.report);
+    result.report.foreseen = jury.foreseen(result.report, is_outward);
     result.report.why_not.clear();
     if (result.report.foreseen < kGivenSides.least_foreseen) {
         result.report.why_not = "half of them do not foresee the sides of the other half";
@@ -202,7 +203,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     result.report.sensors = count_told(hints.to_sensor);
     const auto least = kGivenSides.least_told * double(points.size());
     if (double(result.report.normals) >= least && result.report.normals > 0 &&
-        use(points, hints.normals, scale, cell, result, run))
+        use(points, hints.normals, hints.is_outward, scale, cell, result, run))
         return result;
     run.check();
     if (double(result.report.sensors) < least || result.report.sensors == 0) return result;
@@ -210,7 +211,8 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
         if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
         return result;
     }
-    result.report.from_sensor = use(points, normals_towards(points, hints.to_sensor, scale), scale, cell, result, run);
+    result.report.from_sensor =
+        use(points, normals_towards(points, hints.to_sensor, scale), hints.is_outward, scale, cell, result, run);
     return result;
 }
 

@@ -188,6 +188,10 @@ struct ViewsHeuristics {
     double coarse_spacings = heuristic("views.coarse_spacings", 2.4);
     /// [spacings or noises] Edge of the cells of the screened indicator.
     double fine_spacings = heuristic("views.fine_spacings", 1.2);
+    /// [share of the points] That are free in one direction and not in the opposite one, from which on it is the sky.
+    double sky = heuristic("views.sky", 0.01);
+    /// [weight] Of each point's own free directions, against the sky's.
+    double beside_sky = heuristic("views.beside_sky", 0.1);
     /// [share of all directions] Less those opposite, from which a point is seen on a side.
     double least_free = heuristic("views.least_free", 0.01);
     /// [indicator's slope over a cell] Weight with which points hold the screened indicator (Kazhdan and Hoppe,

@@ -101,6 +101,24 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
     return free;
 }
 
+std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale& scale) {
+    const double cell = kViews.view_spacings * apart(scale);
+    const Occupied occupied(points, cell);
+    const std::vector<Vec3> rays = directions();
+    std::vector<double> seen(rays.size());
+    tbb::parallel_for(std::size_t(0), rays.size(), [&](std::size_t r) {
+        for (const Vec3& p : points) seen[r] += occupied.is_free(p, rays[r]) - occupied.is_free(p, times(-1, rays[r]));
+    });
+    Vec3 sky{0, 0, 0};
+    if (*std::max_element(seen.begin(), seen.end()) > kViews.sky * double(points.size())) {
+        for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
+        sky = unit(sky);
+    }
+    std::vector<Vec3> all = towards(free_directions(points, cell));
+    for (Vec3& way : all) way = plus(sky, times(kViews.beside_sky, way));
+    return all;
+}
+
 double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
     const Occupied occupied(points, kViews.view_spacings * apart(scale));
     std::vector<char> free(points.size());
@@ -111,10 +129,6 @@ double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& dire
         return d != Vec3{0, 0, 0};
     });
     return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
-}
-
-PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& scale) {
-    return {{}, towards(free_directions(points, kViews.view_spacings * apart(scale)))};
 }
 
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,

@@ -10,13 +10,15 @@ namespace covol::cloud {
 /// @param cell  edge of the cells, as wide as a sheet of points needs to have no holes
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 
+/// Where scans of one side were seen from: the direction in which more points are free than in the opposite one, if
+/// there is any, as of the ground with roofs and trees above it; with a small weight the directions in which each is
+/// free, for what stands upright.
+[[nodiscard]] std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale& scale);
+
 /// Share of the points from which nothing is in the way in a direction of their own; those without one, 0, do not
 /// count.
 [[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
                                 const CloudScale& scale);
-
-/// As if each point's sensor had been where it can be seen from; 0 where that is from nowhere, or from all around.
-[[nodiscard]] PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& scale);
 
 /// Adds the indicator that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface
 /// reconstruction, ACM Trans. Graph. 32(3), 2013): sheets that enclose nothing lie at 1/2 by that alone. Normals take

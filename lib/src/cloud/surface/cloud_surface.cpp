@@ -53,7 +53,10 @@ struct TopologyOf {
         detail::drop_bare_pieces(*rough, points, least);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
-        report.held_voxels += cloud::hold_topology(*rough, level_set, run);
+        // Surfaces that lie more than a voxel apart on the mean are not two versions of one: each may close a scan of
+        // one side in its own way.
+        const auto layer = std::size_t(double(level_set.activeVoxelCount()) / (2 * kHalfWidthVoxels));
+        report.held_voxels += cloud::hold_topology(*rough, level_set, run, layer);
         own = simpler;
     }
 };
@@ -106,7 +109,7 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
                   report);
     // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
-    if (topology.own.all > 1 && cloud.has_quadrics && is_open(field, cloud, run))
+    if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
         topology.hold(
             field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),
             report);

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <limits>
 
 #include "covol/domain.h"
 #include "covol/run.h"
@@ -12,9 +13,10 @@ namespace covol::cloud {
 /// topology preserving level set method, IEEE PAMI 25, 2003). Inside is 6-connected, outside 18-connected, as
 /// extract_mesh() joins voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is
 /// narrowest. Both are active near their surface and signed everywhere.
-/// Nothing is changed if the two surfaces lie more than a voxel apart on the mean.
+/// @param most  voxels whose signs may differ: time goes by them, and where there are more nothing is changed
 /// @return the number of voxels that keep rough's sign; their value is small
 /// @throws Error Cancelled
-std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run);
+std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run,
+                          std::size_t most = std::numeric_limits<std::size_t>::max());
 
 }  // namespace covol::cloud

@@ -56,7 +56,7 @@ public:
         report_.marks_off.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
         for (const std::string& line :
              compare_with_marks(report_, *surface_.level_set, problem_.image, marks_, surface_.mark_distances))
-            warn(line);
+            if (!solution_.start.cloud.fills) warn(line);  // points that fill a solid lie within its surface
         if (solution_.start.origin == StartOrigin::Guess) find_surface_beyond();
         if (solution_.start.origin == StartOrigin::Cloud) find_folds();
         if (problem_.image == nullptr || !uses_image(solution_.start.flow)) return;

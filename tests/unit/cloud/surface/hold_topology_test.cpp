@@ -71,6 +71,20 @@ TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those 
     }
 }
 
+TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are left as they are") {
+    const FloatGridPtr small = level_set([](int i, int j, int k) { return away(i, j, k) < 5; });
+    const FloatGridPtr large = level_set([](int i, int j, int k) { return away(i, j, k) < 7 && away(i, j, k) > 2; });
+    std::size_t differ = 0;
+    for (auto value = large->cbeginValueOn(); value; ++value)
+        differ += (*value < 0) != (small->tree().getValue(value.getCoord()) < 0);
+    const FloatGridPtr left = large->deepCopy(), held = large->deepCopy();
+    CHECK(cloud::hold_topology(*small, *left, {}, differ - 1) == 0);
+    CHECK(left->tree().hasSameTopology(large->tree()));
+    CHECK(measure(extract_mesh(*left)).components == 2);  // with its cavity
+    CHECK(cloud::hold_topology(*small, *held, {}, differ) > 0);
+    CHECK(measure(extract_mesh(*held)).components == 1);
+}
+
 TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is narrowest") {
     const double middle = 0.5 * (kSide - 1);
     for (const int narrow : {8, 12, 15}) {
