@@ -271,7 +271,8 @@ class Many(Clouds):
         for seed in 1, 3:
             report = self.report(random_scan_from_the_air(5000, seed))
             self.assertIn("from every point", " ".join(report["warnings"]))
-            self.assertEqual((report["surface"]["closed"], report["surface"]["components"]), (True, 1))
+            self.assertTrue(report["surface"]["closed"])
+            self.assertLessEqual(report["surface"]["components"], 1 + 9)  # roofs without walls may be parts of their own
             self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # that, and as much below it, and walls
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.25 * report["resolved"]["voxel_size"])
             self.assertLess(report["fit"]["marks_off"]["count"], 0.02 * 5000)

@@ -135,9 +135,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             if (!consistency) {
                 consistency.emplace(points, sample.all_areas(), kOrientation.strain_cells * finest, reach, run);
                 // Iterated, normals beside thin parts may end on a wrong side on which they did not begin.
-                Orientation as_propagated = now;
-                tried.push_back(
-                    judged(std::move(as_propagated), cloud::propagated_normals(points, scale, scale.spacing)));
+                tried.push_back(judged(now, cloud::propagated_normals(points, scale, scale.spacing)));
             }
             tried.push_back(judged(std::move(now), std::move(normals)));
         }

@@ -81,6 +81,13 @@ private:
     std::vector<std::uint8_t> full_;
 };
 
+Vec3 middle_of(const PointCells& cells, std::size_t cell) {
+    const auto [begin, end] = cells.cell(cell);
+    Vec3 middle{0, 0, 0};
+    for (std::uint32_t at = begin; at < end; ++at) middle = plus(middle, 1.0 / double(end - begin), cells.sorted()[at]);
+    return middle;
+}
+
 }  // namespace
 
 std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) {
@@ -89,13 +96,12 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
     const std::vector<Vec3> rays = directions();
     std::vector<Vec3> free(points.size());
     tbb::parallel_for(std::size_t(0), cells.cell_count(), [&](std::size_t c) {
-        const auto [begin, end] = cells.cell(c);
-        Vec3 from{0, 0, 0}, sum{0, 0, 0};
-        for (std::uint32_t at = begin; at < end; ++at)
-            for (int a = 0; a < 3; ++a) from[a] += cells.sorted()[at][a] / double(end - begin);
+        const Vec3 from = middle_of(cells, c);
+        Vec3 sum{0, 0, 0};
         for (const Vec3& ray : rays)
             if (occupied.is_free(from, ray))
                 for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kViews.rays;
+        const auto [begin, end] = cells.cell(c);
         for (std::uint32_t at = begin; at < end; ++at) free[cells.order()[at]] = sum;
     });
     return free;
@@ -104,10 +110,16 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
 std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale& scale) {
     const double cell = kViews.view_spacings * apart(scale);
     const Occupied occupied(points, cell);
+    const PointCells cells(points, occupied.cell());
     const std::vector<Vec3> rays = directions();
-    std::vector<double> seen(rays.size());
+    std::vector<double> seen(rays.size());  // points, less those that are seen from the opposite direction
     tbb::parallel_for(std::size_t(0), rays.size(), [&](std::size_t r) {
-        for (const Vec3& p : points) seen[r] += occupied.is_free(p, rays[r]) - occupied.is_free(p, times(-1, rays[r]));
+        for (std::size_t c = 0; c < cells.cell_count(); ++c) {
+            const auto [begin, end] = cells.cell(c);
+            const Vec3 from = middle_of(cells, c);
+            seen[r] +=
+                double(end - begin) * (occupied.is_free(from, rays[r]) - occupied.is_free(from, times(-1, rays[r])));
+        }
     });
     Vec3 sky{0, 0, 0};
     if (*std::max_element(seen.begin(), seen.end()) > kViews.sky * double(points.size())) {
