@@ -12,7 +12,7 @@ namespace covol {
 
 /// What becomes of a surface where no points hold it.
 enum class Holes {
-    Auto,   ///< Open if the points enclose nothing or hold less than half of the surface, else Close
+    Auto,   ///< Open if the points lie on sheets and hold less than half of the closed surface, else Close
     Close,  ///< it goes on smoothly
     Open,   ///< the mesh ends there; the level set stays closed
     Flat    ///< it is spanned by the flattest patch, in mesh and level set
@@ -33,7 +33,7 @@ template <>
 inline constexpr auto kOptions<HolesOptions> = std::tuple{
     Option{"holes", &HolesOptions::policy, points_alone(Group::Clouds),
            "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the "
-           "flattest patch spans it, in both; auto: it ends if the points enclose nothing, else it goes on"},
+           "flattest patch spans it, in both; auto: it ends if that is more than half of it, else it goes on"},
     Option{"hole_distance", &HolesOptions::distance, kPositiveLength, points_alone(Group::Clouds),
            "a hole is where the surface lies farther from all points",
            "3 spacings where they are sparse, at least 3vx"}};

@@ -112,7 +112,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
         const double reach = kOrientation.passed_reach * cloud.scale.spacing;
-        if (report.used && cloud.encloses &&
+        // Of walls within a solid, some points of which are left, given normals alone can tell.
+        if (report.used && cloud.encloses && cloud.enclosed == 0 &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
                 kOrientation.contradicted &&
             // In narrow folds it is these that are wrong.

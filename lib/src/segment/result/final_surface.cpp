@@ -90,11 +90,15 @@ struct Maker {
             case Holes::Flat: return flatten_holes(made.mesh, made.distance_to_points, distance, slack, run());
             case Holes::Auto: break;
         }
-        if (made.share_without_points <= kFinal.warn_without_points) return {};
+        if (made.share_without_points <= kFinal.warn_without_points || options().contours) return {};
         try {
             TreatedHoles open = trimmed();
-            // What closes a sheet is as large as the sheet itself, or larger.
-            if ((choices.cloud && !choices.cloud->encloses) || open.report.share > 0.5) return open;
+            double rims = 0;
+            for (const BoundaryLoop& loop : open.report.loops) rims += loop.length;
+            // What closes a sheet is as large as the sheet itself, or larger; along curves there are strips of points,
+            // and no sheet.
+            const bool is_sheet = measure(open.mesh).area > 2 * distance * rims;
+            if (is_sheet && open.report.share > 0.5) return open;
         } catch (const Error& error) {
             // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
             if (error.code() != Errc::InvalidInput) throw;
