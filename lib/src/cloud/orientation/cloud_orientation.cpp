@@ -49,6 +49,8 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
 /// Of sheets, as of a scan of one side or from the air: neighbours agree on a side all over, which is the one that most
 /// points are seen from. @return whether they do, and the surface passes no more points
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
+    // With more noise neighbours lie above each other, and quadrics have handles in what is bare.
+    if (cloud.scale.noise > kOrientation.noise_of_sheets * cloud.scale.spacing) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
                                               cloud::towards_sky(cloud.points, cloud.scale));

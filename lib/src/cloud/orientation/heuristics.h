@@ -102,6 +102,8 @@ struct OrientationHeuristics {
     double sample_spacings = heuristic("orientation.sample_spacings", 4);
     /// [spacings] Noise below which the nearest points tell the sheet that a point is on.
     double sharp = heuristic("orientation.sharp", 0.2);
+    /// [spacings] Noise up to which points that enclose nothing are oriented from neighbour to neighbour.
+    double noise_of_sheets = heuristic("orientation.noise_of_sheets", 0.3);
     /// [rounds] Of leaving out stray points.
     int stray_rounds = heuristic("orientation.stray_rounds", 3);
     /// [share of the points] That a round has to leave out for another one.

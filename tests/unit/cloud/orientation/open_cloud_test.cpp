@@ -91,8 +91,6 @@ TEST_CASE("segment: a noisy torus of which each part was seen from one side has 
     const std::vector<Vec3> points = half_seen_torus(12000, 0.01, 3);
     SegmentOptions options;
     options.voxel_size = 0.05;
-    CHECK_FALSE(reconstruct(points, options).report.surface.closed);  // half of it is not known
-    options.holes.policy = Holes::Close;
     const SegmentResult result = reconstruct(points, options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.components == 1);
