@@ -18,6 +18,7 @@ import tempfile
 import numpy as np
 from scipy.spatial import cKDTree
 
+import clouds
 import ply
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -79,11 +80,11 @@ class Scene:
         return np.concatenate(found) if found else np.empty((0, 3))
 
 
-def cylinder_side(scene, center, radius, height, flip=False):
+def cylinder_side(scene, center, radius, height):
     def draw(n):
         t, z = scene.random.random(n) * 2 * np.pi, scene.random.random(n) * height
         out = np.stack([np.cos(t), np.sin(t), 0 * t], 1)
-        return np.asarray(center) + radius * out + np.stack([0 * z, 0 * z, z], 1), -out if flip else out
+        return np.asarray(center) + radius * out + np.stack([0 * z, 0 * z, z], 1), out
 
     scene.surface(2 * np.pi * radius * height, draw)
 
@@ -127,7 +128,7 @@ def bracket(scene):
         scene.rectangle((0, y, 4), (4, 0, 0), (0, 0, 12), flip=not sign)
 
 
-def rooms(apart, crossing=False):
+def rooms(apart):
     def make(scene):
         scene.box((0, 0, 0), (14, 14, 10))
         scene.box((14 + apart, 0, 0), (28 + apart, 14, 10))
@@ -201,16 +202,16 @@ def leaf(scene):
     scene.surface(1, draw)
 
 
-SCENES = {  # name: (how it is made, points, whether it encloses something)
-    "box": (box, 6000, True),
-    "cylinder": (cylinder, 6000, True),
-    "bracket": (bracket, 10000, True),
-    "rooms_touch": (rooms(0), 12000, True),
-    "rooms_gap": (rooms(0.8), 12000, True),
-    "room": (room, 60000, False),
-    "facade": (facade, 40000, False),
-    "terrain": (terrain, 60000, False),
-    "leaf": (leaf, 5000, False),
+SCENES = {  # name: (how it is made, points)
+    "box": (box, 6000),
+    "cylinder": (cylinder, 6000),
+    "bracket": (bracket, 10000),
+    "rooms_touch": (rooms(0), 12000),
+    "rooms_gap": (rooms(0.8), 12000),
+    "room": (room, 60000),
+    "facade": (facade, 40000),
+    "terrain": (terrain, 60000),
+    "leaf": (leaf, 5000),
 }
 
 
@@ -246,15 +247,6 @@ def odd_clouds():
             "three_points": np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)])}
 
 
-def triangle_samples(vertices, triangles, count, random):
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    chosen = random.choice(len(areas), count, p=areas / areas.sum())
-    s = np.sqrt(random.random((count, 1)))
-    t = random.random((count, 1))
-    return (1 - s) * a[chosen] + s * (1 - t) * b[chosen] + s * t * c[chosen]
-
-
 def run(command, limit):
     """(exit code, CPU seconds, what it printed)"""
     child = subprocess.Popen(["timeout", str(limit), *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -277,15 +269,15 @@ def measure(mesh, cloud, truth, edges, random):
     vertices, triangles = ply.read(mesh)
     cloud = np.unique(cloud, axis=0)
     apart = np.median(cKDTree(cloud).query(cloud, k=2)[0][:, 1]) * 2
-    found = triangle_samples(vertices, triangles, 200000, random)
+    found = clouds.sample(vertices, triangles, 200000, random)
     row = {"triangles": len(triangles), "spacing": apart}
     row["bare"] = float((cKDTree(cloud).query(found)[0] > 3 * apart).mean())
     if truth is not None:
         # To the planes of the nearest samples, where the true surface is not just missing.
         tree = cKDTree(truth[0])
-        offset = np.abs(np.einsum("ij,ij->i", found - truth[0][tree.query(found)[1]], truth[1][tree.query(found)[1]]))
-        near = tree.query(found)[0] < 3 * apart
-        row["mean_to"] = float(np.where(near, np.minimum(offset, tree.query(found)[0]), tree.query(found)[0]).mean() / apart)
+        away, nearest = tree.query(found)
+        offset = np.abs(np.einsum("ij,ij->i", found - truth[0][nearest], truth[1][nearest]))
+        row["mean_to"] = float(np.where(away < 3 * apart, np.minimum(offset, away), away).mean() / apart)
         own = cKDTree(found)
         row["mean_from"] = float(own.query(truth[0][:100000])[0].mean() / apart)
     else:
@@ -293,7 +285,7 @@ def measure(mesh, cloud, truth, edges, random):
     if len(edges):
         middles = vertices[triangles].mean(1)
         by_edges = triangles[cKDTree(edges).query(middles)[0] < 3 * apart]
-        dense = cKDTree(triangle_samples(vertices, by_edges, 3000000, random))
+        dense = cKDTree(clouds.sample(vertices, by_edges, 3000000, random))
         row["edges"] = float(dense.query(edges)[0].mean() / apart)
     return row
 
@@ -311,7 +303,7 @@ def main():
     options = parser.parse_args()
     only = set(filter(None, options.only.split(",")))
     jobs = []
-    for name, (make, count, _) in SCENES.items():
+    for name, (make, count) in SCENES.items():
         for given in (False, True):
             full = name + ("+normals" if given else "")
             if only and full not in only and name not in only:
