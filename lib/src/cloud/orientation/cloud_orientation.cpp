@@ -57,10 +57,10 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
     hints.is_outward = true;
     cloud::GivenSides sheets =
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
-    if (sheets.report.used) cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
-    if (!sheets.report.used || sheets.torn > kOrientation.few_torn ||
-        share_passed(*sheets.orientation.screened, cloud.points, reach) >
-            share_passed(*cloud.orientation.indicator, cloud.points, reach))
+    if (!sheets.report.used || sheets.torn > kOrientation.few_torn) return false;
+    cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
+    if (share_passed(*sheets.orientation.screened, cloud.points, reach) >
+        share_passed(*cloud.orientation.indicator, cloud.points, reach))
         return false;
     cloud.orientation = std::move(sheets.orientation);
     return cloud.encloses = true;
