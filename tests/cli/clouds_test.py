@@ -336,6 +336,98 @@ class Many(Clouds):
         self.assertFalse((self.out / "s.vdb").exists())
 
 
+class Edges(Clouds):
+    """Solids with edges: these stay where they are."""
+
+    def check_edges(self, points, edges, spacing, volume, within=0.05):
+        done = self.reconstruct(points, "--mesh", "m.obj")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        surface = report["surface"]
+        self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
+        self.assertNotIn("warning", done.stderr)
+        self.assertAlmostEqual(surface["volume"] / volume, 1, delta=0.005)
+        self.assertEqual(subprocess.run([COVOL, "check", "m.obj"], cwd=self.out, capture_output=True).returncode, 0)
+        lines = [line.split() for line in (self.out / "m.obj").read_text().splitlines()]
+        vertices = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
+        used = set()
+        for words in lines:
+            if words[:1] == ["f"]:
+                corners = [int(corner.split("/")[0]) - 1 for corner in words[1:]]
+                used |= {tuple(sorted((corners[n], corners[n - 1]))) for n in range(3)}
+        # To the mesh's edges near them, of which a sharp crease consists.
+        by_cell = {}
+        for a, b in used:
+            for v in (a, b):
+                by_cell.setdefault(tuple(int(x // spacing) for x in vertices[v]), set()).add((a, b))
+        off = []
+        for place in edges:
+            cell = [int(x // spacing) for x in place]
+            near = (edge for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)
+                    for edge in by_cell.get((cell[0] + i, cell[1] + j, cell[2] + k), ()))
+            off.append(min((self.off_segment(place, vertices[a], vertices[b]) for a, b in near), default=spacing))
+        self.assertLess(sum(off) / len(off), within * spacing)
+
+    @staticmethod
+    def off_segment(p, a, b):
+        along, to = [y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, p)]
+        square = sum(x * x for x in along)
+        t = min(1, max(0, sum(x * y for x, y in zip(along, to)) / square)) if square > 0 else 0
+        return math.dist(p, [x + t * y for x, y in zip(a, along)])
+
+    @staticmethod
+    def segment(a, b, count=100):
+        return [tuple(x + n / count * (y - x) for x, y in zip(a, b)) for n in range(count + 1)]
+
+    def test_box(self):
+        # Of edges 12, 10, 8, turned: about 0.35 apart.
+        draw, turned = random.Random(7), lambda p: (0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2])
+        sides, points = (12, 10, 8), []
+        for axis in range(3):
+            others = [a for a in range(3) if a != axis]
+            for end in (0, sides[axis]):
+                for _ in range(int(8 * sides[others[0]] * sides[others[1]])):
+                    p = [0.0, 0.0, 0.0]
+                    p[axis] = end
+                    for a in others:
+                        p[a] = draw.uniform(0, sides[a])
+                    points.append(turned(p))
+        corners = [(x, y, z) for x in (0, 12) for y in (0, 10) for z in (0, 8)]
+        edges = [turned(p) for a in corners for b in corners
+                 if a < b and sum(x != y for x, y in zip(a, b)) == 1 for p in self.segment(a, b)]
+        self.check_edges(points, edges, 0.35, 960)
+
+    def test_cylinder(self):
+        draw, points = random.Random(8), []
+        for _ in range(3000):
+            angle = draw.uniform(0, 2 * math.pi)
+            points.append((5 * math.cos(angle), 5 * math.sin(angle), draw.uniform(0, 10)))
+        for _ in range(1500):
+            angle, radius = draw.uniform(0, 2 * math.pi), 5 * math.sqrt(draw.random())
+            points.append((radius * math.cos(angle), radius * math.sin(angle), draw.choice((0, 10))))
+        edges = [(5 * math.cos(n / 100), 5 * math.sin(n / 100), z) for n in range(629) for z in (0, 10)]
+        self.check_edges(points, edges, 0.32, 250 * math.pi)
+
+    def test_bracket(self):
+        # Two plates that meet at a right angle, with an inner edge.
+        draw, points = random.Random(9), []
+        outline = [(0, 0), (12, 0), (12, 3), (3, 3), (3, 10), (0, 10)]
+        for (x0, z0), (x1, z1) in zip(outline, outline[1:] + outline[:1]):
+            for _ in range(int(8 * 8 * math.hypot(x1 - x0, z1 - z0))):
+                t = draw.random()
+                points.append((x0 + t * (x1 - x0), draw.uniform(0, 8), z0 + t * (z1 - z0)))
+        for y in (0, 8):
+            for width, low, high in ((12, 0, 3), (3, 3, 10)):
+                for _ in range(int(8 * width * (high - low))):
+                    points.append((draw.uniform(0, width), y, draw.uniform(low, high)))
+        edges = []
+        for (x0, z0), (x1, z1) in zip(outline, outline[1:] + outline[:1]):
+            edges += self.segment((x0, 0, z0), (x0, 8, z0))
+            for y in (0, 8):
+                edges += self.segment((x0, y, z0), (x1, y, z1))
+        self.check_edges(points, edges, 0.35, 8 * (36 + 21))
+
+
 class Scenes(Clouds):
     """Seen from one side: the mesh ends where the points do, without being asked for."""
 

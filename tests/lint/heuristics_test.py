@@ -13,7 +13,10 @@ from heuristics import read_heuristics  # noqa: E402
 # A constant of floating point in a .cpp of a folder that has a heuristics.h. Those that are none: tolerances of solvers, mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMostLeaves", "segment/choices.cpp:kMostReach",
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMostLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
+    "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
+    "segment/choices.cpp:kMostReach",
     "contours/contour_curve.cpp:kLongestPiece", "contours/slice_field.cpp:kSeedPiece",
     "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
     "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",

@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <vector>
 
 #include "covol/api.h"
@@ -7,6 +8,10 @@
 #include "covol/run.h"
 
 namespace covol {
+
+namespace cloud {
+class Creases;
+}
 
 /// What surface_from_cloud() found out about the points.
 struct CloudReport {
@@ -34,6 +39,7 @@ struct CloudReport {
 struct CloudSurface {
     FloatGridPtr u;
     CloudReport report;
+    std::shared_ptr<const cloud::Creases> creases;  ///< where sheets meet; null: nowhere
 };
 
 /// The closed surface behind points without normals, as a start (negative inside).

@@ -1,5 +1,6 @@
 #include "redistance/patch_kernel.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -8,6 +9,10 @@
 
 namespace covol::detail {
 namespace {
+
+// Of triangles that have a normal.
+constexpr float kSmallestArea = 1e-24F;  // squared: edges of a millionth of a voxel
+constexpr float kSmallestAngle = 1e-4F;
 
 template <typename Real>
 COVOL_INLINE Real dot(const Real (&a)[3], const float (&b)[3]) {
@@ -112,6 +117,11 @@ void PatchFan::make(const PatchOutline& outline) {
         const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
         t.inverse_from = inverse(t.from_from);
         t.inverse_edge = inverse(product(t.edge, t.edge));
+        // Of what is that narrow, or that small, the normal is what rounding leaves. Its edges are as near.
+        if (!(t.area > std::max(kSmallestArea, kSmallestAngle * kSmallestAngle * t.from_from * t.to_to))) {
+            t.area = 0;
+            std::fill_n(t.normal, 3, 0.0F);
+        }
         t.inverse_area = 1 / t.area;  // without one nothing is within
     }
 }

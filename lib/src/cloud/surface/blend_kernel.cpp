@@ -34,13 +34,25 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
-/// How far a place lies above a piece's quadric, along its axis.
-COVOL_INLINE float height_above(const BlendPiece& p, float x, float y, float z) {
-    const auto along = [&](const float(&axis)[3]) __attribute__((always_inline)) {
-        return axis[0] * (x - p.origin[0]) + axis[1] * (y - p.origin[1]) + axis[2] * (z - p.origin[2]);
-    };
-    const float u = along(p.axes[0]), v = along(p.axes[1]);
-    return along(p.axes[2]) - (p.c[0] + u * (p.c[1] + u * p.c[3] + v * p.c[4]) + v * (p.c[2] + v * p.c[5]));
+/// First-order distances of a row of places to a sheet.
+COVOL_INLINE Float8 distance_to(const BlendSheet& s, float x, float y, Float8 z) {
+    x -= s.origin[0], y -= s.origin[1], z -= s.origin[2];
+    const Float8 u = s.axes[0][0] * x + s.axes[0][1] * y + s.axes[0][2] * z;
+    const Float8 v = s.axes[1][0] * x + s.axes[1][1] * y + s.axes[1][2] * z;
+    const Float8 t = s.axes[2][0] * x + s.axes[2][1] * y + s.axes[2][2] * z;
+    const Float8 height = s.c[0] + u * (s.c[1] + u * s.c[3] + v * s.c[4]) + v * (s.c[2] + v * s.c[5]);
+    const Float8 du = s.c[1] + 2 * u * s.c[3] + v * s.c[4], dv = s.c[2] + 2 * v * s.c[5] + u * s.c[4];
+    return (t - height) / square_root(1 + du * du + dv * dv);
+}
+
+COVOL_INLINE Float8 distance_to(const BlendPiece& p, float x, float y, Float8 z) {
+    Float8 distance = distance_to(p.sheets[p.count - 1], x, y, z);
+    for (int n = p.count - 2; n >= 0; --n) {
+        const Float8 other = distance_to(p.sheets[n], x, y, z);
+        const bool is_convex = n == 0 ? p.first_is_convex : p.others_are_convex;
+        distance = (other > distance) == (Int8{} - int(is_convex)) ? other : distance;
+    }
+    return distance;
 }
 
 }  // namespace
@@ -73,11 +85,12 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
         for (int k = 0; k < 8; ++k) {
             const std::size_t voxel = std::size_t(row) * 8 + std::size_t(k);
             const std::int32_t nearest = leaf.nearest[voxel];
-            for (std::size_t a = 0; a < 3; ++a) leaf.normal[a][voxel] = nearest < 0 ? 0.0F : pieces[nearest].axes[2][a];
+            for (std::size_t a = 0; a < 3; ++a) leaf.normal[a][voxel] = nearest < 0 ? 0.0F : pieces[nearest].normal[a];
             if (nearest < 0) continue;
-            const float height = height_above(pieces[nearest], h * float(row >> 3), h * float(row & 7), h * float(k));
-            any |= std::abs(height) < limit;
-            leaf.sum[voxel] = height;
+            const float distance =
+                distance_to(pieces[nearest], h * float(row >> 3), h * float(row & 7), Float8{} + h * float(k))[0];
+            any |= std::abs(distance) < limit;
+            leaf.sum[voxel] = distance;
             leaf.weight[voxel] = 1;
         }
         is_near[row] = any;
@@ -85,26 +98,20 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
     }
     for (std::size_t n = 0; n < count; ++n) {
         const BlendPiece& p = pieces[n];
-        const Float8 up = z - p.foot[2], up2 = up * up, to_z = z - p.origin[2];
+        const Float8 up = z - p.foot[2], up2 = up * up;
         const float scale = 1 / (p.reach * p.reach);
         for_rows(
             p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
                 if (!is_near[row]) return;
                 const Float8 share = (up2 + beside) * scale;
-                const Float8 same = at(leaf.normal[0].data(), row) * p.axes[2][0] +
-                                    at(leaf.normal[1].data(), row) * p.axes[2][1] +
-                                    at(leaf.normal[2].data(), row) * p.axes[2][2];
+                const Float8 same = at(leaf.normal[0].data(), row) * p.normal[0] +
+                                    at(leaf.normal[1].data(), row) * p.normal[1] +
+                                    at(leaf.normal[2].data(), row) * p.normal[2];
                 const Int8 counts = (share < 1.0F) & (same > 0.0F);
                 if (!detail::any(counts)) return;
-                const float x = h * float(i) - p.origin[0], y = h * float(j) - p.origin[1];
-                const Float8 u = p.axes[0][0] * x + p.axes[0][1] * y + p.axes[0][2] * to_z;
-                const Float8 v = p.axes[1][0] * x + p.axes[1][1] * y + p.axes[1][2] * to_z;
-                const Float8 t = p.axes[2][0] * x + p.axes[2][1] * y + p.axes[2][2] * to_z;
-                const Float8 height = p.c[0] + u * (p.c[1] + u * p.c[3] + v * p.c[4]) + v * (p.c[2] + v * p.c[5]);
-                const Float8 du = p.c[1] + 2 * u * p.c[3] + v * p.c[4], dv = p.c[2] + 2 * v * p.c[5] + u * p.c[4];
                 const Float8 near = 1 - share, weight = counts ? near * near : Float8{};
-                at(leaf.sum.data(), row) += weight * (t - height) / square_root(1 + du * du + dv * dv);
+                at(leaf.sum.data(), row) += weight * distance_to(p, h * float(i), h * float(j), z);
                 at(leaf.weight.data(), row) += weight;
             });
     }

@@ -7,9 +7,15 @@
 
 namespace covol::cloud {
 
+struct BlendSheet {
+    float origin[3], axes[3][3], c[6];  ///< as in Sheet
+};
+
 struct BlendPiece {
-    float foot[3], reach;
-    float origin[3], axes[3][3], c[6];  ///< as in Quadric
+    float foot[3], reach, normal[3];
+    BlendSheet sheets[3];
+    int count;                                ///< of sheets
+    bool first_is_convex, others_are_convex;  ///< as in Crease
 };
 
 struct BlendLeaf {

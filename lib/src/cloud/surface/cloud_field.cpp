@@ -13,6 +13,7 @@
 #include "cloud/surface/blend_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/local_fit.h"
+#include "cloud/surface/sharp_mesh.h"
 #include "covol/error.h"
 #include "grid/flood_tiles.h"
 #include "grid/leaf_band.h"
@@ -203,6 +204,17 @@ std::vector<Coord> ways_on(const Leaf& leaf, float limit) {
     return ways;
 }
 
+/// In a leaf's frame.
+BlendSheet blend_sheet(const Sheet& sheet, const Vec3& leaf) {
+    BlendSheet result;
+    for (int a = 0; a < 3; ++a) {
+        result.origin[a] = float(sheet.origin[a] - leaf[a]);
+        for (int b = 0; b < 3; ++b) result.axes[a][b] = float(sheet.axes[a][b]);
+    }
+    for (std::size_t c = 0; c < 6; ++c) result.c[c] = float(sheet.c[c]);
+    return result;
+}
+
 /// Fills one leaf.
 class Blend {
 public:
@@ -287,10 +299,15 @@ private:
                 piece.reach = float(reach);
                 for (int a = 0; a < 3; ++a) {
                     piece.foot[a] = float(foot[a] - box.min[a]);
-                    piece.origin[a] = float(q.origin[a] - box.min[a]);
-                    for (int b = 0; b < 3; ++b) piece.axes[a][b] = float(q.axes[a][b]);
+                    piece.normal[a] = float(q.axes[2][a]);
                 }
-                for (int c = 0; c < 6; ++c) piece.c[c] = float(q.c[c]);
+                piece.count = q.crease ? int(q.crease->count) : 1;
+                for (int s = 0; s < piece.count; ++s)
+                    piece.sheets[s] = blend_sheet(q.crease ? q.crease->sheets[std::size_t(s)] : q, box.min);
+                if (q.crease) {
+                    piece.first_is_convex = q.crease->first_is_convex;
+                    piece.others_are_convex = q.crease->others_are_convex;
+                }
                 near_.push_back(piece);
                 pieces_of_near_.push_back(n);
             }
@@ -380,8 +397,9 @@ std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, const Indicator&
                                  CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F),
                                squared_distances(cloud.points, indicator)};
-    std::vector<Quadric> quadrics = quadrics_over(near_level(points, indicator, cloud.scale.noise), points,
-                                                  kBlend.node_voxels * h, cloud.scale.spacing, report.bare_nodes, run);
+    std::vector<Quadric> quadrics =
+        quadrics_over(near_level(points, indicator, cloud.scale.noise), points, kBlend.node_voxels * h,
+                      cloud.scale.spacing, cloud.scale.noise, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);
@@ -390,6 +408,18 @@ std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, const Indicator&
     report.noise = median(noise);
     report.radius = median(radius);
     return quadrics;
+}
+
+std::shared_ptr<const Creases> creases_of(const CloudField::Pieces& pieces) {
+    std::vector<Quadric> quadrics;
+    std::vector<double> reach;
+    for (std::size_t n = 0; n < pieces.size(); ++n)
+        if (pieces[n].crease) {
+            quadrics.push_back(pieces[n]);
+            reach.push_back(pieces.reach(n));
+        }
+    if (quadrics.empty()) return nullptr;
+    return std::make_shared<const Creases>(std::move(quadrics), std::move(reach));
 }
 
 }  // namespace
@@ -412,6 +442,7 @@ CloudField::CloudField(const CloudOrientation& cloud, double h, CloudReport& rep
     report.turned = cloud.orientation.turned;
     pieces_ = std::make_unique<const Pieces>(
         cloud.has_quadrics ? quadrics_of(cloud, *indicator_, h, report, run) : std::vector<Quadric>{}, h);
+    creases_ = creases_of(*pieces_);
 }
 
 CloudField::~CloudField() = default;

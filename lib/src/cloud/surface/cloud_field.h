@@ -21,11 +21,15 @@ public:
     /// set's band. @pre domain.voxel_size is h
     [[nodiscard]] FloatGridPtr on(const Domain& domain, const RunContext& run) const;
 
+    /// Null if there are none.
+    [[nodiscard]] const std::shared_ptr<const Creases>& creases() const { return creases_; }
+
     class Pieces;
 
 private:
     std::unique_ptr<const Pieces> pieces_;
     std::shared_ptr<const Indicator> indicator_;
+    std::shared_ptr<const Creases> creases_;
 };
 
 /// The indicator's alone.

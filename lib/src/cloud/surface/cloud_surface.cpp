@@ -53,6 +53,10 @@ struct TopologyOf {
         detail::drop_bare_pieces(*rough, points, least);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
+        // Small pieces may be torn off, large ones are bodies that the indicator's cells are too wide to tell apart.
+        if (simpler.pieces < own.pieces &&
+            cloud::count_large_pieces(*rough, run) < cloud::count_large_pieces(level_set, run))
+            return;
         // Surfaces that lie more than a voxel apart on the mean are not two versions of one: each may close a scan of
         // one side in its own way.
         const auto layer = std::size_t(double(level_set.activeVoxelCount()) / (2 * kHalfWidthVoxels));
@@ -118,7 +122,9 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
 
 CloudSurface cloud::settled_field(const Domain& domain, const CloudOrientation& cloud, const RunContext& run) {
     CloudSurface result;
-    result.u = cloud::CloudField(cloud, domain.voxel_size, result.report, run).on(domain, run);
+    const cloud::CloudField field(cloud, domain.voxel_size, result.report, run);
+    result.u = field.on(domain, run);
+    result.creases = field.creases();
     settle(*result.u, cloud, result.report, run);
     return result;
 }

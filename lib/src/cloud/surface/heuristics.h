@@ -58,6 +58,23 @@ struct LocalFitHeuristics {
 };
 COVOL_HEURISTICS LocalFitHeuristics kFit{};
 
+/// Sheets that meet: crease.cpp, local_fit.cpp.
+struct CreaseHeuristics {
+    /// [spacings] Radius of the neighbourhoods in which creases are looked for: about 50 points.
+    double radius = heuristic("crease.radius", 4.0);
+    /// [ratio] Of the misfit of the sheets to that of one quadric.
+    double misfit_ratio = heuristic("crease.misfit_ratio", 0.5);
+    /// [radii] Misfit above which it is noise that is divided.
+    double most_misfit = heuristic("crease.most_misfit", 0.05);
+    /// [distances between nodes] Least radius, as local_fit.wide_of_apart.
+    double wide_of_apart = heuristic("crease.wide_of_apart", 3);
+    /// [cosine] Between normals of sheets that meet smoothly.
+    double smooth_cosine = heuristic("crease.smooth_cosine", 0.9);
+    /// [cosine] Between normals of a sheet and the other side of a thin body.
+    double other_side = heuristic("crease.other_side", -0.5);
+};
+COVOL_HEURISTICS CreaseHeuristics kCrease{};
+
 /// The blend of the quadrics with the indicator, as a level set: cloud_surface.cpp.
 struct CloudSurfaceHeuristics {
     /// [voxels] Reach of a quadric, at least.

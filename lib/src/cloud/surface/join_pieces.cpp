@@ -56,6 +56,12 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     return solid;
 }
 
+/// Of pieces, the largest first.
+std::vector<Piece>::iterator first_small_of(std::vector<Piece>& pieces) {
+    return std::find_if(pieces.begin(), pieces.end(),
+                        [&](const Piece& p) { return p.volume < kJoin.small * pieces.front().volume; });
+}
+
 /// Squared distance from a segment.
 double squared_from(const Gap& gap, const Vec3& place) {
     const Vec3 along = minus(gap.to, gap.from), to = minus(place, gap.from);
@@ -91,10 +97,14 @@ void fill(FloatGrid& level_set, const Gap& gap, double radius) {
 
 }  // namespace
 
+std::size_t count_large_pieces(const FloatGrid& level_set, const RunContext& run) {
+    std::vector<Piece> pieces = pieces_of(extract_mesh(level_set, {}, run));
+    return std::size_t(first_small_of(pieces) - pieces.begin());
+}
+
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run) {
     std::vector<Piece> pieces = pieces_of(extract_mesh(level_set, {}, run));
-    const auto first_small = std::find_if(
-        pieces.begin(), pieces.end(), [&](const Piece& p) { return p.volume < kJoin.small * pieces.front().volume; });
+    const auto first_small = first_small_of(pieces);
     if (first_small == pieces.end()) return 0;
     std::vector<Vec3> large;
     for (auto piece = pieces.begin(); piece != first_small; ++piece)

@@ -17,4 +17,7 @@ namespace covol::cloud {
 /// @return how many were joined
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run);
 
+/// How many pieces of a solid are not small.
+[[nodiscard]] std::size_t count_large_pieces(const FloatGrid& level_set, const RunContext& run);
+
 }  // namespace covol::cloud

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/geometry.h"
 #include "base/median.h"
+#include "cloud/surface/crease.h"
 #include "cloud/surface/fit_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "points/point_cells.h"
@@ -19,16 +21,6 @@ namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-std::array<Vec3, 3> frame_of(const Vec3& normal) {
-    int least = 0;
-    for (int a = 1; a < 3; ++a)
-        if (std::abs(normal[a]) < std::abs(normal[least])) least = a;
-    Vec3 other{0, 0, 0};
-    other[least] = 1;
-    const Vec3 u = unit(cross(normal, other));
-    return {u, cross(normal, u), normal};
-}
 
 struct Fit {
     std::array<double, 6> c{};
@@ -61,6 +53,7 @@ struct Level {
 struct Scratch {
     std::vector<PointCells::Range> ranges;
     FitPoints near;  // in radii
+    std::vector<CreasePoint> crease;
 };
 
 /// Those of the ranges' points within the radius whose normals are on this side.
@@ -200,10 +193,58 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     return best;
 }
 
+/// What lies around a node where sheets meet. Points on the other side of a thin body point away from it.
+std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec3& normal, Scratch& scratch) {
+    level.cells.find(place, level.radius, scratch.ranges);
+    std::vector<CreasePoint>& points = scratch.crease;
+    points.clear();
+    const double r2 = level.radius * level.radius;
+    for (const PointCells::Range& range : scratch.ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], place);
+            const double near = 1 - dot(to, to) / r2;
+            if (near > 0 && dot(level.normal(n), normal) > kCrease.other_side)
+                points.push_back({level.cells.sorted()[n], level.normal(n), level.sorted.count[n] * near * near});
+        }
+    return fit_crease(points, place, level.radius);
+}
+
+/// A crease where the quadric could not grow, if there is one.
+void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& scratch) {
+    if (q.radius > level.radius) return;
+    const std::optional<Crease> crease = crease_at(level, q.origin, normal, scratch);
+    if (!crease) return;
+    const std::array<Vec3, 3> axes = frame_of(crease->mean_normal());
+    // Up or down to where they are.
+    double height = 0;
+    for (int step = 0; step < 4; ++step) {
+        const Vec3 at = plus(q.origin, height, axes[2]);
+        const Sheet& sheet = crease->sheets[crease->nearest(at)];
+        const double along = dot(sheet.normal(at), axes[2]);
+        if (!(along > 0.1)) return;
+        height -= sheet.distance(at) / along;
+    }
+    if (!(std::abs(height) < level.radius)) return;
+    q.axes = axes;
+    q.c = {height, 0, 0, 0, 0, 0};
+    q.radius = level.radius;
+    q.noise = crease->misfit;
+    q.crease = std::make_shared<const Crease>(*crease);
+}
+
+/// So wide that noise leaves the misfit of sheets below its limit, but not so wide that it holds other creases; 0:
+/// noise is too large for that.
+double crease_radius_for(double spacing, double noise) {
+    const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
+    if (noise > kCrease.most_misfit * widest) return 0;
+    return std::clamp(noise / (0.75 * kCrease.most_misfit), smallest, widest);
+}
+
 /// The cloud, thinned for each radius.
 class Fitter {
 public:
-    Fitter(const OrientedCloud& cloud, double spacing, const RunContext& run) {
+    Fitter(const OrientedCloud& cloud, double spacing, double noise, const RunContext& run) {
+        if (const double wide = crease_radius_for(spacing, noise); wide > 0) every_.emplace(cloud, wide);
         levels_.reserve(kFit.levels);
         OrientedCloud last;
         double radius = kFit.first_spacings * spacing;
@@ -215,14 +256,19 @@ public:
         }
     }
 
-    [[nodiscard]] std::vector<Quadric> fit(const OrientedCloud& nodes, const RunContext& run) const {
+    /// Of neighbourhoods in which creases are looked for; 0: in none.
+    [[nodiscard]] double crease_radius() const { return every_ ? every_->radius : 0; }
+
+    [[nodiscard]] std::vector<Quadric> fit(const OrientedCloud& nodes, bool with_creases, const RunContext& run) const {
         std::vector<Quadric> result(nodes.size());
         tbb::enumerable_thread_specific<Scratch> scratch;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
             if (run.cancelled()) return;
             Scratch& mine = scratch.local();
-            for (std::size_t n = range.begin(); n < range.end(); ++n)
+            for (std::size_t n = range.begin(); n < range.end(); ++n) {
                 result[n] = choose(levels_, nodes.points[n], nodes.normals[n], mine);
+                if (with_creases) take_crease(*every_, nodes.normals[n], result[n], mine);
+            }
         });
         run.check();
         return result;
@@ -230,6 +276,7 @@ public:
 
 private:
     std::vector<Level> levels_;
+    std::optional<Level> every_;  // without thinning, which takes means across creases
 };
 
 /// The nodes that no quadric is so close to that it tells of their place, too.
@@ -251,7 +298,8 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
                 for (std::uint32_t at = range.begin; at < range.end && !covered[n]; ++at) {
                     const Quadric& q = quadrics[cells.order()[at]];
                     const Vec3 to = minus(p, cells.sorted()[at]);
-                    covered[n] = dot(to, to) < q.apart * q.apart && dot(nodes.normals[n], q.axes[2]) > kFit.same_sheet;
+                    covered[n] = dot(to, to) < q.apart * q.apart &&
+                                 dot(nodes.normals[n], q.axes[2]) > (q.crease ? 0 : kFit.same_sheet);
                 }
         }
     });
@@ -299,26 +347,6 @@ std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
 }
 
 }  // namespace
-
-double Quadric::distance(const Vec3& world) const {
-    const Vec3 to = minus(world, origin);
-    const double u = dot(to, axes[0]), v = dot(to, axes[1]), t = dot(to, axes[2]);
-    const double height = c[0] + u * (c[1] + u * c[3] + v * c[4]) + v * (c[2] + v * c[5]);
-    const double du = c[1] + 2 * u * c[3] + v * c[4], dv = c[2] + 2 * v * c[5] + u * c[4];
-    return (t - height) / std::sqrt(1 + du * du + dv * dv);
-}
-
-double Quadric::curvature() const {
-    // Of [2 c3, c4; c4, 2 c5], the slope at the foot being small.
-    const double mean = c[3] + c[5];
-    return std::abs(mean) + std::hypot(c[3] - c[5], c[4]);
-}
-
-Vec3 Quadric::foot() const {
-    Vec3 at = origin;
-    for (int a = 0; a < 3; ++a) at[a] += c[0] * axes[2][a];
-    return at;
-}
 
 OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     const PointCells cells(cloud.points, edge);
@@ -384,27 +412,29 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
 
 std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
                                   const RunContext& run) {
-    return Fitter(cloud, spacing, run).fit(nodes, run);
+    return Fitter(cloud, spacing, 0, run).fit(nodes, true, run);
 }
 
 std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing,
-                                   std::size_t& bare, const RunContext& run) {
-    const Fitter fitter(cloud, spacing, run);
+                                   double noise, std::size_t& bare, const RunContext& run) {
+    const Fitter fitter(cloud, spacing, noise, run);
     std::vector<Quadric> all;
     bare = 0;
     for (double times = kFit.widest;; times = std::max(1.0, times / 2)) {
         const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
-        std::vector<Quadric> found = fitter.fit(nodes, run);
-        const double least = times > 1 ? kFit.wide_of_apart * apart : 0;
+        const bool is_last = !(times > 1);
+        const double least = is_last ? 0 : kFit.wide_of_apart * apart,
+                     least_of_crease = is_last ? 0 : kCrease.wide_of_apart * apart;
+        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > least_of_crease, run);
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
         for (Quadric& q : found) {
-            if (!(q.radius > least)) continue;
+            if (!(q.radius > (q.crease ? least_of_crease : least))) continue;
             q.apart = apart;
             all.push_back(q);
         }
-        if (!(times > 1)) return without_lone(all);
+        if (is_last) return without_lone(all);
     }
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 // Pieces of the surface behind an oriented cloud: quadrics over neighbourhoods as wide as the noise asks for and the
 // shape allows.
-#include <array>
+#include <memory>
 #include <vector>
 
+#include "cloud/surface/sheet.h"
 #include "covol/domain.h"
 #include "covol/orientation.h"
 #include "covol/run.h"
@@ -21,19 +22,17 @@ struct OrientedCloud {
 /// Means of the points of each cell of the given edge, those on the two sides of a sheet apart.
 [[nodiscard]] OrientedCloud thinned(const OrientedCloud& cloud, double edge);
 
-/// A height over a plane: t = c0 + c1 u + c2 v + c3 u^2 + c4 uv + c5 v^2, world units.
-struct Quadric {
-    Vec3 origin;
-    std::array<Vec3, 3> axes;  ///< u, v and the normal, outward
-    std::array<double, 6> c;
-    double radius = 0;        ///< of the neighbourhood that it was fitted to
-    double least_radius = 0;  ///< of the smallest that tells anything
-    double noise = 0;         ///< standard deviation of the points from it, along each axis
-    double apart = 0;         ///< edge of the cells that its node and those beside it were taken from
-    /// First-order signed distance, > 0 outside.
-    [[nodiscard]] double distance(const Vec3& world) const;
-    [[nodiscard]] double curvature() const;  ///< the larger one at the foot, absolute, nearly
-    [[nodiscard]] Vec3 foot() const;         ///< above the origin
+/// A sheet, or several that meet, fitted to a neighbourhood. Of several the sheet itself is a plane through where they
+/// lie above the origin, across their mean normal.
+struct Quadric : Sheet {
+    double radius = 0;                     ///< of the neighbourhood that it was fitted to
+    double least_radius = 0;               ///< of the smallest that tells anything
+    double noise = 0;                      ///< standard deviation of the points from it, along each axis
+    double apart = 0;                      ///< edge of the cells that its node and those beside it were taken from
+    std::shared_ptr<const Crease> crease;  ///< null: one sheet
+    [[nodiscard]] double distance(const Vec3& world) const {
+        return crease ? crease->distance(world) : Sheet::distance(world);
+    }
 };
 
 /// Quadrics at the nodes, by weighted least squares. The neighbourhood is the largest of a geometric sequence whose fit
@@ -52,8 +51,11 @@ struct Quadric {
 /// four or eight times as much where the neighbourhoods are so wide that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
 /// @param spacing as in fit_quadrics()
+/// @param noise   standard deviation along each axis, about; creases are looked for in neighbourhoods that are wide
+///                enough for it
 /// @param bare    how many nodes have none
 [[nodiscard]] std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
-                                                 double spacing, std::size_t& bare, const RunContext& run);
+                                                 double spacing, double noise, std::size_t& bare,
+                                                 const RunContext& run);
 
 }  // namespace covol::cloud

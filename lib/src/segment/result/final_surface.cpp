@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cloud/surface/hold_topology.h"
+#include "cloud/surface/sharp_mesh.h"
 #include "covol/clip.h"
 #include "covol/compare.h"
 #include "covol/error.h"
@@ -31,6 +32,7 @@ struct Maker {
     const Choices& choices;
     const Domain& domain;
     const std::vector<Vec3>& points;  ///< that attract, without stray ones
+    const cloud::Creases* creases;    ///< of the field that the surface is made of, or null
     Surface made;
 
     [[nodiscard]] const SegmentOptions& options() const { return problem.options; }
@@ -55,7 +57,11 @@ struct Maker {
         set_clip(*made.u, problem.clip());
     }
 
-    void relax() { made.mesh_report = relax_mesh(made.mesh, *made.level_set, {options().extract.isovalue}, run()); }
+    void relax() {
+        made.mesh_report = relax_mesh(made.mesh, *made.level_set, {options().extract.isovalue}, run());
+        if (creases != nullptr && options().extract.isovalue == 0)
+            cloud::sharpen(made.mesh, *creases, domain.voxel_size);
+    }
 
     void take_mesh() {
         made.mesh = extract_mesh(*made.level_set, options().extract, run());
@@ -182,7 +188,7 @@ Surface make_surface(const Problem& problem, const Choices& choices, Solution& s
     const bool is_field =
         solution.start.origin == StartOrigin::Cloud && rests(problem, solution.start, solution.edges.options.feature);
     const std::vector<Vec3>& points = choices.cloud ? choices.cloud->points : solution.start.marks.attracting;
-    Maker maker{problem, choices, solution.start.domain, points, {}};
+    Maker maker{problem, choices, solution.start.domain, points, is_field ? solution.start.creases.get() : nullptr, {}};
     maker.made.active_voxels = solution.solve.active_voxels;
     maker.made.leaf_count = solution.solve.leaf_count;
     maker.made.marks = choices.measured_marks;

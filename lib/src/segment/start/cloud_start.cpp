@@ -91,6 +91,7 @@ StartSurface start_from_cloud(const Problem& problem, const Choices& choices, Ma
         CloudSurface field = cloud::settled_field(facts.domain, *choices.cloud, run);
         start.u = std::move(field.u);
         facts.cloud = std::move(field.report);
+        facts.creases = std::move(field.creases);
         if (!at_rest) start.u = start_from_grid(facts.domain, *start.u, run);
     }
     const CloudReport& report = facts.cloud;

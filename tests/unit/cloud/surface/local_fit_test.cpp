@@ -301,7 +301,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     const OrientedCloud places = oriented(s);
     test::add_noise(s, spacing, 2);
     std::size_t bare = 1000;
-    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, bare, {});
+    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, 0, bare, {});
     CHECK(bare < 20);  // of 10,000 places
     CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
     for (const Quadric& q : quadrics) {
@@ -327,7 +327,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     CHECK(farthest < 3 * edge);
     CHECK(farthest_beyond < 2 * edge);
     // Without noise they are as close as asked: on a ball no neighbourhood is that wide.
-    for (const Quadric& q : quadrics_over(places, places, edge, spacing, bare, {})) CHECK(q.apart == edge);
+    for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 
 TEST_CASE("points far from all others make no quadrics beside those of a sheet") {
@@ -343,7 +343,7 @@ TEST_CASE("points far from all others make no quadrics beside those of a sheet")
     }
     std::size_t bare = 0;
     double widest = 0;
-    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, spacing, bare, {}))
+    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, spacing, 0, bare, {}))
         widest = std::max(widest, q.least_radius);
     INFO("widest " << widest << " spacing " << spacing);
     CHECK(widest < 6 * spacing);

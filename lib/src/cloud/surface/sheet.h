@@ -1,0 +1,40 @@
+#pragma once
+// A piece of a smooth surface, and creases of several.
+#include <array>
+#include <cstddef>
+
+#include "covol/domain.h"
+
+namespace covol::cloud {
+
+/// Two directions across a unit normal, and the normal.
+[[nodiscard]] std::array<Vec3, 3> frame_of(const Vec3& normal);
+
+/// A height over a plane: t = c0 + c1 u + c2 v + c3 u^2 + c4 uv + c5 v^2, world units.
+struct Sheet {
+    Vec3 origin;
+    std::array<Vec3, 3> axes;  ///< u, v and the normal, outward
+    std::array<double, 6> c;
+    /// First-order signed distance, > 0 outside.
+    [[nodiscard]] double distance(const Vec3& world) const;
+    /// Its gradient where the sheet is, a unit vector.
+    [[nodiscard]] Vec3 normal(const Vec3& world) const;
+    [[nodiscard]] double curvature() const;  ///< the larger one at the foot, absolute, nearly
+    [[nodiscard]] Vec3 foot() const;         ///< above the origin
+};
+
+/// Two or three sheets that meet. The solid is first & second, first | second; of three first & (second & third) with
+/// either sign at either place.
+struct Crease {
+    std::array<Sheet, 3> sheets;
+    std::size_t count = 0;
+    bool first_is_convex = true;    ///< between the first and the others
+    bool others_are_convex = true;  ///< between the second and the third
+    double misfit = 0;              ///< root mean square distance of the points
+    [[nodiscard]] double distance(const Vec3& world) const;
+    /// The sheet that the distance is taken from.
+    [[nodiscard]] std::size_t nearest(const Vec3& world) const;
+    [[nodiscard]] Vec3 mean_normal() const;
+};
+
+}  // namespace covol::cloud
