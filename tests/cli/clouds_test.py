@@ -413,19 +413,19 @@ class Edges(Clouds):
         draw, points = random.Random(9), []
         outline = [(0, 0), (12, 0), (12, 3), (3, 3), (3, 10), (0, 10)]
         for (x0, z0), (x1, z1) in zip(outline, outline[1:] + outline[:1]):
-            for _ in range(int(8 * 8 * math.hypot(x1 - x0, z1 - z0))):
+            for _ in range(int(12 * 8 * math.hypot(x1 - x0, z1 - z0))):
                 t = draw.random()
                 points.append((x0 + t * (x1 - x0), draw.uniform(0, 8), z0 + t * (z1 - z0)))
         for y in (0, 8):
             for width, low, high in ((12, 0, 3), (3, 3, 10)):
-                for _ in range(int(8 * width * (high - low))):
+                for _ in range(int(12 * width * (high - low))):
                     points.append((draw.uniform(0, width), y, draw.uniform(low, high)))
         edges = []
         for (x0, z0), (x1, z1) in zip(outline, outline[1:] + outline[:1]):
             edges += self.segment((x0, 0, z0), (x0, 8, z0))
             for y in (0, 8):
                 edges += self.segment((x0, y, z0), (x1, y, z1))
-        self.check_edges(points, edges, 0.35, 8 * (36 + 21))
+        self.check_edges(points, edges, 0.29, 8 * (36 + 21))
 
 
 class Scenes(Clouds):
