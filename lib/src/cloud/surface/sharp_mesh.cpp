@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -59,15 +60,6 @@ std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& f
     return at;
 }
 
-/// The sheets that a place on the surface lies on; 0: it does not.
-unsigned sheets_at(const Crease& crease, const Vec3& place, double within) {
-    const double distance = crease.distance(place);
-    unsigned sheets = 0;
-    for (std::size_t s = 0; s < crease.count; ++s)
-        if (std::abs(crease.sheets[s].distance(place) - distance) < within) sheets |= 1U << s;
-    return sheets;
-}
-
 class Sharpener {
 public:
     Sharpener(TriangleMesh& mesh, const Creases& creases, double h) : mesh_(mesh), creases_(creases), h_(h) {}
@@ -102,14 +94,8 @@ private:
             const Crease* crease = creases_.nearest(place);
             if (crease == nullptr || !(std::abs(crease->distance(place)) < kOnSurface * h_)) return;
             near_[v] = 1;
-            unsigned on = 0, beside = 0;
-            for (std::size_t s = 0; s < crease->count; ++s) {
-                const double off = std::abs(crease->sheets[s].distance(place));
-                if (off < kBeside * h_) beside |= 1U << s;
-                if (off < kOnCrease * h_) on |= 1U << s;
-            }
-            if ((beside & (beside - 1)) == 0) return;
-            on |= 1U << crease->nearest(place);
+            if (std::has_single_bit(crease->sheets_at(place, kBeside * h_))) return;
+            const unsigned on = crease->sheets_at(place, kOnCrease * h_);
             std::optional<Vec3> moved = meeting(*crease, on, place, kLongestMove * h_);
             // What lies on two sheets need not lie on the solid's border.
             if (!moved || std::abs(crease->distance(*moved)) > kSame * h_)
@@ -123,7 +109,7 @@ private:
         const Vec3 from = mesh_.place(a), to = mesh_.place(b), middle = times(0.5, plus(from, to));
         const Crease* crease = creases_.nearest(middle);
         if (crease == nullptr) return {};
-        const unsigned at_a = sheets_at(*crease, from, kSame * h_), at_b = sheets_at(*crease, to, kSame * h_);
+        const unsigned at_a = crease->sheets_at(from, kSame * h_), at_b = crease->sheets_at(to, kSame * h_);
         if ((at_a & at_b) != 0) return {};
         for (const Vec3* end : {&from, &to})
             if (!(std::abs(crease->distance(*end)) < kOnSurface * h_)) return {};
@@ -196,7 +182,7 @@ private:
             const Crease* crease = creases_.nearest(middle);
             if (crease == nullptr || crease->count < 3) continue;
             unsigned common = 7U;
-            for (const std::uint32_t v : t) common &= sheets_at(*crease, mesh_.place(v), kSame * h_);
+            for (const std::uint32_t v : t) common &= crease->sheets_at(mesh_.place(v), kSame * h_);
             if (common != 0) continue;
             const std::optional<Vec3> corner = meeting(*crease, 7U, middle, kLongestMove * h_);
             if (!corner || std::abs(crease->distance(*corner)) > kSame * h_ ||
@@ -214,6 +200,8 @@ private:
     /// to the middle of their neighbours on the crease.
     void mend() {
         meshing::CornerTable table(mesh_.triangles, mesh_.vertices.size());
+        for (std::uint32_t v = 0; v < table.vertices(); ++v)
+            if (is_near(v) && count_sheets(v) == 3) clear_around(table, v);
         bool any = true;
         for (int turn = 0; turn < kMendings && any; ++turn) {
             std::vector<char> is_bad(mesh_.triangles.size());
@@ -230,6 +218,21 @@ private:
             }
         }
         meshing::remove_gone(mesh_.triangles, mesh_.vertices);
+    }
+
+    /// Draws what is closer to a corner than marching cubes tell into it: edges between its creases would cut it off.
+    void clear_around(meshing::CornerTable& table, std::uint32_t vertex) {
+        for (bool any = true; any;) {
+            std::uint32_t close = meshing::CornerTable::kNone;
+            table.around(vertex, [&](std::uint32_t corner) {
+                const std::uint32_t other = table.vertex(table.next(corner)), facing = table.previous(corner);
+                if (length(minus(mesh_.place(other), mesh_.place(vertex))) < kOnCrease * h_ &&
+                    table.can_collapse(facing))
+                    close = facing;
+            });
+            any = close != meshing::CornerTable::kNone;
+            if (any) table.collapse(close);
+        }
     }
 
     void straighten(meshing::CornerTable& table, std::uint32_t triangle) {
@@ -249,7 +252,7 @@ private:
     [[nodiscard]] int count_sheets(std::uint32_t vertex) const {
         const Vec3 place = mesh_.place(vertex);
         const Crease* crease = creases_.nearest(place);
-        return crease == nullptr ? 0 : __builtin_popcount(sheets_at(*crease, place, kSame * h_));
+        return crease == nullptr ? 0 : std::popcount(crease->sheets_at(place, kSame * h_));
     }
 
     struct Shape {
@@ -302,13 +305,13 @@ private:
         const Vec3 place = mesh_.place(vertex);
         const Crease* crease = creases_.nearest(place);
         if (crease == nullptr) return;
-        const unsigned sheets = sheets_at(*crease, place, kSame * h_);
+        const unsigned sheets = crease->sheets_at(place, kSame * h_);
         if (sheets == 7U) return;  // a corner
         Vec3 sum{0, 0, 0};
         int count = 0;
         table.around(vertex, [&](std::uint32_t corner) {
             const Vec3 at = mesh_.place(table.vertex(meshing::CornerTable::next(corner)));
-            if ((sheets_at(*crease, at, kSame * h_) & sheets) != sheets) return;
+            if ((crease->sheets_at(at, kSame * h_) & sheets) != sheets) return;
             sum = plus(sum, at);
             ++count;
         });

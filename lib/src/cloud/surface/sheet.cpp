@@ -54,6 +54,21 @@ std::size_t Crease::nearest(const Vec3& world) const {
 
 double Crease::distance(const Vec3& world) const { return sheets[nearest(world)].distance(world); }
 
+unsigned Crease::sheets_at(const Vec3& world, double within) const {
+    double value = sheets[count - 1].distance(world);
+    unsigned found = 1U << (count - 1);
+    for (std::size_t n = count - 1; n-- > 0;) {
+        const double other = sheets[n].distance(world);
+        const bool is_other = (n == 0 ? first_is_convex : others_are_convex) == (other > value);
+        if (std::abs(other - value) <= within)
+            found |= 1U << n;
+        else if (is_other)
+            found = 1U << n;
+        if (is_other) value = other;
+    }
+    return found;
+}
+
 Vec3 Crease::mean_normal() const {
     Vec3 sum{0, 0, 0};
     for (std::size_t n = 0; n < count; ++n) sum = plus(sum, sheets[n].axes[2]);

@@ -34,6 +34,9 @@ struct Crease {
     [[nodiscard]] double distance(const Vec3& world) const;
     /// The sheet that the distance is taken from.
     [[nodiscard]] std::size_t nearest(const Vec3& world) const;
+    /// The sheets that the distance would be taken from if theirs changed by at most `within`, one bit each: one on a
+    /// face, two on an edge. What only goes on beyond a crease is none of them.
+    [[nodiscard]] unsigned sheets_at(const Vec3& world, double within) const;
     [[nodiscard]] Vec3 mean_normal() const;
 };
 
