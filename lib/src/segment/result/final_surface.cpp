@@ -59,8 +59,9 @@ struct Maker {
 
     void relax() {
         made.mesh_report = relax_mesh(made.mesh, *made.level_set, {options().extract.isovalue}, run());
-        if (creases != nullptr && options().extract.isovalue == 0)
-            cloud::sharpen(made.mesh, *creases, domain.voxel_size);
+        if (creases == nullptr || options().extract.isovalue != 0) return;
+        if (const std::size_t divided = cloud::sharpen(made.mesh, *creases, domain.voxel_size); divided > 0)
+            run().info("mesh: " + std::to_string(divided) + " edges divided along creases");
     }
 
     void take_mesh() {
