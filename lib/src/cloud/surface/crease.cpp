@@ -26,6 +26,7 @@ constexpr int kTurns = 6;                   // of k-planes; they end when no poi
 
 /// Points, and to which sheet each belongs.
 struct Parts {
+    static constexpr std::size_t kAll = 3;  // in place of a part's number
     const std::vector<CreasePoint>& points;
     double radius;
     std::vector<std::uint8_t> of;
@@ -83,7 +84,7 @@ struct Parts {
         std::size_t count = 0;
         double sum = 0;
         for (std::size_t n = 0; n < points.size(); ++n)
-            if (part > 2 || of[n] == part) {
+            if (part == kAll || of[n] == part) {
                 const Vec3 to = minus(points[n].place, sheet.origin);
                 const double u = dot(to, sheet.axes[0]) / radius, v = dot(to, sheet.axes[1]) / radius;
                 Vector6 x;
@@ -106,10 +107,10 @@ struct Parts {
         bool changed = false;
         for (std::size_t n = 0; n < points.size(); ++n) {
             std::size_t best = 0;
-            double least = std::numeric_limits<double>::infinity();
+            double smallest = std::numeric_limits<double>::infinity();
             for (std::size_t s = 0; s < count; ++s)
-                if (const double off = std::abs(distance(sheets[s], points[n].place)); off < least) {
-                    least = off;
+                if (const double off = std::abs(distance(sheets[s], points[n].place)); off < smallest) {
+                    smallest = off;
                     best = s;
                 }
             changed |= of[n] != best;
@@ -220,7 +221,7 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
     crease.misfit = misfit_of(points, crease);
     // What few points bend is of no use beyond them.
     if (crease.misfit > kFlat * radius) {
-        Crease bent = crease;  // whose planes are in the order of the parts no more: they are fitted anew
+        Crease bent = crease;  // All its sheets are fitted anew, because combine() may have swapped them.
         for (std::size_t n = 0; n < points.size(); ++n) parts.weights[n] = points[n].weight;
         for (int turn = 0; turn < kRobustTurns; ++turn) {
             for (std::size_t s = 0; s < count; ++s) {
@@ -250,7 +251,7 @@ std::optional<Crease> fit_crease(const std::vector<CreasePoint>& points, const V
     if (!(length(normal) > 0)) return {};
     Sheet whole{origin, frame_of(unit(normal)), {}};
     const Parts all(points, radius);
-    all.bend(3, whole);
+    all.bend(Parts::kAll, whole);
     double misfit = misfit_of(points, whole);
     if (misfit < kFlat * radius) return {};
     std::optional<Crease> best;
