@@ -9,9 +9,7 @@
 
 namespace covol {
 
-namespace cloud {
 class Creases;
-}
 
 /// What surface_from_cloud() found out about the points.
 struct CloudReport {
@@ -39,7 +37,7 @@ struct CloudReport {
 struct CloudSurface {
     FloatGridPtr u;
     CloudReport report;
-    std::shared_ptr<const cloud::Creases> creases;  ///< where sheets meet; null: nowhere
+    std::shared_ptr<const Creases> creases;  ///< where sheets meet; null: nowhere
 };
 
 /// The closed surface behind points without normals, as a start (negative inside).

@@ -14,7 +14,8 @@
 #include "base/geometry.h"
 #include "mesh/corner_table.h"
 
-namespace covol::cloud {
+namespace covol {
+namespace cloud {
 namespace {
 
 // In voxels.
@@ -334,18 +335,22 @@ private:
 
 }  // namespace
 
-Creases::Creases(std::vector<Quadric> quadrics, std::vector<double> reach)
+std::size_t sharpen(TriangleMesh& mesh, const Creases& creases, double h) { return Sharpener(mesh, creases, h).run(); }
+
+}  // namespace cloud
+
+Creases::Creases(std::vector<cloud::Quadric> quadrics, std::vector<double> reach)
     : quadrics_(std::move(quadrics)),
       reach_(std::move(reach)),
       longest_(reach_.empty() ? 1 : *std::max_element(reach_.begin(), reach_.end())),
-      cells_(feet_of(quadrics_), longest_) {}
+      cells_(cloud::feet_of(quadrics_), longest_) {}
 
-const Crease* Creases::nearest(const Vec3& place) const {
-    thread_local std::vector<PointCells::Range> ranges;
+const cloud::Crease* Creases::nearest(const Vec3& place) const {
+    thread_local std::vector<cloud::PointCells::Range> ranges;
     cells_.find(place, longest_, ranges);
     double smallest = std::numeric_limits<double>::infinity();
-    const Crease* found = nullptr;
-    for (const PointCells::Range& range : ranges)
+    const cloud::Crease* found = nullptr;
+    for (const cloud::PointCells::Range& range : ranges)
         for (std::uint32_t at = range.begin; at < range.end; ++at) {
             const Vec3 to = minus(cells_.sorted()[at], place);
             const double squared = dot(to, to);
@@ -357,6 +362,4 @@ const Crease* Creases::nearest(const Vec3& place) const {
     return found;
 }
 
-std::size_t sharpen(TriangleMesh& mesh, const Creases& creases, double h) { return Sharpener(mesh, creases, h).run(); }
-
-}  // namespace covol::cloud
+}  // namespace covol

@@ -32,7 +32,7 @@ struct Maker {
     const Choices& choices;
     const Domain& domain;
     const std::vector<Vec3>& points;  ///< that attract, without stray ones
-    const cloud::Creases* creases;    ///< of the field that the surface is made of, or null
+    const Creases* creases;           ///< of the field that the surface is made of, or null
     Surface made;
 
     [[nodiscard]] const SegmentOptions& options() const { return problem.options; }

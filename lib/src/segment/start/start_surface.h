@@ -36,7 +36,7 @@ struct StartFacts {
     GuessReport guess;
     InferenceReport inference;  ///< of a guess in an image
     CloudReport cloud;
-    std::shared_ptr<const cloud::Creases> creases;  ///< of a cloud, or null
+    std::shared_ptr<const Creases> creases;  ///< of a cloud, or null
     CorrectionReport correction_report;
     TagDistanceChoice tag;
     BandReport band;
