@@ -13,6 +13,8 @@ using detail::Int8;
 
 COVOL_INLINE Float8& at(float* values, int row) { return reinterpret_cast<Float8*>(values)[row]; }
 
+COVOL_INLINE float square_root(float x) { return __builtin_sqrtf(x); }
+
 COVOL_INLINE Float8 square_root(Float8 x) {
     for (int n = 0; n < 8; ++n) x[n] = __builtin_sqrtf(x[n]);
     return x;
@@ -34,23 +36,27 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
-/// First-order distances of a row of places to a sheet.
-COVOL_INLINE Float8 distance_to(const BlendSheet& s, float x, float y, Float8 z) {
+/// First-order distance of a place, or of a row of places, to a sheet.
+template <typename Real>
+COVOL_INLINE Real distance_to(const BlendSheet& s, float x, float y, Real z) {
     x -= s.origin[0], y -= s.origin[1], z -= s.origin[2];
-    const Float8 u = s.axes[0][0] * x + s.axes[0][1] * y + s.axes[0][2] * z;
-    const Float8 v = s.axes[1][0] * x + s.axes[1][1] * y + s.axes[1][2] * z;
-    const Float8 t = s.axes[2][0] * x + s.axes[2][1] * y + s.axes[2][2] * z;
-    const Float8 height = s.c[0] + u * (s.c[1] + u * s.c[3] + v * s.c[4]) + v * (s.c[2] + v * s.c[5]);
-    const Float8 du = s.c[1] + 2 * u * s.c[3] + v * s.c[4], dv = s.c[2] + 2 * v * s.c[5] + u * s.c[4];
+    const Real u = s.axes[0][0] * x + s.axes[0][1] * y + s.axes[0][2] * z;
+    const Real v = s.axes[1][0] * x + s.axes[1][1] * y + s.axes[1][2] * z;
+    const Real t = s.axes[2][0] * x + s.axes[2][1] * y + s.axes[2][2] * z;
+    const Real height = s.c[0] + u * (s.c[1] + u * s.c[3] + v * s.c[4]) + v * (s.c[2] + v * s.c[5]);
+    const Real du = s.c[1] + 2 * u * s.c[3] + v * s.c[4], dv = s.c[2] + 2 * v * s.c[5] + u * s.c[4];
     return (t - height) / square_root(1 + du * du + dv * dv);
 }
 
-COVOL_INLINE Float8 distance_to(const BlendPiece& p, float x, float y, Float8 z) {
-    Float8 distance = distance_to(p.sheets[p.count - 1], x, y, z);
+template <typename Real>
+COVOL_INLINE Real distance_to(const BlendPiece& p, float x, float y, Real z) {
+    Real distance = distance_to(p.sheets[p.count - 1], x, y, z);
     for (int n = p.count - 2; n >= 0; --n) {
-        const Float8 other = distance_to(p.sheets[n], x, y, z);
-        const bool is_convex = n == 0 ? p.first_is_convex : p.others_are_convex;
-        distance = (other > distance) == (Int8{} - int(is_convex)) ? other : distance;
+        const Real other = distance_to(p.sheets[n], x, y, z);
+        if (n == 0 ? p.first_is_convex : p.others_are_convex)
+            distance = other > distance ? other : distance;
+        else
+            distance = other > distance ? distance : other;
     }
     return distance;
 }
@@ -87,8 +93,7 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
             const std::int32_t nearest = leaf.nearest[voxel];
             for (std::size_t a = 0; a < 3; ++a) leaf.normal[a][voxel] = nearest < 0 ? 0.0F : pieces[nearest].normal[a];
             if (nearest < 0) continue;
-            const float distance =
-                distance_to(pieces[nearest], h * float(row >> 3), h * float(row & 7), Float8{} + h * float(k))[0];
+            const float distance = distance_to(pieces[nearest], h * float(row >> 3), h * float(row & 7), h * float(k));
             any |= std::abs(distance) < limit;
             leaf.sum[voxel] = distance;
             leaf.weight[voxel] = 1;

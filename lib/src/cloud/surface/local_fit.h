@@ -40,7 +40,8 @@ struct Quadric : Sheet {
 /// 2004, Goldenshluger and Nemirovski 1997): wide where noise has to be averaged, narrow at edges and tips. What noise
 /// of the same size along the surface bends is straightened: it lowers the mean height of points by half its variance
 /// times the Laplacian. Where the smallest neighbourhood's points are much farther from its quadric than from the
-/// indicator's surface it has sheets of several folds or an edge in it, and there is no quadric.
+/// indicator's surface it has sheets of several folds in it, and there is no quadric. Where sheets meet in an
+/// edge or a corner, fit_crease() gives these.
 /// @param nodes    where; their normals say which side of a sheet they are on
 /// @param spacing  mean distance of neighbours on the surface, of `cloud`'s points as they were measured
 /// @return as many as there are nodes; radius 0 where no neighbourhood is a sheet

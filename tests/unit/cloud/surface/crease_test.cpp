@@ -76,7 +76,7 @@ double worst(const Crease& crease, const Solid& f) {
 
 }  // namespace
 
-TEST_CASE("fit_crease: edges, grooves and corners of every kind are found to the bit where points are exact") {
+TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where points are exact") {
     const Solid a = half_space({1, 0.2, 0}, 0.1), b = half_space({-0.1, 1, 0.3}, 0.05),
                 c = half_space({0.1, -0.2, 1}, 0.08);
     const struct {
@@ -148,7 +148,7 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
             for (int k = -14; k <= 14; ++k)
                 at.setValue({i, j, k}, float(std::clamp(box({double(i), double(j), double(k)}), -3.0, 3.0)));
     TriangleMesh mesh = extract_mesh(*extract_surface(*grid));
-    const auto off_edges = [&] {  // of the corners and places along edges, to the nearest vertex
+    const auto off_corners = [&] {  // of the corners, to the nearest vertex
         double most = 0;
         for (int n = 0; n < 8; ++n) {
             Vec3 corner{0, 0, 0};
@@ -161,7 +161,7 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
         }
         return most;
     };
-    CHECK(off_edges() > 0.1);
+    CHECK(off_corners() > 0.1);
     std::vector<Quadric> quadrics;
     for (int i = -1; i <= 1; ++i)
         for (int j = -1; j <= 1; ++j)
@@ -185,7 +185,7 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
             }
     const Creases creases(quadrics, std::vector<double>(quadrics.size(), 7.0));
     CHECK(sharpen(mesh, creases, 1) > 50);
-    CHECK(off_edges() < 1e-4);
+    CHECK(off_corners() < 1e-4);
     const MeshMeasures m = measure(mesh);
     CHECK((m.closed && m.manifold && m.genus == 0 && m.components == 1));
     CHECK(std::abs(m.volume / std::pow(2 * kHalfEdge, 3) - 1) < 1e-4);
