@@ -24,9 +24,10 @@ sys.path[:0] = [str(ROOT / "tests/cli"), str(ROOT / "tools/napari")]
 
 BLUE, YELLOW, WHITE = (68, 119, 170), (255, 220, 60), (255, 255, 255)
 COLORS = (BLUE, (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119))
-STYLE = """body { margin: 0; padding: 10px; font: 13px/1.35 sans-serif; color: #222; background: #fff; width: max-content }
+# The family is named: whose width sans-serif has depends on what else is installed, and so would the width of a picture.
+STYLE = """body { margin: 0; padding: 10px; font: 13px/1.35 "DejaVu Sans", sans-serif; color: #222; background: #fff; width: max-content }
 .row { display: flex; gap: 8px; align-items: flex-start } .column { display: flex; flex-direction: column; gap: 8px }
-figure { margin: 0 } figcaption { padding: 2px 0 } img { display: block } pre { margin: 0; font: 12px/1.4 monospace }
+figure { margin: 0 } figcaption { padding: 2px 0 } img { display: block } pre { margin: 0; font: 12px/1.4 "DejaVu Sans Mono", monospace }
 table { border-collapse: collapse } td, th { padding: 1px 8px 1px 0; text-align: left; font-weight: normal } th { color: #666 }
 .cell { border-left: 3px solid #77a; background: #f5f5f8; padding: 6px 8px }"""
 
