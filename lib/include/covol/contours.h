@@ -72,6 +72,9 @@ private:
 /// @param gap           usual distance between marked slices
 [[nodiscard]] COVOL_API double compute_cap_height(double area, double before, double distance, double gap);
 
+/// Sections in planes of several directions, as densify() found them.
+struct Sections;
+
 /// Marks on slices, made dense enough to hold a level set.
 struct Contours {
     std::vector<Vec3> marks;                    ///< as they were clicked, world units
@@ -84,6 +87,7 @@ struct Contours {
     double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
     std::string summary;        ///< one line for people
     bool is_network = false;    ///< planes of several directions: no solid, `along` is thinned, and the sides are told
+    std::shared_ptr<const Sections> sections;  ///< of a network of closed lines alone, or null
     std::vector<Vec3> inside, outside;  ///< of a network: places in its planes, by the even-odd rule in each
     /// Of a network: of each place of `along` the direction within its plane that points out of the section; empty
     /// where there are open lines.

@@ -96,6 +96,9 @@ struct SegmentOptions {
     /// exterior seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior
     /// seed.
     std::shared_ptr<const Contours> contours;
+    /// Of a network of contours, whose lines are the marks: a guess that contradicts them is given up for what lies
+    /// between them.
+    std::shared_ptr<const Sections> sections;
     PointHints hints;                    ///< of the points as they are given; for a cloud
     std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
     std::size_t painted_seeds = 0;       ///< so many of them are voxels of paint; for messages

@@ -268,7 +268,7 @@ void Densifier::make_network() {
         (line.closed ? closed : open).push_back(std::move(curve));
     }
     const double step = std::max(options_.step, length / kContours.network_marks);
-    const std::vector<detail::Section> sections =
+    std::vector<detail::Section> sections =
         detail::sections_of(closed, has_image_ ? kContours.same_slice * geometry_.smallest_spacing()
                                                : kContours.same_slice_of_extent * detail::extent_of(result_.marks));
     detail::SectionMarks marks = detail::marks_along(sections, step);
@@ -283,6 +283,7 @@ void Densifier::make_network() {
     result_.outside = std::move(sides.outside);
     result_.slices = sections.size();
     result_.is_network = true;
+    if (open.empty() && !has_loose_) result_.sections = std::make_shared<Sections>(Sections{std::move(sections)});
 }
 
 void Densifier::join_lines() {

@@ -154,13 +154,18 @@ SectionMarks marks_along(const std::vector<Section>& sections, double step) {
     return marks;
 }
 
+SectionLevels levels_of(const Section& section, double cell) {
+    SectionLevels levels{section.plane, grid_around(section.polygons, cell), {}};
+    levels.level = signed_distance_of_polygons(section.polygons, levels.grid);
+    return levels;
+}
+
 Sides sides_of(const std::vector<Section>& sections, double cell) {
     Sides sides;
     for (const Section& section : sections) {
-        const SliceGrid grid = grid_around(section.polygons, cell);
-        const std::vector<float> level = signed_distance_of_polygons(section.polygons, grid);
+        const SectionLevels levels = levels_of(section, cell);
         for (const bool inside : {true, false})
-            for (const Vec2& centre : centres_of_discs(level, grid, inside, grid.cell))
+            for (const Vec2& centre : centres_of_discs(levels.level, levels.grid, inside, levels.grid.cell))
                 (inside ? sides.inside : sides.outside).push_back(section.plane.world(centre));
     }
     return sides;

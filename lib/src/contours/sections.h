@@ -30,6 +30,16 @@ struct Section {
     std::vector<Polygon> polygons;
 };
 
+/// The signed distance within a section's plane to its polygons, negative inside by the even-odd rule.
+struct SectionLevels {
+    SectionPlane plane;
+    SliceGrid grid;
+    std::vector<float> level;
+    [[nodiscard]] double at(const Vec2& p) const { return sample_slice(level, grid, place_in(grid, p[0], p[1])); }
+};
+/// @param cell  of the grid, which holds the polygons and something around them; larger where it would have too many
+[[nodiscard]] SectionLevels levels_of(const Section& section, double cell);
+
 /// Contours by plane: those that lie within `tolerance` of one share it.
 [[nodiscard]] std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance);
 
@@ -49,3 +59,11 @@ struct Sides {
 [[nodiscard]] Sides sides_of(const std::vector<Section>& sections, double cell);
 
 }  // namespace covol::detail
+
+namespace covol {
+
+struct Sections {
+    std::vector<detail::Section> planes;
+};
+
+}  // namespace covol

@@ -114,6 +114,7 @@ private:
         if (marks.points.empty()) {
             marks.hints.normals = network.outward;
             marks.hints.is_outward = true;
+            options.sections = network.sections;
         }
         append(marks.points, network.along);
         append(options.inside, network.inside);

@@ -1,8 +1,10 @@
 // The start from few marks: the surface through them that bends least.
 #include <utility>
 
+#include "contours/section_field.h"
 #include "covol/inference.h"
 #include "covol/orientation.h"
+#include "covol/start.h"
 #include "distance/memory_need.h"
 #include "guess/guess_in_image.h"
 #include "segment/heuristics.h"
@@ -52,6 +54,33 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
+/// Where the surface that bends least runs off between thin parts, what lies between the sections does not.
+void take_sections(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
+    StartFacts& facts = start.facts;
+    const Domain& domain = facts.domain;
+    const detail::SectionField field(problem.options.sections->planes, domain.voxel_size, domain.origin, problem.run);
+    std::size_t wrong = 0;
+    const auto count = [&](const std::vector<Vec3>& places, bool is_inside) {
+        for (const Vec3& place : places) {
+            double value = 0;
+            field.row(place, {0, 0, 0}, 1, &value);
+            wrong += (value < 0) != is_inside;
+        }
+    };
+    count(problem.options.inside, true);
+    count(problem.options.outside, false);
+    if (wrong >= facts.guess.wrong_seeds) return;
+    start.u = start_from_level(
+        domain, marks,
+        [&](const Vec3& from, const Vec3& step, int n, double* values) { field.row(from, step, n, values); },
+        problem.run);
+    facts.on_surface = marks;
+    facts.guess.summary = std::to_string(marks.size()) + " marks; " + std::to_string(facts.guess.wrong_seeds) +
+                          " places of their sections contradict the surface through them that bends least: the "
+                          "harmonic function between the sections is taken";
+    facts.guess.wrong_seeds = wrong;
+}
+
 void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     StartFacts& facts = start.facts;
     Guess made = guess::guess_in_image(facts.domain, marks, guess_options(problem, start.h(), marks), problem.clip(),
@@ -59,6 +88,7 @@ void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface&
     facts.guess = std::move(made.report);
     start.u = std::move(made.u);
     facts.on_surface = std::move(made.marks);
+    if (problem.options.sections && facts.guess.wrong_seeds > 0) take_sections(problem, marks, start);
 }
 
 /// What marks and image show together, if the marks alone are not as good.
