@@ -3,6 +3,7 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/sections_test.py
 """
 import csv
+import itertools
 import json
 import math
 import unittest
@@ -17,9 +18,9 @@ VOLUME = 4 / 3 * math.pi * RADII.prod()
 AXES = rotation((1, 2, 3), 0.7)  # columns: axes of the ellipsoid
 
 
-def section(normal, offset, count=48, radii=RADII):
+def section(normal, offset, count=48, radii=RADII, axes=AXES):
     """The ellipsoid's outline in the plane normal . (x - CENTRE) = offset; none where they do not meet."""
-    n = AXES.T @ normal * radii  # the plane, where the ellipsoid is the unit ball
+    n = axes.T @ normal * radii  # the plane, where the ellipsoid is the unit ball
     reach = np.linalg.norm(n)
     if abs(offset) >= 0.98 * reach:
         return None
@@ -30,7 +31,7 @@ def section(normal, offset, count=48, radii=RADII):
     v = np.cross(n, u)
     turns = 2 * math.pi * np.arange(count) / count
     ball = middle + r * (np.outer(np.cos(turns), u) + np.outer(np.sin(turns), v))
-    return CENTRE + (ball * radii) @ AXES.T
+    return CENTRE + (ball * radii) @ axes.T
 
 
 def family(normal, count, radii=RADII):
@@ -93,6 +94,22 @@ class Sections(Case):
         report = self.surface("--contours", write_csl(self.inputs / "shell.csl", planes), "--voxel-size", 0.3)
         self.assertAlmostEqual(report["surface"]["volume"] / (VOLUME * 7 / 8), 1, delta=0.05)
         self.assertEqual(report["surface"]["components"], 2)
+
+    def test_many_thin_bodies(self):
+        """Of the outlines of all few lie on each: the surface that bends least through them runs off."""
+        rng, radii, bodies = np.random.default_rng(5), np.array([3.2, 0.9, 0.9]), []
+        for place in itertools.product((-7.0, 0, 7.0), (-3.0, 0, 3.0), (-1.5, 1.5)):
+            bodies.append((np.array(place), rotation((0.3, 1, 0.2), 0.2) @ rotation(rng.normal(size=3), 0.2)))
+        planes = []
+        for normal in np.eye(3)[:2]:
+            for offset in np.linspace(-9.4, 9.4, 13) if normal[0] else np.linspace(-3.9, 3.9, 9):
+                lines = [(1, section(normal, offset - normal @ place, radii=radii, axes=axes) + place) for place, axes in bodies
+                         if section(normal, offset - normal @ place, radii=radii, axes=axes) is not None]
+                planes.append((normal, offset, lines))
+        report = self.surface("--contours", write_csl(self.inputs / "many.csl", planes), "--contour-curve", "lines", "--voxel-size", 0.15)
+        surface = report["surface"]
+        self.assertEqual((surface["components"], surface["genus"]), (len(bodies), 0))
+        self.assertAlmostEqual(surface["volume"] / (len(bodies) * 4 / 3 * math.pi * radii.prod()), 1, delta=0.15)
 
     def test_slicers_closed_curves(self):
         curves = [{"type": "ClosedCurve", "coordinateSystem": "LPS", "name": f"c{n}", "controlPoints": [{"position": list(p)} for p in line[::3]]}

@@ -88,7 +88,7 @@ struct Contours {
     std::string summary;        ///< one line for people
     bool is_network = false;    ///< planes of several directions: no solid, `along` is thinned, and the sides are told
     std::shared_ptr<const Sections> sections;  ///< of a network of closed lines alone, or null
-    std::vector<Vec3> inside, outside;  ///< of a network: places in its planes, by the even-odd rule in each
+    std::vector<Vec3> inside, outside;         ///< of a network: places in its planes, by the even-odd rule in each
     /// Of a network: of each place of `along` the direction within its plane that points out of the section; empty
     /// where there are open lines.
     std::vector<Vec3> outward;

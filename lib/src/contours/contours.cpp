@@ -166,10 +166,12 @@ void Densifier::find_planes(Line& line) const {
     }
 }
 
-/// Whether each closed line lies across one of the image's axes, or of the world's.
+/// Whether each closed line lies across one of the image's axes; without an image, across the frame's: there no axis
+/// comes before others.
 bool Densifier::lies_in_slices() const {
     return std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) {
-        return !line.closed || line.constant != std::array<bool, 3>{false, false, false};
+        return !line.closed ||
+               (has_image_ ? line.constant != std::array<bool, 3>{false, false, false} : line.constant[frame_.axis()]);
     });
 }
 

@@ -16,12 +16,12 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kMostFieldNodes = 6'000'000;
-constexpr int kCoarsest = 16;        // nodes along the longest side
-constexpr float kSettled = 1e-3F;    // largest change of a value in a sweep
+constexpr int kCoarsest = 16;      // nodes along the longest side
+constexpr float kSettled = 1e-3F;  // largest change of a value in a sweep
 constexpr int kMostSweeps = 400;
 constexpr std::size_t kFolds = 6;
 constexpr float kFarthestLevel = 0.8F;  // from 0, of the surface
-constexpr float kClosest = 1e-3F;    // cells from a plane; a node that is closer has the plane's value
+constexpr float kClosest = 1e-3F;       // cells from a plane; a node that is closer has the plane's value
 
 using Size = std::array<int, 3>;
 
@@ -42,7 +42,9 @@ struct Lattice {
     Vec3 low;
     double cell;
     Size size;
-    [[nodiscard]] std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
+    [[nodiscard]] std::size_t count() const {
+        return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]);
+    }
     [[nodiscard]] std::array<std::ptrdiff_t, 3> strides() const {
         return {std::ptrdiff_t(size[1]) * size[2], size[2], 1};
     }
@@ -97,7 +99,8 @@ std::vector<Stop> stops_of(const std::vector<SectionLevels>& planes, const Latti
                     const auto node = std::uint32_t(i * stride[a] + j * stride[b] + k * stride[c]);
                     const auto part = float(t - i);
                     found[n].push_back({node, std::uint8_t(2 * a + 1), std::max(part, kClosest), value});
-                    found[n].push_back({std::uint32_t(node + stride[a]), std::uint8_t(2 * a), std::max(1 - part, kClosest), value});
+                    found[n].push_back(
+                        {std::uint32_t(node + stride[a]), std::uint8_t(2 * a), std::max(1 - part, kClosest), value});
                 }
         }
     });
@@ -216,7 +219,8 @@ double area_within(const SectionPlane& plane, const WorldBox& box) {
             at[a] -= plane.height(at) / plane.normal[a];
             within += at[a] >= box.min[a] && at[a] <= box.max[a];
         }
-    return within / double(kAlong * kAlong) * (box.max[b] - box.min[b]) * (box.max[c] - box.min[c]) / std::abs(plane.normal[a]);
+    return within / double(kAlong * kAlong) * (box.max[b] - box.min[b]) * (box.max[c] - box.min[c]) /
+           std::abs(plane.normal[a]);
 }
 
 struct Field {
@@ -240,9 +244,8 @@ Field solve_between(const std::vector<SectionLevels>& planes, const WorldBox& bo
                 const auto stride = lattice.strides();
                 for (int j = 1; j + 1 < lattice.size[1]; ++j)
                     for (int k = 1; k + 1 < lattice.size[2]; ++k)
-                        finer.values[std::size_t(i * stride[0] + j * stride[1] + k)] =
-                            float(trilinear(field.values, field.lattice,
-                                            plus(lattice.low, cell, {double(i), double(j), double(k)})));
+                        finer.values[std::size_t(i * stride[0] + j * stride[1] + k)] = float(trilinear(
+                            field.values, field.lattice, plus(lattice.low, cell, {double(i), double(j), double(k)})));
             });
         Solver(planes, lattice, run).solve(finer.values, across / cell);
         field = std::move(finer);
@@ -265,7 +268,8 @@ float cross_validated_level(const std::vector<SectionLevels>& planes, const Worl
             const int stride = std::max(1, int(cell / plane.grid.cell));
             for (int j = 0; j < plane.grid.ny; j += stride)
                 for (int i = 0; i < plane.grid.nx; i += stride) {
-                    const Vec2 at{plane.grid.origin[0] + i * plane.grid.cell, plane.grid.origin[1] + j * plane.grid.cell};
+                    const Vec2 at{plane.grid.origin[0] + i * plane.grid.cell,
+                                  plane.grid.origin[1] + j * plane.grid.cell};
                     const float level = plane.level[std::size_t(j) * std::size_t(plane.grid.nx) + std::size_t(i)];
                     found.emplace_back(float(trilinear(field.values, field.lattice, plane.plane.world(at))), level < 0);
                 }

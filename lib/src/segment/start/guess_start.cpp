@@ -6,6 +6,7 @@
 #include "covol/orientation.h"
 #include "covol/start.h"
 #include "distance/memory_need.h"
+#include "grid/levels_at.h"
 #include "guess/guess_in_image.h"
 #include "segment/heuristics.h"
 #include "segment/solve/fields.h"
@@ -54,31 +55,33 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
+/// Of the places whose side is known those on the other one.
+std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
+    std::size_t wrong = 0;
+    for (const double level : detail::levels_at(u, problem.options.inside)) wrong += level >= 0;
+    for (const double level : detail::levels_at(u, problem.options.outside)) wrong += level < 0;
+    return wrong;
+}
+
 /// Where the surface that bends least runs off between thin parts, what lies between the sections does not.
 void take_sections(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     StartFacts& facts = start.facts;
+    const std::size_t before = count_wrong(problem, *start.u);
+    if (before == 0) return;
     const Domain& domain = facts.domain;
     const detail::SectionField field(problem.options.sections->planes, domain.voxel_size, domain.origin, problem.run);
-    std::size_t wrong = 0;
-    const auto count = [&](const std::vector<Vec3>& places, bool is_inside) {
-        for (const Vec3& place : places) {
-            double value = 0;
-            field.row(place, {0, 0, 0}, 1, &value);
-            wrong += (value < 0) != is_inside;
-        }
-    };
-    count(problem.options.inside, true);
-    count(problem.options.outside, false);
-    if (wrong >= facts.guess.wrong_seeds) return;
-    start.u = start_from_level(
+    const FloatGridPtr u = start_from_level(
         domain, marks,
         [&](const Vec3& from, const Vec3& step, int n, double* values) { field.row(from, step, n, values); },
         problem.run);
+    const std::size_t after = count_wrong(problem, *u);
+    if (after >= before) return;
+    start.u = u;
     facts.on_surface = marks;
-    facts.guess.summary = std::to_string(marks.size()) + " marks; " + std::to_string(facts.guess.wrong_seeds) +
+    facts.guess.summary = std::to_string(marks.size()) + " marks; " + std::to_string(before) +
                           " places of their sections contradict the surface through them that bends least: the "
                           "harmonic function between the sections is taken";
-    facts.guess.wrong_seeds = wrong;
+    facts.guess.wrong_seeds = after;
 }
 
 void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
@@ -88,7 +91,7 @@ void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface&
     facts.guess = std::move(made.report);
     start.u = std::move(made.u);
     facts.on_surface = std::move(made.marks);
-    if (problem.options.sections && facts.guess.wrong_seeds > 0) take_sections(problem, marks, start);
+    if (problem.options.sections) take_sections(problem, marks, start);
 }
 
 /// What marks and image show together, if the marks alone are not as good.
