@@ -17,7 +17,7 @@ ALLOWED = {
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMostReach",
-    "contours/contour_curve.cpp:kLongestPiece", "contours/slice_field.cpp:kSeedPiece",
+    "contours/contour_curve.cpp:kLongestPiece", "contours/section_field.cpp:kClosest", "contours/section_field.cpp:kSettled", "contours/slice_field.cpp:kSeedPiece",
     "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
     "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",

@@ -20,7 +20,6 @@ constexpr int kCoarsest = 16;      // nodes along the longest side
 constexpr float kSettled = 1e-3F;  // largest change of a value in a sweep
 constexpr int kMostSweeps = 400;
 constexpr std::size_t kFolds = 6;
-constexpr float kFarthestLevel = 0.8F;  // from 0, of the surface
 constexpr float kClosest = 1e-3F;       // cells from a plane; a node that is closer has the plane's value
 
 using Size = std::array<int, 3>;
@@ -279,11 +278,10 @@ float cross_validated_level(const std::vector<SectionLevels>& planes, const Worl
     // Those below the level that are outside, and those above it that are inside.
     auto wrong = std::ptrdiff_t(std::count_if(found.begin(), found.end(), [](const auto& f) { return f.second; }));
     std::ptrdiff_t fewest = wrong;
-    float best = -kFarthestLevel;
+    float best = 0;
     for (const auto& [value, is_inside] : found) {
         wrong += is_inside ? -1 : 1;
-        if (value >= kFarthestLevel) break;
-        if (value > -kFarthestLevel && wrong < fewest) {
+        if (std::abs(value) < 1 && wrong < fewest) {
             fewest = wrong;
             best = value;
         }

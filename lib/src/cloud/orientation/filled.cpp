@@ -20,16 +20,6 @@ namespace {
 
 constexpr int kMostRadii = 64;
 
-/// Some of the points, evenly: those that lie together follow each other.
-std::vector<Vec3> thinned(const std::vector<Vec3>& points, double spacing) {
-    if (points.size() <= kFilled.most_points) return points;
-    const PointCells cells(points, kOrientation.sample_spacings * spacing);
-    std::vector<Vec3> some;
-    for (std::size_t n = 0; n < kFilled.most_points; ++n)
-        some.push_back(cells.sorted()[n * points.size() / kFilled.most_points]);
-    return some;
-}
-
 struct Neighbourhood {
     double count = 0;
     double thickness = 0;  ///< [radii] least standard deviation along any direction
@@ -55,16 +45,18 @@ Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radi
     return {count, std::sqrt(std::max(0.0, axes.eigenvalues()[0]))};
 }
 
+/// [radii] Of random points that fill a ball; fitted to balls of 8 to 100 points, of which few measure less.
+double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / std::sqrt(count)); }
+
 }  // namespace
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
-    const std::vector<Vec3> some = thinned(points, spacing);
-    const auto all = double(some.size());
-    if (all < 32 * kFilled.least_neighbours || !(spacing > 0)) return false;  // an eighth is four times the first ones
-    const PointCells cells(some, spacing * std::cbrt(double(points.size()) / all));
-    std::vector<Neighbourhood> around(std::min(some.size(), kFilled.samples));
+    const auto all = double(points.size());
+    if (all < 96 * kFilled.least_neighbours || !(spacing > 0)) return false;  // an eighth is twelve times the first ones
+    const PointCells cells(points, spacing);
+    std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
     // Not every so many: points in rows would be asked at the same place of each row.
-    const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % some.size()]; };
+    const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
     for (int n = 0; n < kMostRadii; ++n, radius *= kCloudScale.growth) {
         run.check();
@@ -78,7 +70,8 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
         const double count = median_of([](const Neighbourhood& a) { return a.count; });
         if (count < kFilled.least_neighbours) continue;
         if (count > all / 8) return true;
-        if (median_of([](const Neighbourhood& a) { return a.thickness; }) < kFilled.least_thickness) return false;
+        const double thickness = median_of([](const Neighbourhood& a) { return a.thickness; });
+        if (thickness < std::min(kFilled.least_thickness, kFilled.thick * expected_thickness(count))) return false;
     }
     return false;
 }

@@ -45,15 +45,15 @@ COVOL_HEURISTICS StrayHeuristics kStray{};
 
 /// Points that fill a solid: filled.cpp.
 struct FilledHeuristics {
-    /// [points] That are looked at, evenly spread.
-    std::size_t most_points = heuristic("filled.most_points", 20000);
-    /// [points] Whose neighbourhoods are, of those.
+    /// [points] Whose neighbourhoods are looked at.
     std::size_t samples = heuristic("filled.samples", 400);
     /// [points] Fewest in a neighbourhood.
-    double least_neighbours = heuristic("filled.least_neighbours", 24);
+    double least_neighbours = heuristic("filled.least_neighbours", 8);
     /// [radii] Least standard deviation along any direction, at all radii, of points that fill a solid: measured 0.29
     /// to 0.42 of balls, boxes, tori and lattices, 0.24 and less of surfaces with noise and thin parts.
     double least_thickness = heuristic("filled.least_thickness", 0.27);
+    /// [of the expected one] The same of few points, which measure less.
+    double thick = heuristic("filled.thick", 0.8);
     /// [distances of the points] Cell of the grid of their density: its splines hold about 70 points.
     double cell_spacings = heuristic("filled.cell_spacings", 2);
 };

@@ -27,6 +27,22 @@ std::vector<Vec3> near(const test::Solid3& shape, std::size_t count, double nois
     return s.points;
 }
 
+/// On a gyroid of three periods along each axis, whose sheets lie about 3 apart.
+std::vector<Vec3> on_gyroid(std::size_t count, unsigned seed) {
+    std::vector<Vec3> points = test::box_cloud(count, {{0, 0, 0}, {6 * M_PI, 6 * M_PI, 6 * M_PI}}, seed);
+    for (Vec3& p : points)
+        for (int step = 0; step < 20; ++step) {
+            const auto [x, y, z] = p;
+            const double value = std::sin(x) * std::cos(y) + std::sin(y) * std::cos(z) + std::sin(z) * std::cos(x);
+            const Vec3 slope{std::cos(x) * std::cos(y) - std::sin(z) * std::sin(x),
+                             std::cos(y) * std::cos(z) - std::sin(x) * std::sin(y),
+                             std::cos(z) * std::cos(x) - std::sin(y) * std::sin(z)};
+            const double squared = slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2];
+            for (int a = 0; a < 3; ++a) p[a] -= value * slope[a] / (squared + 0.01);
+        }
+    return points;
+}
+
 bool fills(const std::vector<Vec3>& points) { return cloud::fill_a_solid(points, measure_spacing(points).median, {}); }
 
 }  // namespace
@@ -37,7 +53,7 @@ TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, wha
         CHECK(fills(within(test::ball(1), 1500, seed)));
         CHECK(fills(within(test::block({1, 0.6, 0.4}), 8000, seed)));
         CHECK(fills(within(test::torus(1, 0.35), 12000, seed)));
-        CHECK(fills(within(test::ball(1), 60000, seed)));  // more than are looked at
+        CHECK(fills(within(test::ball(1), 60000, seed)));
         for (const double noise : {0.0, 0.03, 0.1}) {
             INFO("noise " << noise << ", seed " << seed);
             CHECK_FALSE(fills(near(test::ball(1), 6000, noise, seed)));
@@ -48,6 +64,7 @@ TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, wha
         }
         CHECK_FALSE(fills(within(test::ball(1), 300, seed)));  // too few to tell
     }
+    for (const std::size_t count : {4000, 50000}) CHECK_FALSE(fills(on_gyroid(count, 1)));
     std::vector<Vec3> lattice;
     for (int n = 0; n < 8000; ++n) lattice.push_back({double(n % 20), double(n / 20 % 20), double(n / 400)});
     CHECK(fills(lattice));
