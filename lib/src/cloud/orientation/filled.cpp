@@ -52,7 +52,8 @@ double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / st
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * kFilled.least_neighbours || !(spacing > 0)) return false;  // an eighth is twelve times the first ones
+    if (all < 96 * kFilled.least_neighbours || !(spacing > 0))
+        return false;  // an eighth is twelve times the first ones
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
     // Not every so many: points in rows would be asked at the same place of each row.
