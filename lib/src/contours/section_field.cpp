@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMostFieldNodes = 6'000'000;
 constexpr int kCoarsest = 16;      // nodes along the longest side
-constexpr float kSettled = 1e-3F;  // largest change of a value in a sweep
+constexpr float kSettled = 1e-4F;  // largest change of a value in a sweep
 constexpr int kMostSweeps = 400;
 constexpr std::size_t kFolds = 6;
 constexpr float kClosest = 1e-3F;  // cells from a plane; a node that is closer has the plane's value

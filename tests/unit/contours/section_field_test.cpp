@@ -60,8 +60,8 @@ TEST_CASE("the field between planes of two directions: each plane's sides, and n
     const SectionField field(sections, 0.1, {0.02, 0, 0.01}, {});
     double low = 1, high = -1;
     std::size_t wrong = 0, asked = 0;
-    for (double x = -4.5; x <= 4.5; x += 0.11)
-        for (double y = -4.5; y <= 4.5; y += 0.11)
+    for (double x = -4.2; x <= 4.2; x += 0.11)
+        for (double y = -4.2; y <= 4.2; y += 0.11)
             for (const double z : {-0.8, -0.4, 0.0, 0.4, 0.8, 0.6, 1.1}) {
                 const double found = value(field, {x, y, z});
                 low = std::min(low, found);
