@@ -16,8 +16,9 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kMostFieldNodes = 6'000'000;
-constexpr int kCoarsest = 16;      // nodes along the longest side
-constexpr float kSettled = 1e-4F;  // largest change of a value in a sweep
+constexpr std::size_t kMostStops = 20'000'000;  // edges of the lattice that end on planes; 16 bytes each
+constexpr int kCoarsest = 16;                   // nodes along the longest side
+constexpr float kSettled = 1e-4F;               // largest change of a value in a sweep
 constexpr int kMostSweeps = 400;
 constexpr std::size_t kFolds = 6;
 constexpr float kClosest = 1e-3F;  // cells from a plane; a node that is closer has the plane's value
@@ -304,7 +305,10 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
         box.max[a] += plane_distance_;
         nodes *= (box.max[a] - box.min[a]) / h + 2;
     }
-    cell_ = h * std::max(1.0, std::ceil(std::cbrt(nodes / double(kMostFieldNodes))));
+    // A plane of any direction crosses up to sqrt(3) edges for each node of a layer, each with two ends.
+    const double stops = 2 * std::sqrt(3.0) * double(sections.size()) * std::pow(nodes, 2.0 / 3);
+    cell_ = h * std::ceil(
+                    std::max({1.0, std::cbrt(nodes / double(kMostFieldNodes)), std::sqrt(stops / double(kMostStops))}));
     std::vector<SectionLevels> planes(sections.size());
     tbb::parallel_for(std::size_t(0), planes.size(), [&](std::size_t n) { planes[n] = levels_of(sections[n], cell_); });
     run.check();
