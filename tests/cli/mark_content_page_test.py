@@ -113,7 +113,8 @@ class Content(PageCase):
         if os.environ.get("COVOL_PICTURES"):
             self.driver.save_screenshot(os.environ["COVOL_PICTURES"] + "/table.png")
         self.keys(Keys.ESCAPE)
-        before = self.js("return mark.study.structures[0].result.triangles")
+        # The first answer's voxels are coarser: a machine that is busy may still show it.
+        before = self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.triangles")
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=options]").click()
         field = self.driver.find_element(By.CSS_SELECTOR, "dialog.options [name=voxel_size]")
         field.send_keys("1.6")
