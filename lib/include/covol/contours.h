@@ -98,8 +98,8 @@ struct Contours {
 /// between the slices.
 ///
 /// The plane of a line is found from its marks: an index coordinate that is constant along it, else the plane that they
-/// lie closest to. Closed lines in parallel planes of any direction make the solid, where all lie across axes those of
-/// the axis with the most marks; closed lines in planes of several other directions are a network. Other lines are
+/// lie closest to. Closed lines in parallel planes of any direction make the solid, in an image where all lie across
+/// axes those of the axis with the most marks; closed lines in other planes are a network. Other lines are
 /// joined along themselves only. Points that belong to no line count as marks. A closed line of fewer than three
 /// distinct marks is taken as open.
 /// @throws Error InvalidOptions; InvalidInput (no line; a line that lies in no plane; a line outside the image: both
