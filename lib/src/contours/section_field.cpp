@@ -24,6 +24,7 @@ constexpr std::size_t kFolds = 6;
 constexpr float kClosest = 1e-3F;  // cells from a plane; a node that is closer has the plane's value
 
 using Size = std::array<int, 3>;
+using Planes = std::vector<const SectionLevels*>;
 
 /// Where an edge of the lattice ends on a plane.
 struct Stop {
@@ -77,11 +78,11 @@ double trilinear(const std::vector<float>& values, const Lattice& lattice, const
 }
 
 /// All edges of the lattice that one of the planes crosses, at both their nodes.
-std::vector<Stop> stops_of(const std::vector<SectionLevels>& planes, const Lattice& lattice, const RunContext& run) {
+std::vector<Stop> stops_of(const Planes& planes, const Lattice& lattice, const RunContext& run) {
     const auto stride = lattice.strides();
     std::vector<std::vector<Stop>> found(planes.size());
     tbb::parallel_for(std::size_t(0), planes.size(), [&](std::size_t n) {
-        const SectionPlane& plane = planes[n].plane;
+        const SectionPlane& plane = planes[n]->plane;
         for (int a = 0; a < 3; ++a) {
             if (plane.normal[a] == 0) continue;
             const int b = (a + 1) % 3, c = (a + 2) % 3;
@@ -94,7 +95,7 @@ std::vector<Stop> stops_of(const std::vector<SectionLevels>& planes, const Latti
                     if (!(t >= 0 && t < lattice.size[a] - 1)) continue;
                     const int i = int(t);
                     at[a] += t * lattice.cell;
-                    const double level = planes[n].at(plane.flat(at));
+                    const double level = planes[n]->at(plane.flat(at));
                     const auto value = float(std::clamp(level / lattice.cell, -1.0, 1.0));
                     const auto node = std::uint32_t(i * stride[a] + j * stride[b] + k * stride[c]);
                     const auto part = float(t - i);
@@ -116,7 +117,7 @@ std::vector<Stop> stops_of(const std::vector<SectionLevels>& planes, const Latti
 /// Laplace's equation on a lattice whose border is outside.
 class Solver {
 public:
-    Solver(const std::vector<SectionLevels>& planes, const Lattice& lattice, const RunContext& run)
+    Solver(const Planes& planes, const Lattice& lattice, const RunContext& run)
         : lattice_(lattice), run_(run), entry_(lattice.count(), -1) {
         make_entries(stops_of(planes, lattice, run));
     }
@@ -230,8 +231,7 @@ struct Field {
 
 /// From coarse lattices to one with this cell.
 /// @param across  the planes' distance
-Field solve_between(const std::vector<SectionLevels>& planes, const WorldBox& box, double finest, double across,
-                    const RunContext& run) {
+Field solve_between(const Planes& planes, const WorldBox& box, double finest, double across, const RunContext& run) {
     double cell = finest;
     while (longest_side(box) > kCoarsest * cell) cell *= 2;
     Field field;
@@ -254,17 +254,17 @@ Field solve_between(const std::vector<SectionLevels>& planes, const WorldBox& bo
 }
 
 /// The level that parts inside from outside best in planes that the field was not made from.
-float cross_validated_level(const std::vector<SectionLevels>& planes, const WorldBox& box, double cell, double across,
+float cross_validated_level(const Planes& planes, const WorldBox& box, double cell, double across,
                             const RunContext& run) {
     if (planes.size() < kFolds) return 0;
     std::vector<std::pair<float, bool>> found;  // value, whether it is inside
     for (std::size_t fold = 0; fold < kFolds; ++fold) {
-        std::vector<SectionLevels> kept;
+        Planes kept;
         for (std::size_t n = 0; n < planes.size(); ++n)
             if (n % kFolds != fold) kept.push_back(planes[n]);
         const Field field = solve_between(kept, box, cell, across, run);
         for (std::size_t n = fold; n < planes.size(); n += kFolds) {
-            const SectionLevels& plane = planes[n];
+            const SectionLevels& plane = *planes[n];
             const int stride = std::max(1, int(cell / plane.grid.cell));
             for (int j = 0; j < plane.grid.ny; j += stride)
                 for (int i = 0; i < plane.grid.nx; i += stride) {
@@ -309,9 +309,11 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     const double stops = 2 * std::sqrt(3.0) * double(sections.size()) * std::pow(nodes, 2.0 / 3);
     cell_ = h * std::ceil(
                     std::max({1.0, std::cbrt(nodes / double(kMostFieldNodes)), std::sqrt(stops / double(kMostStops))}));
-    std::vector<SectionLevels> planes(sections.size());
-    tbb::parallel_for(std::size_t(0), planes.size(), [&](std::size_t n) { planes[n] = levels_of(sections[n], cell_); });
+    std::vector<SectionLevels> levels(sections.size());
+    tbb::parallel_for(std::size_t(0), levels.size(), [&](std::size_t n) { levels[n] = levels_of(sections[n], cell_); });
     run.check();
+    Planes planes;
+    for (const SectionLevels& plane : levels) planes.push_back(&plane);
     Field field = solve_between(planes, box, cell_, plane_distance_, run);
     const float level = cross_validated_level(planes, box, 2 * cell_, plane_distance_, run);
     for (float& value : field.values) value -= level;
