@@ -38,20 +38,25 @@ class Made(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("no such picture: houdini", done.stderr)
 
+    def distances(self, name):
+        """Of the picture made now from each of docs: the mean difference of grey values in coarse cells; none if the size differs."""
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, HERE / "make.py", folder, name], capture_output=True, text=True, timeout=600)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            size, seen = look(pathlib.Path(folder) / f"in_{name}.png")
+        kept = {other: look(DOCS / f"pictures/in_{other}.png") for other in make.NEEDS}
+        return {other: np.abs(seen - grey).mean() if np.allclose(size, kept[name][0], rtol=0.1) else np.inf for other, (_, grey) in kept.items()}
+
     def compare(self, name):
         """Its size and its look are those of the picture in docs: nearer to it by far than to any other."""
         if absent := make.missing(name):
             self.skipTest(f"SKIPPED: {', '.join(absent)} not installed; see tests/run.sh")
-        with tempfile.TemporaryDirectory() as folder:
-            done = subprocess.run([sys.executable, HERE / "make.py", folder, name], capture_output=True, text=True, timeout=600)
-            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            made = pathlib.Path(folder) / f"in_{name}.png"
-            kept = {other: DOCS / f"pictures/in_{other}.png" for other in make.NEEDS}
-            size, seen = look(made)
-            np.testing.assert_allclose(size, look(kept[name])[0], rtol=0.1)
-            far = {other: np.abs(seen - look(path)[1]).mean() for other, path in kept.items()}
-        own = far.pop(name)
-        self.assertLess(own, 0.1 * min(far.values()), f"docs/pictures/in_{name}.png is stale: make it anew by tests/pictures/make.py")
+        for _ in range(3):  # on a busy machine a window may not be painted when it is captured; a stale picture differs each time
+            far = self.distances(name)
+            own = far.pop(name)
+            if own < 0.1 * min(far.values()):
+                return
+        self.fail(f"docs/pictures/in_{name}.png is stale, by {own:.3g} grey values: make it anew by tests/pictures/make.py")
 
 
 for name in make.NEEDS:

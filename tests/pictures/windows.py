@@ -25,7 +25,7 @@ selectImage("Mask of %(title)s");
 setSlice(%(slice)d);
 setLocation(646, 0, 354, 284);
 Table.setLocationAndSize(646, 290, 354, 260, "covol: %(title)s");
-wait(1000);
+wait(3000);
 run("Capture Screen");
 saveAs("PNG", "%(out)s/screen.png");
 exec("sh", "-c", "kill $PPID");
