@@ -134,7 +134,7 @@ int run(const bench::Arguments& arguments) {
     Problem p = make_problem(arguments);
     const double setup_wall = setup.wall();
     const int fixed = int(arguments.number("steps", 0)),
-              most = fixed > 0 ? fixed : int(arguments.number("max-steps", 500));
+              maximum = fixed > 0 ? fixed : int(arguments.number("max-steps", 500));
     const std::vector<char> active = test::all_active(p.u);
     StopRule rule(arguments.number("tolerance", 2e-3));
     const double tau_in_voxels = p.options.tau / p.domain.voxel_size;
@@ -142,7 +142,7 @@ int run(const bench::Arguments& arguments) {
     double wall = 0, cpu = 0, sweeps = 0;
     int steps = 0;
     bool steady = false;
-    while (steps < most && !steady) {
+    while (steps < maximum && !steady) {
         const DenseField before = p.u;
         const bench::Stopwatch watch;
         sweeps += test::dense_evolve(p.u, active, {&p.distance, &p.edge}, p.options, 1);

@@ -29,7 +29,7 @@ struct Cube {
     LeafBand band;
     HaloField u, phi, edge;
     Leaves previous, out;
-    LeafArray<Share> rows;
+    LeafArray<Fraction> rows;
 
     explicit Cube(int side) {
         std::vector<Coord> origins;
@@ -46,7 +46,7 @@ struct Cube {
         phi = field([=](const Coord& x) { return std::abs(radius(x) - 0.6 * middle); });
         edge = field([](const Coord& x) { return 0.5 + 0.4 * std::sin(0.3 * (x.x() + x.y() - x.z())); });
         previous = u.values;
-        rows = LeafArray<Share>(6 * band.size(), Share(kShareUnit / 10), 0);
+        rows = LeafArray<Fraction>(6 * band.size(), Fraction(kFractionUnit / 10), 0);
         out = Leaves(band.size(), 0.0F, 0);
     }
 
@@ -62,7 +62,7 @@ struct Cube {
         });
         return f;
     }
-    [[nodiscard]] Share* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
+    [[nodiscard]] Fraction* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
 };
 
 /// Made once: what a kernel takes does not depend on the values that others left.
@@ -117,7 +117,7 @@ struct Kernel {
     double bytes;  // read and written for a voxel, once each
 };
 
-constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Share);
+constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Fraction);
 constexpr Kernel kKernels[] = {
     {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // u, phi, edge; u before; rows
     {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // u, u before, rows; u

@@ -74,16 +74,16 @@ TEST_CASE("a plane runs at unit speed in each of the six directions") {
 
 // Of a step the lag is that from the beginning: (1+2c)/6 voxels for every h, which is first order.
 TEST_CASE("a plane arrives on time, first order in h, and stays") {
-    const auto [power, share] =
+    const auto [power, fraction] =
         GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));  // of the time step, share * h^power
     for (const double h : {0.1, 0.05, 0.025}) {
         const PlaneRun run{h, -0.613, 0.4, 0, 1, 0.5};
-        const double way = run.to - run.from, tau = share * std::pow(h, power);
+        const double way = run.to - run.from, tau = fraction * std::pow(h, power);
         const double half = run.position(0.5 * way, static_cast<int>(std::lround(0.5 * way / tau)));
         const double late = run.position(1.5 * way, static_cast<int>(std::lround(1.5 * way / tau)));
         const double error = std::abs(half - 0.5 * (run.from + run.to)), off = std::abs(late - run.to);
         std::printf("plane, h = %.3f, tau = %.2f h^%.0f: half way off by %.2e = %.3f h, at rest off by %.3f h\n", h,
-                    share, power, error, error / h, off / h);
+                    fraction, power, error, error / h, off / h);
         CHECK(error / h == Approx((1 + 2 * tau / h) / 6).margin(0.02));
         CHECK(off < 0.1 * h);
     }
@@ -106,7 +106,7 @@ TEST_CASE("a plane that starts as a distance arrives on time and stays") {
 
 // The scheme's own error: its one-sided differences see a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
 TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
-    const auto [power, share, most] =  // of the time step, share * h^power, and of the error, voxels
+    const auto [power, fraction, maximum] =  // of the time step, share * h^power, and of the error, voxels
         GENERATE(table<double, double, double>({{1, 1, 0.5}, {2, 1, 0.6}, {2, 0.25, 0.6}}));
     double previous = 0;
     for (const int n : {24, 48, 96}) {
@@ -121,7 +121,7 @@ TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
         o.delta = 0;
         o.tolerance = 0;
         o.follow = true;
-        o.max_steps = static_cast<int>(std::lround(time / (share * std::pow(h, power))));
+        o.max_steps = static_cast<int>(std::lround(time / (fraction * std::pow(h, power))));
         o.tau = time / o.max_steps;
         EvolveFields fields;
         fields.distance = d.get();
@@ -131,8 +131,8 @@ TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
         double error = 0;
         for (const Crossing& c : crossings)
             error += std::abs(length(c.position) - 0.7) / static_cast<double>(crossings.size());
-        std::printf("sphere, h = %.4f, tau = %.2f h^%.0f: error %.2e = %.3f h", h, share, power, error, error / h);
-        CHECK(error < most * h);
+        std::printf("sphere, h = %.4f, tau = %.2f h^%.0f: error %.2e = %.3f h", h, fraction, power, error, error / h);
+        CHECK(error < maximum * h);
         if (previous > 0) {
             std::printf(", observed order %.2f", std::log2(previous / error));
             CHECK(std::log2(previous / error) >= 1);

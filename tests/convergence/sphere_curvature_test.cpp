@@ -83,11 +83,11 @@ TEST_CASE("evolve(): a shrinking sphere, first order in h or better") {
     }
 }
 
-double tracked_error(int n, double share) {
+double tracked_error(int n, double fraction) {
     const double h = 2.8 / n;
     const Domain domain = cube_domain(n, h);
     const FloatGridPtr u = start_grid(domain, signed_distance, 3 * h);
-    EvolveOptions o = curvature_alone(share * h * h);
+    EvolveOptions o = curvature_alone(fraction * h * h);
     o.follow = true;
     evolve(*u, {}, o);
     return radius_error(domain, to_dense(domain, *u), kEnd);
@@ -95,11 +95,11 @@ double tracked_error(int n, double share) {
 
 // Values frozen on the band's border hold the surface back when sqrt(δτ) comes near the band's width, hence τ ~ h².
 TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or better") {
-    const double share = GENERATE(1.0, 0.25);
+    const double fraction = GENERATE(1.0, 0.25);
     double previous = 0;
     for (const int n : {20, 40, 80}) {
-        const double h = 2.8 / n, error = tracked_error(n, share);
-        const std::string what = "evolve, tracked band, tau = " + std::to_string(share) + " h^2";
+        const double h = 2.8 / n, error = tracked_error(n, fraction);
+        const std::string what = "evolve, tracked band, tau = " + std::to_string(fraction) + " h^2";
         const double order = print_order(what.c_str(), h, error, previous);
         CHECK(error < 0.075 * h);
         if (previous > 0) CHECK(order >= 1);

@@ -53,7 +53,7 @@ const Rules& rules() {
         those.cookie = "fedcba9876543210";
         those.cookie_name = "covol_mark_8000";
         those.live_path = "/live";
-        those.most_body_bytes = 1000;
+        those.max_body_bytes = 1000;
         return those;
     }();
     return made;

@@ -34,19 +34,19 @@ TEST_CASE("compute_distance() is within 0.01 h of brute force on average, 0.3 h 
         const DistanceResult result = compute_distance(points, domain, {radius});
         REQUIRE(result.report.active_voxels > 0);
         std::mt19937 random(seed);
-        double sum = 0, worst = 0, least = 0;
+        double sum = 0, worst = 0, minimum = 0;
         int samples = 0;
         const std::int64_t every = std::max<std::int64_t>(1, result.report.active_voxels / 2000);
         for (auto value = result.grid->cbeginValueOn(); value; ++value) {
             if (std::int64_t(random() % std::uint32_t(every)) != 0) continue;
             const double error = *value - brute_force_distance(points, world_of(domain, value.getCoord()));
-            least = std::min(least, error);
+            minimum = std::min(minimum, error);
             worst = std::max(worst, error);
             sum += std::abs(error);
             ++samples;
         }
         CHECK(sum / samples <= 0.01 * h);
         CHECK(worst <= 0.3 * h);
-        CHECK(least >= -1e-4 * h);  // each value is the distance to some point
+        CHECK(minimum >= -1e-4 * h);  // each value is the distance to some point
     }
 }

@@ -29,23 +29,23 @@ void check_proper(const TriangleMesh& mesh, const MeshMeasures& expected) {
 class Worst {
 public:
     void add(const std::string& kind, double value) {
-        const auto [at, first] = least_.try_emplace(kind, value);
+        const auto [at, first] = minimum_.try_emplace(kind, value);
         if (!first) at->second = std::min(at->second, value);
     }
     void print(const char* what) const {
-        for (const auto& [kind, value] : least_)
+        for (const auto& [kind, value] : minimum_)
             std::printf("%s: %s at least %.1f degrees\n", what, kind.c_str(), value);
     }
 
 private:
-    std::map<std::string, double> least_;
+    std::map<std::string, double> minimum_;
 };
 
 }  // namespace
 
 TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of the extraction and no slivers") {
     Worst worst;
-    double most = 0, mean = 0;
+    double maximum = 0, mean = 0;
     for (unsigned seed = 0; seed < kShapes; ++seed) {
         const RandomSolid solid = random_solid(seed);
         INFO("seed " << seed << ", " << solid.name);
@@ -62,12 +62,12 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
             CHECK(report.smallest_angle >= report.smallest_angle_before);
         CHECK(report.deviation.mean < deviation.mean + 0.02);
         worst.add(solid.name, report.smallest_angle);
-        most = std::max(most, report.deviation.max - deviation.max);
+        maximum = std::max(maximum, report.deviation.max - deviation.max);
         mean = std::max(mean, report.deviation.mean);
     }
     worst.print("relaxed, 1st percentile of the smallest angles");
     std::printf("mean distance from the level set at most %.3f voxels; the largest grows by %.3f at most\n", mean,
-                most);
+                maximum);
 }
 
 TEST_CASE("200 random solids: decimated meshes are proper and keep the topology") {

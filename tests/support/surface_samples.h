@@ -95,12 +95,12 @@ inline Solid3 shell(double outer, double inner) {
 inline Solid3 block(const Vec3& half) {
     const auto distance = [half](const Vec3& p) {
         Vec3 beyond;
-        double most = -1e30;
+        double maximum = -1e30;
         for (int a = 0; a < 3; ++a) {
             beyond[a] = std::max(0.0, std::abs(p[a]) - half[a]);
-            most = std::max(most, std::abs(p[a]) - half[a]);
+            maximum = std::max(maximum, std::abs(p[a]) - half[a]);
         }
-        return norm(beyond) + std::min(0.0, most);
+        return norm(beyond) + std::min(0.0, maximum);
     };
     return {distance,
             {{-half[0] - 0.02, -half[1] - 0.02, -half[2] - 0.02}, {half[0] + 0.02, half[1] + 0.02, half[2] + 0.02}}};
@@ -116,11 +116,11 @@ inline double capsule(const Vec3& p, const Vec3& a, const Vec3& b, double radius
 /// A lying body on four legs.
 inline Solid3 table(double leg) {
     const auto distance = [leg](const Vec3& p) {
-        double least = capsule(p, {-0.5, 0, 0}, {0.5, 0, 0}, 0.3);
+        double minimum = capsule(p, {-0.5, 0, 0}, {0.5, 0, 0}, 0.3);
         for (const double x : {-0.55, 0.55})
             for (const double y : {-0.15, 0.15})
-                least = std::min(least, capsule(p, {x, y, 0}, {1.3 * x, 2 * y, -0.9}, leg));
-        return least;
+                minimum = std::min(minimum, capsule(p, {x, y, 0}, {1.3 * x, 2 * y, -0.9}, leg));
+        return minimum;
     };
     return {distance, {{-0.85, -0.4, -1}, {0.85, 0.4, 0.35}}};
 }

@@ -17,7 +17,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace {
 
-constexpr std::uint32_t kMostHeaderBytes = 16 * 1024;
+constexpr std::uint32_t kMaxHeaderBytes = 16 * 1024;
 
 std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -33,7 +33,7 @@ RequestHead head_of(const http::request<http::empty_body>& request) {
 }  // namespace
 
 HttpConnection::HttpConnection(Hub& hub, asio::ip::tcp::socket socket)
-    : hub_(hub), stream_(std::move(socket)), buffer_(4 * kMostHeaderBytes) {}
+    : hub_(hub), stream_(std::move(socket)), buffer_(4 * kMaxHeaderBytes) {}
 
 void HttpConnection::read() {
     is_head_ = false;
@@ -41,9 +41,9 @@ void HttpConnection::read() {
     response_.reset();
     serializer_.reset();
     parser_.emplace();
-    parser_->header_limit(kMostHeaderBytes);
+    parser_->header_limit(kMaxHeaderBytes);
     // judge() looks at the length. Boost 1.74 takes "none" for 0 here.
-    if (hub_.rules.most_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
+    if (hub_.rules.max_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     waits_since_ = std::chrono::steady_clock::now();
     stream_.expires_after(hub_.options.idle);
     http::async_read_header(stream_, buffer_, *parser_,
@@ -54,7 +54,7 @@ void HttpConnection::on_read(beast::error_code status) {
     waits_since_.reset();
     if (!stream_.socket().is_open() || hub_.is_stopping) return finish();
     if (status == http::error::header_limit || status == http::error::buffer_overflow) {
-        return refuse(431, "The head of a request has at most " + std::to_string(kMostHeaderBytes) + " bytes.");
+        return refuse(431, "The head of a request has at most " + std::to_string(kMaxHeaderBytes) + " bytes.");
     }
     if (status == http::error::body_limit) return refuse(413, "Requests have no body here.");
     const bool is_malformed = status.category() == make_error_code(http::error::bad_method).category() &&
@@ -127,7 +127,7 @@ void HttpConnection::take_body(Request request) {
     hub_.is_posting = is_posting_ = true;
     wants_to_stay_ = parser_->get().version() == 11 && parser_->get().keep_alive();
     auto parser = std::make_shared<BodyParser>(std::move(*parser_));
-    parser->body_limit(hub_.rules.most_body_bytes);
+    parser->body_limit(hub_.rules.max_body_bytes);
     read_body(std::move(parser), std::move(request));
 }
 
@@ -200,11 +200,11 @@ void HttpConnection::write() {
 
 // Where a socket is closed before all is read that came, the client may lose the answer.
 void HttpConnection::drain() {
-    constexpr std::size_t kMost = 1 << 20, kPiece = 4096;
+    constexpr std::size_t kMax = 1 << 20, kPiece = 4096;
     buffer_.consume(buffer_.size());
     stream_.async_read_some(buffer_.prepare(kPiece), [self = self()](beast::error_code status, std::size_t count) {
         self->drained_ += count;
-        if (status || self->drained_ > kMost) return self->finish();
+        if (status || self->drained_ > kMax) return self->finish();
         self->drain();
     });
 }

@@ -12,10 +12,10 @@ Hub::Hub(Options its_options, Handlers its_handlers)
       live_pool(2) {}
 
 // More than these are closed without a word.
-constexpr std::size_t kMostRefused = 8;
+constexpr std::size_t kMaxRefused = 8;
 
 void Hub::welcome(boost::asio::ip::tcp::socket socket) {
-    bool has_room = connections_.size() < options.most_connections;
+    bool has_room = connections_.size() < options.max_connections;
     if (!has_room) {
         // Browsers keep connections open for later, and other programs may hold some without a word: neither may keep
         // out one that has a request.
@@ -31,7 +31,7 @@ void Hub::welcome(boost::asio::ip::tcp::socket socket) {
     if (has_room) {
         enter(connection, false);
         connection->read();
-    } else if (connections_.size() < options.most_connections + kMostRefused) {
+    } else if (connections_.size() < options.max_connections + kMaxRefused) {
         enter(connection, false);
         connection->refuse(503, "Too many connections are open.");
     }

@@ -57,7 +57,7 @@ public:
     /// are at work refuses the new one.
     void welcome(boost::asio::ip::tcp::socket socket);
     /// @return whether one more WebSocket is allowed
-    [[nodiscard]] bool has_room_for_client() const { return live_count_ < options.most_clients; }
+    [[nodiscard]] bool has_room_for_client() const { return live_count_ < options.max_clients; }
     [[nodiscard]] Client next_client() { return {++last_client_}; }
     void enter(std::shared_ptr<Connection> connection, bool is_live);
     /// Nothing happens where it has left before.

@@ -23,7 +23,7 @@ LiveConnection::LiveConnection(Hub& hub, beast::tcp_stream stream, Client client
       handlers_(asio::make_strand(hub.live_pool.get_executor())),
       deadline_(hub.io),
       rate_(hub.options.messages_per_second, hub.options.message_burst),
-      outbox_(hub.options.most_waiting_bytes) {}
+      outbox_(hub.options.max_waiting_bytes) {}
 
 void LiveConnection::accept(http::request<http::empty_body> request) {
     handshake_ = std::move(request);
@@ -91,15 +91,15 @@ void LiveConnection::read() {
 bool LiveConnection::is_too_fast() { return !rate_.allows_one(std::chrono::steady_clock::now()); }
 
 bool LiveConnection::has_much_to_handle() const {
-    constexpr std::size_t kMostMessages = 64;
-    return unhandled_ >= kMostMessages || unhandled_bytes_ >= 2 * hub_.options.most_message_bytes;
+    constexpr std::size_t kMaxMessages = 64;
+    return unhandled_ >= kMaxMessages || unhandled_bytes_ >= 2 * hub_.options.max_message_bytes;
 }
 
 void LiveConnection::on_read(beast::error_code status) {
     is_reading_ = false;
     if (status) return finish();
     if (is_closing_) return;  // close() reads on, up to the client's answer
-    if (buffer_.size() > hub_.options.most_message_bytes) {
+    if (buffer_.size() > hub_.options.max_message_bytes) {
         return close(websocket::close_code::too_big, "a message is too large", kPartingTime);
     }
     if (!socket_.is_message_done()) return read();
@@ -152,10 +152,10 @@ void LiveConnection::on_write(beast::error_code status) {
     if (outbox_.written()) write();
 }
 
-void LiveConnection::close(websocket::close_code code, const char* why, std::chrono::milliseconds most) {
+void LiveConnection::close(websocket::close_code code, const char* why, std::chrono::milliseconds maximum) {
     if (is_finished_) return;
     const bool was_closing = is_closing_;
-    part(most);
+    part(maximum);
     if (was_closing) return;
     socket_.async_close({code, why}, [self = self()](beast::error_code status) {
         if (!status || !self->is_reading_) self->finish();
@@ -164,10 +164,10 @@ void LiveConnection::close(websocket::close_code code, const char* why, std::chr
 
 // Where the client closes, or sends no UTF-8, reading answers that by itself, and writing fails from then on. The
 // reading has to come to its end: of a socket that is closed before, the client may not get the answer.
-void LiveConnection::part(std::chrono::milliseconds most) {
+void LiveConnection::part(std::chrono::milliseconds maximum) {
     is_closing_ = true;
     outbox_.close();
-    deadline_.expires_after(most);
+    deadline_.expires_after(maximum);
     deadline_.async_wait([self = self()](beast::error_code status) {
         if (status != asio::error::operation_aborted) self->finish();
     });

@@ -45,9 +45,9 @@ private:
     void write();
     void on_write(boost::beast::error_code status);
     /// Neither reads on nor writes, and closes after so long at most.
-    void part(std::chrono::milliseconds most);
+    void part(std::chrono::milliseconds maximum);
     /// Says why, waits so long for the client's answer and closes.
-    void close(boost::beast::websocket::close_code code, const char* why, std::chrono::milliseconds most);
+    void close(boost::beast::websocket::close_code code, const char* why, std::chrono::milliseconds maximum);
 
     Hub& hub_;
     boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;

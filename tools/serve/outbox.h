@@ -20,8 +20,8 @@ public:
         Refused   ///< it was closed, or is not ready for broadcasts
     };
 
-    /// @param most_bytes  of the texts that are not written yet; a single one may be larger where nothing else waits
-    explicit Outbox(std::size_t most_bytes) : most_bytes_(most_bytes) {}
+    /// @param max_bytes  of the texts that are not written yet; a single one may be larger where nothing else waits
+    explicit Outbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
     /// The first text for this client alone makes it ready for broadcasts.
     [[nodiscard]] Added add(SharedText text, bool is_broadcast) {
@@ -29,7 +29,7 @@ public:
         if (is_closed_ || (is_broadcast && !takes_broadcasts_)) return Added::Refused;
         takes_broadcasts_ = true;
         const bool is_first = texts_.empty();
-        if (!is_first && (text->size() > most_bytes_ || bytes_ > most_bytes_ - text->size())) {
+        if (!is_first && (text->size() > max_bytes_ || bytes_ > max_bytes_ - text->size())) {
             is_closed_ = true;
             return Added::TooMuch;
         }
@@ -66,7 +66,7 @@ public:
 private:
     mutable std::mutex mutex_;
     std::deque<SharedText> texts_;
-    const std::size_t most_bytes_;
+    const std::size_t max_bytes_;
     std::size_t bytes_ = 0;
     bool takes_broadcasts_ = false, is_closed_ = false;
 };

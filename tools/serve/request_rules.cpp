@@ -75,8 +75,8 @@ Judgement judge_body(const std::vector<std::string_view>& lengths, const Rules& 
     const auto [last, status] = std::from_chars(lengths[0].data(), end, bytes);
     if (last != end || lengths[0].empty() || status == std::errc::invalid_argument)
         return refuse(400, "Content-Length: expected one number.");
-    if (status != std::errc() || bytes > rules.most_body_bytes)
-        return refuse(413, "A file has at most " + std::to_string(rules.most_body_bytes) + " bytes here.");
+    if (status != std::errc() || bytes > rules.max_body_bytes)
+        return refuse(413, "A file has at most " + std::to_string(rules.max_body_bytes) + " bytes here.");
     if (bytes == 0) return refuse(400, "Content-Length: expected a file that is not empty.");
     Judgement good;
     good.kind = Judgement::Kind::Post;
@@ -86,11 +86,11 @@ Judgement judge_body(const std::vector<std::string_view>& lengths, const Rules& 
 
 // What is wrong with the request before anybody asks who sent it; Get or Post where nothing is.
 Judgement judge_form(const RequestHead& head, const Rules& rules) {
-    const bool is_post = head.method == "POST" && rules.most_body_bytes > 0;
+    const bool is_post = head.method == "POST" && rules.max_body_bytes > 0;
     if (head.method != "GET" && head.method != "HEAD" && !is_post)
         return refuse(405, "Only GET and HEAD are answered here.");
-    if (head.target.size() > rules.most_target_bytes) {
-        return refuse(414, "An address has at most " + std::to_string(rules.most_target_bytes) + " bytes.");
+    if (head.target.size() > rules.max_target_bytes) {
+        return refuse(414, "An address has at most " + std::to_string(rules.max_target_bytes) + " bytes.");
     }
     if (!values_of(head, "Transfer-Encoding").empty()) return refuse(400, "Requests have no body here.");
     if (is_post) return judge_body(values_of(head, "Content-Length"), rules);

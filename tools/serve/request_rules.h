@@ -25,9 +25,9 @@ struct Rules {
     std::string token;                     ///< of the link that a person opens
     std::string cookie_name, cookie;
     std::string live_path;
-    std::size_t most_target_bytes = 4096;
-    bool may_be_framed = false;       ///< pages of the same host, on other ports, may show the link in a frame
-    std::size_t most_body_bytes = 0;  ///< of a POST; 0: none is answered
+    std::size_t max_target_bytes = 4096;
+    bool may_be_framed = false;      ///< pages of the same host, on other ports, may show the link in a frame
+    std::size_t max_body_bytes = 0;  ///< of a POST; 0: none is answered
 };
 
 /// What to do with a request.
@@ -43,7 +43,7 @@ struct Judgement {
     int status = 400;
     std::string why{};           ///< for people
     Request request{};           ///< of Get and Post
-    std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::most_body_bytes
+    std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::max_body_bytes
     bool is_head = false;
     bool is_link = false;  ///< of SetCookie: a person followed a link of another page, or of a file, to get here
 };

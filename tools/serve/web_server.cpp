@@ -81,8 +81,8 @@ std::string Options::why_invalid() const {
     }
     if (page_policy.empty() || !is_header_value(page_policy)) return "page_policy: expected one line";
     if (live_path.size() < 2 || live_path[0] != '/') return "live_path: expected /name, got \"" + live_path + "\"";
-    if (most_message_bytes < 1) return "most_message_bytes: expected >= 1, got 0";
-    if (most_connections < 1) return "most_connections: expected >= 1, got 0";
+    if (max_message_bytes < 1) return "most_message_bytes: expected >= 1, got 0";
+    if (max_connections < 1) return "most_connections: expected >= 1, got 0";
     if (!(messages_per_second > 0)) {
         return "messages_per_second: expected > 0, got " + std::to_string(messages_per_second);
     }
@@ -105,7 +105,7 @@ public:
         hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
         hub_.rules.live_path = hub_.options.live_path;
         hub_.rules.may_be_framed = !hub_.options.frame_origins.empty();
-        hub_.rules.most_body_bytes = hub_.handlers.post ? hub_.options.most_body_bytes : 0;
+        hub_.rules.max_body_bytes = hub_.handlers.post ? hub_.options.max_body_bytes : 0;
         wait();
         thread_ = std::thread([this] { serve(); });
     }
@@ -158,8 +158,8 @@ private:
 
     // Takes the connections that wait. @return false where none can be had for now
     bool accept_all() {
-        constexpr int kMost = 64;  // then it is the turn of others
-        for (int n = 0; n < kMost; ++n) {
+        constexpr int kMax = 64;  // then it is the turn of others
+        for (int n = 0; n < kMax; ++n) {
             const int accepted = ::accept4(acceptor_.native_handle(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
             if (accepted < 0) {
                 const bool is_short = errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;

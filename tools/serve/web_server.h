@@ -47,7 +47,7 @@ struct Client {
 struct Handlers {
     std::function<Response(const Request&)>
         get{};  ///< may be slow; what it throws becomes an answer 500 without details
-    /// A POST with its body, one at a time, where Options::most_body_bytes allows any; as `get`.
+    /// A POST with its body, one at a time, where Options::max_body_bytes allows any; as `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
     std::function<void(Client, std::string_view)> message{};  ///< UTF-8; where it throws, the client is closed (1011)
@@ -65,13 +65,13 @@ struct Options {
     std::vector<std::string> frame_origins{};
     std::string page_policy = "default-src 'none'";  ///< Content-Security-Policy of text/html, without frame-ancestors
     std::string live_path = "/live";                 ///< where WebSockets are opened
-    std::size_t most_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
-    std::size_t most_body_bytes = 0;                         ///< of a POST; 0: none is answered
-    std::size_t most_waiting_bytes = std::size_t(64) << 20;  ///< that a client has not read yet: with more it is closed
+    std::size_t max_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
+    std::size_t max_body_bytes = 0;                         ///< of a POST; 0: none is answered
+    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< that a client has not read yet: with more it is closed
     /// Open at once, >= 1, WebSockets among them. One more closes the one that waits longest for a request; where none
     /// waits it is refused (503).
-    std::size_t most_connections = 16;
-    std::size_t most_clients = 8;                 ///< WebSockets open at once
+    std::size_t max_connections = 16;
+    std::size_t max_clients = 8;                  ///< WebSockets open at once
     double messages_per_second = 200;             ///< > 0, of each client: with more it is closed (1008)
     double message_burst = 400;                   ///< >= 1: so many at once
     std::chrono::milliseconds idle{30'000};       ///< >= 1: without a request, or without progress of an answer

@@ -22,20 +22,20 @@
 namespace covol {
 
 struct BrickOptions {
-    std::int64_t most_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
-    int overlap = 16;                      ///< voxels, a multiple of 8, 8 to 2^23: layers of its neighbours
-    double tolerance = 0.05;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
-    int most_sweeps = 4;                   ///< >= 1
+    std::int64_t max_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
+    int overlap = 16;                     ///< voxels, a multiple of 8, 8 to 2^23: layers of its neighbours
+    double tolerance = 0.05;              ///< voxels, > 0: neighbours agree when their surfaces lie closer
+    int max_sweeps = 4;                   ///< >= 1
 };
 
 template <>
 inline constexpr auto kOptions<BrickOptions> = std::tuple{
-    Option{"brick_voxels", &BrickOptions::most_voxels, kPositive},
+    Option{"brick_voxels", &BrickOptions::max_voxels, kPositive},
     Option{"brick_overlap", &BrickOptions::overlap, counted_in(Unit::Voxels, between(8, 1 << 23)), Group::Numerics,
            "layers of its neighbours around a brick, a multiple of 8"},
     Option{"seam_tolerance", &BrickOptions::tolerance, counted_in(Unit::Voxels, kPositive), Group::Numerics,
            "sweeps over the bricks end when neighbours' surfaces lie closer than this, voxels"},
-    Option{"most_sweeps", &BrickOptions::most_sweeps, at_least(1)},
+    Option{"most_sweeps", &BrickOptions::max_sweeps, at_least(1)},
     Rule<BrickOptions>{"brick_overlap", "a multiple of 8", [](const BrickOptions& o) { return o.overlap % 8 == 0; }}};
 
 struct Brick {

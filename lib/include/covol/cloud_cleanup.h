@@ -28,7 +28,7 @@ struct CloudCleanupOptions {
                                 ///< until none is left; >= 1.
     double simplify = 0;        ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
-    double wlop_share = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].
+    double wlop_fraction = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].
     /// Of WLOP's neighbourhoods, world units, > 0; automatic: 2.5 mean spacings of the new points.
     std::optional<double> wlop_radius;
     int neighbours = 24;  ///< For outliers and jets, >= 6.
@@ -47,7 +47,7 @@ inline constexpr auto kOptions<CloudCleanupOptions> = std::tuple{
            "keep one point in each cell of this edge, 1vx for example"},
     Option{"smooth", &CloudCleanupOptions::smooth, Group::Clouds,
            "move the points to fitted quadrics (jets), or make 0.25 times as many by projection, evenly spread (wlop)"},
-    Option{"wlop_share", &CloudCleanupOptions::wlop_share, Range{0, 1, true}},
+    Option{"wlop_share", &CloudCleanupOptions::wlop_fraction, Range{0, 1, true}},
     Option{"wlop_radius", &CloudCleanupOptions::wlop_radius, kPositive},
     Option{"neighbours", &CloudCleanupOptions::neighbours, at_least(6)},
     Rule<CloudCleanupOptions>{"remove_outliers", "0 or >= 1", [](const CloudCleanupOptions& o) {

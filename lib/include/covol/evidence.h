@@ -73,10 +73,11 @@ struct Evidence {
 
 /// Share of a surface's area that lies farther than `reach` from every point: where the points do not determine it.
 /// @param distance  to the points; its background, for what lies beyond its tube, is at least `reach`
-[[nodiscard]] COVOL_API double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
-                                                            double reach, const RunContext& run = {});
+[[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
+                                                               double reach, const RunContext& run = {});
 /// The same, on a distance grid of its own with a third of `reach` as voxel size.
-[[nodiscard]] COVOL_API double measure_share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
-                                                            double reach, const RunContext& run = {});
+[[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh,
+                                                               const std::vector<Vec3>& points, double reach,
+                                                               const RunContext& run = {});
 
 }  // namespace covol

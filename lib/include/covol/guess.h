@@ -20,7 +20,7 @@ struct GuessOptions {
     /// spacing).
     std::array<Vec3, 3> deviation{};
     /// The largest that it may be, where marks fit each other badly; up to `deviation`: as it is said.
-    double most_deviation = 0;
+    double max_deviation = 0;
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
     std::optional<WorldBox> end;
@@ -31,7 +31,7 @@ struct GuessOptions {
 template <>
 inline constexpr auto kOptions<GuessOptions> =
     std::tuple{Option{"deviation", &GuessOptions::deviation},
-               Option{"most_deviation", &GuessOptions::most_deviation, kNotNegative},
+               Option{"most_deviation", &GuessOptions::max_deviation, kNotNegative},
                Option{"inside", &GuessOptions::inside},
                Option{"outside", &GuessOptions::outside},
                Option{"end", &GuessOptions::end},

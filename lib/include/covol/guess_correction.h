@@ -20,24 +20,24 @@ namespace covol {
 inline constexpr double kCorrectionVoxels = 12.0;
 
 struct CorrectionOptions {
-    std::optional<double> precision;     ///< of the marks, world units, > 0; automatic: half a voxel
-    std::optional<double> least_radius;  ///< within which a mark acts on the guess, however little it moves it, world
-                                         ///< units, > 0; automatic: kCorrectionVoxels
+    std::optional<double> precision;   ///< of the marks, world units, > 0; automatic: half a voxel
+    std::optional<double> min_radius;  ///< within which a mark acts on the guess, however little it moves it, world
+                                       ///< units, > 0; automatic: kCorrectionVoxels
 };
 
 template <>
 inline constexpr auto kOptions<CorrectionOptions> = std::tuple{
     Option{"precision", &CorrectionOptions::precision, kPositive},
-    Option{"guess_radius", &CorrectionOptions::least_radius, kPositiveLength, with_image(Group::ReadingMarks),
+    Option{"guess_radius", &CorrectionOptions::min_radius, kPositiveLength, with_image(Group::ReadingMarks),
            "a mark acts on the guess at least so far around it",
            "12vx, or two of the image's widest spacing; 3 times its distance to the guess if it lies inside, 2.2 times "
            "outside, where that is more"}};
 
 struct CorrectionReport {
-    std::size_t marks = 0, seeds = 0;             ///< that act: seeds only where the guess had them on the wrong side
-    double before_mean = 0, before_max = 0;       ///< distances of the marks to the guess, world units
-    double after_mean = 0, after_max = 0;         ///< to the corrected surface
-    double least_radius = 0, largest_radius = 0;  ///< within which marks act, world units
+    std::size_t marks = 0, seeds = 0;           ///< that act: seeds only where the guess had them on the wrong side
+    double before_mean = 0, before_max = 0;     ///< distances of the marks to the guess, world units
+    double after_mean = 0, after_max = 0;       ///< to the corrected surface
+    double min_radius = 0, largest_radius = 0;  ///< within which marks act, world units
     double depth = 0;  ///< of the guess: radius of the largest ball inside, world units, to within 8 voxels
 };
 

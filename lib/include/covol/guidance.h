@@ -44,10 +44,10 @@ struct GuidanceReport {
     double gain = 0;     ///< what the image adds to the log-likelihood of a mark that it was not learnt from, nats
     /// how far off the border the image alone would lie (rms, an upper estimate, at the marks)
     double image_error = 0;
-    double guess_error = 0;      ///< how far off the border the guess lies (rms, a lower estimate)
-    double confident_share = 0;  ///< of the area, where the image says more than the guess
-    double mean_offset = 0;      ///< by area, outward > 0
-    double max_offset = 0;       ///< of |offset|
+    double guess_error = 0;         ///< how far off the border the guess lies (rms, a lower estimate)
+    double confident_fraction = 0;  ///< of the area, where the image says more than the guess
+    double mean_offset = 0;         ///< by area, outward > 0
+    double max_offset = 0;          ///< of |offset|
 };
 
 struct Guided {

@@ -49,7 +49,7 @@ struct BoundaryLoop {
 struct HolesReport {
     Holes policy = Holes::Close;  ///< what was done, never Auto
     double distance = 0;          ///< as used
-    double share = 0;             ///< of the closed surface's area: what was trimmed, or made flat
+    double fraction = 0;          ///< of the closed surface's area: what was trimmed, or made flat
     double closed_volume = 0;     ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
     std::size_t dropped_pieces = 0;   ///< between holes, too small to stay
     std::vector<BoundaryLoop> loops;  ///< of the holes
@@ -65,8 +65,8 @@ struct HolesReport {
                                                              const RunContext& run = {});
 
 /// Share of the area that lies farther than `distance` from every point, of the distances at the vertices.
-[[nodiscard]] COVOL_API double measure_share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
-                                                    double distance);
+[[nodiscard]] COVOL_API double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
+                                                       double distance);
 
 struct TreatedHoles {
     TriangleMesh mesh;

@@ -161,7 +161,7 @@ private:
     static Image copy_of(const ImageGeometry& geometry, PixelType type, const T* values);
     void require_finite() const;
     template <typename T>
-    [[nodiscard]] std::vector<T> values_of_chunks(double most) const;
+    [[nodiscard]] std::vector<T> values_of_chunks(double maximum) const;
     [[nodiscard]] VoxelBox in_file(const VoxelBox& held) const;
     void expect_slice(int k) const;
     void forget_slice(int k) const;

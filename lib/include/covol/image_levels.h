@@ -33,16 +33,16 @@ public:
     };
     /// How much of the file was decoded for it.
     struct CacheUse {
-        std::uint64_t bytes = 0, most_bytes = 0;  ///< that are kept; that may be
-        std::uint64_t decoded = 0;                ///< chunks so far
+        std::uint64_t bytes = 0, max_bytes = 0;  ///< that are kept; that may be
+        std::uint64_t decoded = 0;               ///< chunks so far
     };
 
     /// The image as it is held, without coarser levels.
     COVOL_API explicit ImageLevels(Image image);
     /// @param sources  the finest first, which is the whole of `image`; a level whose voxels do not span whole numbers
     ///                 of fine ones is left out
-    /// @param most_bytes  of decoded chunks that are kept
-    COVOL_API ImageLevels(Image image, const std::vector<Source>& sources, std::uint64_t most_bytes);
+    /// @param max_bytes  of decoded chunks that are kept
+    COVOL_API ImageLevels(Image image, const std::vector<Source>& sources, std::uint64_t max_bytes);
 
     [[nodiscard]] const Image& image() const noexcept { return image_; }
     [[nodiscard]] const std::vector<Level>& levels() const noexcept { return levels_; }  ///< the finest first
@@ -76,9 +76,9 @@ private:
 
 /// The image of `image.path()`, with its coarser levels.
 /// @param options  those that it was read with
-/// @param most_bytes  of decoded chunks that are kept
+/// @param max_bytes  of decoded chunks that are kept
 /// @throws Error as read_image(). A coarser level that is damaged is a warning, and left out.
 [[nodiscard]] COVOL_API ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options,
-                                                      std::uint64_t most_bytes, const RunContext& run = {});
+                                                      std::uint64_t max_bytes, const RunContext& run = {});
 
 }  // namespace covol

@@ -87,7 +87,7 @@ COVOL_API void add_contours(Marks& marks, PointCloud cloud, const std::optional<
                             const RunContext& run = {});
 /// Of points without an image: sorts them in space, and keeps `most` of them, evenly spread (order_spatially()); 0:
 /// all.
-COVOL_API void thin_points(Marks& marks, std::size_t most, const RunContext& run = {});
+COVOL_API void thin_points(Marks& marks, std::size_t maximum, const RunContext& run = {});
 /// Points and contours as they were given, world units.
 [[nodiscard]] COVOL_API std::vector<Vec3> positions_of(const Marks& marks, const std::optional<ImageGeometry>& image);
 

@@ -204,19 +204,19 @@ struct SegmentReport {
     std::optional<double> image_support;
     /// Where the image's slope along the surface's normals at the marks is steepest on the mean.
     struct ImageBorder {
-        int voxels = 0;     ///< from the marks, outward; of the image, or steps of voxel_size where that is longer
-        double share = 1;   ///< of the slope there that the marks have where they lie, within a voxel
-        double errors = 0;  ///< standard errors of the mean that both differ by
+        int voxels = 0;       ///< from the marks, outward; of the image, or steps of voxel_size where that is longer
+        double fraction = 1;  ///< of the slope there that the marks have where they lie, within a voxel
+        double errors = 0;    ///< standard errors of the mean that both differ by
     };
     std::optional<ImageBorder> image_border;  ///< none as image_support
     /// Share of a surface through marks alone that lies farther from all of them than half of their box's diagonal.
     std::optional<double> surface_beyond_marks;
     std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     SeedCheck seeds;
-    CorrectionReport correction;      ///< of SegmentOptions::guess
-    double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
-    HolesReport holes;                ///< of points without an image; distance 0: none
-    SegmentOptions resolved;          ///< what was used: each automatic choice that was made has its value
+    CorrectionReport correction;         ///< of SegmentOptions::guess
+    double fraction_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
+    HolesReport holes;                   ///< of points without an image; distance 0: none
+    SegmentOptions resolved;             ///< what was used: each automatic choice that was made has its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
 

@@ -107,7 +107,8 @@ COVOL_API void check_inside(const PointCloud& cloud, const ImageGeometry& geomet
 /// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more
 /// than `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
 /// @throws Error InvalidOptions (most = 0), InvalidInput (2^32 points and more).
-[[nodiscard]] COVOL_API std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most);
+[[nodiscard]] COVOL_API std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points,
+                                                                   std::size_t maximum);
 
 /// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
 struct SpacingStatistics {

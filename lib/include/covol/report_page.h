@@ -38,18 +38,18 @@ struct ReportPage {
 
 struct ReportPageOptions {
     /// of all structures together; larger meshes are drawn together, cell by cell, vertices stay on the surface
-    std::int64_t most_triangles = 400'000;
+    std::int64_t max_triangles = 400'000;
     /// of the slices; larger images are cut to the structures and their marks, and then thinned
-    std::int64_t most_voxels = 16'000'000;
-    std::int64_t most_marks = 20'000;  ///< of each structure; of more, every n-th
-    int jpeg_quality = 80;             ///< 1 to 100
+    std::int64_t max_voxels = 16'000'000;
+    std::int64_t max_marks = 20'000;  ///< of each structure; of more, every n-th
+    int jpeg_quality = 80;            ///< 1 to 100
 };
 
 template <>
 inline constexpr auto kOptions<ReportPageOptions> =
-    std::tuple{Option{"most_triangles", &ReportPageOptions::most_triangles, at_least(100)},
-               Option{"most_voxels", &ReportPageOptions::most_voxels, at_least(1000)},
-               Option{"most_marks", &ReportPageOptions::most_marks, at_least(1)},
+    std::tuple{Option{"most_triangles", &ReportPageOptions::max_triangles, at_least(100)},
+               Option{"most_voxels", &ReportPageOptions::max_voxels, at_least(1000)},
+               Option{"most_marks", &ReportPageOptions::max_marks, at_least(1)},
                Option{"jpeg_quality", &ReportPageOptions::jpeg_quality, between(1, 100)}};
 
 /// What a page holds.

@@ -24,13 +24,14 @@ struct Structure {
 
 struct SeparateOptions {
     std::optional<double> gap;  ///< gaps narrower than this close, world units; 0: none; automatic: 1 voxel
-    double nested_share = 0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
+    double nested_fraction =
+        0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
 };
 
 template <>
 inline constexpr auto kOptions<SeparateOptions> =
     std::tuple{Option{"gap", &SeparateOptions::gap, kNotNegative},
-               Option{"nested_share", &SeparateOptions::nested_share, Range{0.5, 1, true}}};
+               Option{"nested_share", &SeparateOptions::nested_fraction, Range{0.5, 1, true}}};
 
 /// Two structures that overlapped.
 struct StructureOverlap {

@@ -42,7 +42,7 @@ public:
     /// @param read_guess  as of StudySite; none: structures with a guess fail
     /// @param told  called from the solver's thread, one result at a time; it must not call the solver
     COVOL_API StudySolver(std::function<Image()> image, SegmentOptions options,
-                          std::function<void(const StudyResult&)> told, const RunContext& run = {},
+                          std::function<void(const StudyResult&)> on_result, const RunContext& run = {},
                           std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess = {});
     /// Cancels what runs.
     COVOL_API ~StudySolver();

@@ -58,7 +58,7 @@ struct Piece {
 };
 
 /// The share of a triangle's area below a level, its corners' levels ascending.
-double share_below(const std::array<double, 3>& l, double level) {
+double fraction_below(const std::array<double, 3>& l, double level) {
     if (level <= l[0]) return 0;
     if (level >= l[2]) return 1;
     if (level < l[1]) return (level - l[0]) * (level - l[0]) / ((l[1] - l[0]) * (l[2] - l[0]));
@@ -137,7 +137,7 @@ private:
             double below = 0;
             const int last = slice_of(p.levels[2]);
             for (int k = slice_of(p.levels[0]); k <= last; ++k) {
-                const double upto = k == last ? 1.0 : share_below(p.levels, k + 0.5);
+                const double upto = k == last ? 1.0 : fraction_below(p.levels, k + 0.5);
                 add(p, (upto - below) * p.area, slice(k));
                 below = upto;
             }
@@ -228,17 +228,17 @@ private:
         while (int(result_.suggestions.size()) < options_.suggestions) {
             run_.check();
             std::size_t best = 0;
-            double most = 0;
+            double maximum = 0;
             for (std::size_t k = 0; k < covers.size(); ++k) {
                 std::erase_if(covers[k], [&](std::uint32_t n) { return !pieces_[n].unsupported; });
                 double sum = 0;
                 for (const std::uint32_t n : covers[k]) sum += pieces_[n].area;
-                if (sum <= most) continue;
-                most = sum;
+                if (sum <= maximum) continue;
+                maximum = sum;
                 best = k;
             }
-            if (!(most > 0)) return;
-            Suggestion s{static_cast<int>(best), most, {}, place(outline[best], covers[best])};
+            if (!(maximum > 0)) return;
+            Suggestion s{static_cast<int>(best), maximum, {}, place(outline[best], covers[best])};
             s.index = geometry_.world_to_index(s.world);
             result_.suggestions.push_back(s);
             for (const std::uint32_t n : covers[best]) pieces_[n].unsupported = false;
@@ -251,15 +251,15 @@ private:
         constexpr std::size_t kSample = 2000;
         const std::size_t step = covered.size() / kSample + 1, stride = outline.size() / kSample + 1;
         Vec3 best = outline.front();
-        double most = -1;
+        double maximum = -1;
         for (std::size_t m = 0; m < outline.size(); m += stride) {
             double sum = 0;
             for (std::size_t n = 0; n < covered.size(); n += step) {
                 const Piece& p = pieces_[covered[n]];
                 if (detail::squared_distance(p.center, outline[m]) <= options_.reach * options_.reach) sum += p.area;
             }
-            if (sum <= most) continue;
-            most = sum;
+            if (sum <= maximum) continue;
+            maximum = sum;
             best = outline[m];
         }
         return best;
@@ -301,8 +301,8 @@ Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& mark
     return assess(mesh, marks, nullptr, geometry, options, run);
 }
 
-double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach,
-                                    const RunContext& run) {
+double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach,
+                                       const RunContext& run) {
     struct Areas {
         double total = 0, bare = 0;
     } areas;
@@ -334,11 +334,11 @@ double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& d
     return areas.total > 0 ? areas.bare / areas.total : 0.0;
 }
 
-double measure_share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
-                                    const RunContext& run) {
+double measure_fraction_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
+                                       const RunContext& run) {
     if (points.empty() || mesh.empty()) return 0;
     const Domain domain = make_domain(bounding_box(points, reach), reach / 3);
-    return measure_share_without_points(mesh, *compute_distance(points, domain, {reach}, run).grid, reach, run);
+    return measure_fraction_without_points(mesh, *compute_distance(points, domain, {reach}, run).grid, reach, run);
 }
 
 }  // namespace covol

@@ -23,9 +23,9 @@ struct Moments {
     Vec3d moment{0, 0, 0};
     Vec3d low{std::numeric_limits<double>::max()}, high{-std::numeric_limits<double>::max()};
 
-    void add(double share, const Vec3d& at) {
-        volume += share;
-        moment += share * at;
+    void add(double fraction, const Vec3d& at) {
+        volume += fraction;
+        moment += fraction * at;
     }
     void reach(const Vec3d& at) {
         low = openvdb::math::minComponent(low, at);

@@ -28,10 +28,10 @@ using Accessor = FloatGrid::ConstAccessor;
 
 std::string quoted(const std::string& name) { return "'" + name + "'"; }
 
-std::string percent(double share) {
+std::string percent(double fraction) {
     std::ostringstream text;
     text.precision(3);
-    text << 100 * share << " %";
+    text << 100 * fraction << " %";
     return text.str();
 }
 
@@ -99,12 +99,12 @@ private:
                 if (both == 0) continue;
                 StructureOverlap overlap{a, b, double(both) * h_ * h_ * h_, std::nullopt};
                 const std::uint64_t in_a = solids[a]->activeVoxelCount(), in_b = solids[b]->activeVoxelCount();
-                const double share = double(both) / double(std::min(in_a, in_b));
-                if (share >= options_.nested_share) {
+                const double fraction = double(both) / double(std::min(in_a, in_b));
+                if (fraction >= options_.nested_fraction) {
                     if (in_a == in_b)
                         throw Error(Errc::InvalidInput, quoted(structures_[a].name) + " and " +
                                                             quoted(structures_[b].name) +
-                                                            " are the same solid: " + percent(share) +
+                                                            " are the same solid: " + percent(fraction) +
                                                             " of their voxels are common; mark each by its own points");
                     overlap.inner = in_a < in_b ? a : b;
                 }

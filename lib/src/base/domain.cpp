@@ -34,11 +34,11 @@ void require_extent(const char* where, const WorldBox& box) {
 
 void require_voxel_size(const char* where, double voxel_size) {
     // OpenVDB takes transforms whose determinant is below 3e-15 for singular.
-    constexpr double kLeast = 1.5e-5;
-    if (voxel_size >= kLeast && std::isfinite(voxel_size)) return;
+    constexpr double kMin = 1.5e-5;
+    if (voxel_size >= kMin && std::isfinite(voxel_size)) return;
     std::ostringstream text;
-    text << where << ": `voxel_size`: expected >= " << kLeast << ", got " << voxel_size;
-    if (voxel_size > 0 && voxel_size < kLeast)
+    text << where << ": `voxel_size`: expected >= " << kMin << ", got " << voxel_size;
+    if (voxel_size > 0 && voxel_size < kMin)
         text << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `points_scale` of "
                 "points)";
     throw Error(Errc::InvalidOptions, text.str(), "voxel_size");

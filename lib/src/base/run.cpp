@@ -24,8 +24,8 @@ void RunContext::check() const {
 
 void with_threads(const RunContext& run, const std::function<void()>& work) {
     // TBB prints a warning where an arena asks for more than the process may have.
-    const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    const int width = std::min(run.threads, int(most));
+    const auto maximum = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    const int width = std::min(run.threads, int(maximum));
     if (run.threads <= 0 || width == tbb::this_task_arena::max_concurrency()) {
         work();
         return;

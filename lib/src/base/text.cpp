@@ -100,7 +100,7 @@ Character first_of(std::string_view text) {
     const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[n]); };
     if (byte(0) < 0x80) return {byte(0), 1};
     const std::size_t length = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-    constexpr char32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter forms of the same character are refused
+    constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter forms of the same character are refused
     if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < length) return {};
     char32_t code = byte(0) & (0x7FU >> length);
     for (std::size_t n = 1; n < length; ++n) {
@@ -108,7 +108,7 @@ Character first_of(std::string_view text) {
         code = code << 6U | (byte(n) & 0x3FU);
     }
     const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-    if (code < kLeast[length] || code > 0x10FFFF || surrogate) return {};
+    if (code < kMin[length] || code > 0x10FFFF || surrogate) return {};
     return {code, length};
 }
 

@@ -27,7 +27,7 @@ namespace {
 using namespace pipeline;
 
 constexpr double kCoarseVoxels = 400;     // most across the points, on the lattice of the coarse solve
-constexpr double kLeastFactor = 2;        // voxels: least size of that lattice's voxels
+constexpr double kMinFactor = 2;          // voxels: least size of that lattice's voxels
 constexpr int kStateLayers = 8;           // around a brick, that its state holds
 constexpr int kSurfaceLayers = 8;         // around a brick: its distance to the surface rests on no more
 constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
@@ -251,7 +251,7 @@ struct BrickJob::Parts {
     [[nodiscard]] double coarse_factor() const {
         const std::vector<Vec3>& attracting = resolved.marks.attracting;
         const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);
-        double factor = kLeastFactor;
+        double factor = kMinFactor;
         while (longest_side(box) > kCoarseVoxels * factor * h()) factor *= 2;
         return factor;
     }
@@ -281,7 +281,7 @@ struct BrickJob::Parts {
                 plan.domain = fine_domain(problem, resolved, coarse.report.domain);
                 break;
             } catch (const Error& error) {
-                if (error.code() == Errc::Cancelled || factor <= kLeastFactor) throw;
+                if (error.code() == Errc::Cancelled || factor <= kMinFactor) throw;
                 run.info("coarse solve at " + number(*coarse_options.voxel_size) + ": " + error.what());
             }
         }

@@ -32,11 +32,11 @@ class Splitter {
 public:
     /// @param weight  voxels of the fine band that one place stands for
     Splitter(const Domain& domain, double weight, const BrickOptions& options)
-        : domain_(domain), weight_(weight), most_(double(options.most_voxels)) {}
+        : domain_(domain), weight_(weight), maximum_(double(options.max_voxels)) {}
 
     void split(VoxelBox box, std::vector<Place>::iterator begin, std::vector<Place>::iterator end) {
         const double voxels = weight_ * double(end - begin);
-        if (voxels > most_)
+        if (voxels > maximum_)
             for (const int axis : longest_first(begin, end)) {
                 std::nth_element(begin, begin + (end - begin) / 2, end,
                                  [axis](const Place& p, const Place& q) { return p[axis] < q[axis]; });
@@ -70,7 +70,7 @@ private:
     }
 
     const Domain& domain_;
-    double weight_, most_;
+    double weight_, maximum_;
     std::vector<Brick> bricks_;
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 using Accessor = FloatGrid::ConstAccessor;
 
-constexpr double kLeastCell = 0.1;      // voxels: a layer closer to the face than this is moved onto it
+constexpr double kMinCell = 0.1;        // voxels: a layer closer to the face than this is moved onto it
 constexpr float kSameDistance = 1e-3F;  // voxels: a distance that is the face's own
 
 openvdb::CoordBBox voxels_of(const Domain& d) {
@@ -302,7 +302,7 @@ double depth_in(const Clip& clip, const Vec3& x) {
 }
 
 int LatticeClip::face_layer(int axis, bool upper) const {
-    return upper ? int(std::ceil(high[axis] - kLeastCell)) : int(std::floor(low[axis] + kLeastCell));
+    return upper ? int(std::ceil(high[axis] - kMinCell)) : int(std::floor(low[axis] + kMinCell));
 }
 
 double LatticeClip::position(int axis, int layer) const {

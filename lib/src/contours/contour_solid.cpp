@@ -82,8 +82,8 @@ public:
         const double here = at(slice(), p);
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
-            const double height = slice().end + radius, share = height / std::abs(slice().w - inner().w);
-            return {std::min(here, carried_on(column(p), height)) - (1 + 2 * share) * radius,
+            const double height = slice().end + radius, fraction = height / std::abs(slice().w - inner().w);
+            return {std::min(here, carried_on(column(p), height)) - (1 + 2 * fraction) * radius,
                     std::numeric_limits<double>::max()};
         }
         if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
@@ -294,9 +294,9 @@ bool ContourSolid::may_meet(const Vec3& center, double radius) const {
     const Vec3 p = data_->frame.from_world(center);
     double low = std::numeric_limits<double>::max(), high = -low;
     const auto include = [&](const Interval& interval) {
-        const auto [least, most] = interval.range(p[0], p[1], radius);
-        low = std::min(low, least);
-        high = std::max(high, most);
+        const auto [minimum, maximum] = interval.range(p[0], p[1], radius);
+        low = std::min(low, minimum);
+        high = std::max(high, maximum);
     };
     const auto& slices = data_->slices;
     if (p[2] + radius < slices.front().w - slices.front().highest() ||

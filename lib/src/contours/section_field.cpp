@@ -15,11 +15,11 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMostFieldNodes = 6'000'000;
-constexpr std::size_t kMostStops = 20'000'000;  // edges of the lattice that end on planes; 16 bytes each
-constexpr int kCoarsest = 16;                   // nodes along the longest side
-constexpr float kSettled = 1e-4F;               // largest change of a value in a sweep
-constexpr int kMostSweeps = 400;
+constexpr std::size_t kMaxFieldNodes = 6'000'000;
+constexpr std::size_t kMaxStops = 20'000'000;  // edges of the lattice that end on planes; 16 bytes each
+constexpr int kCoarsest = 16;                  // nodes along the longest side
+constexpr float kSettled = 1e-4F;              // largest change of a value in a sweep
+constexpr int kMaxSweeps = 400;
 constexpr std::size_t kFolds = 6;
 constexpr float kClosest = 1e-3F;  // cells from a plane; a node that is closer has the plane's value
 
@@ -126,7 +126,7 @@ public:
     /// @param across  cells between planes, which the best factor depends on
     void solve(std::vector<float>& values, double across) const {
         const auto factor = float(2 / (1 + std::sin(std::numbers::pi / std::max(across, 3.0))));
-        for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+        for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
             run_.check();
             const double change = std::max(half_sweep(values, 0, factor), half_sweep(values, 1, factor));
             if (change < double(kSettled)) break;
@@ -172,15 +172,15 @@ private:
                         for (int k = 1 + (i + j + colour) % 2; k + 1 < lattice_.size[2]; k += 2) {
                             float* v = values.data() + i * di + j * dj + k;
                             const std::int32_t entry = entry_[std::size_t(v - values.data())];
-                            float asked;
+                            float wanted;
                             if (entry < 0) {
-                                asked = (v[-di] + v[di] + v[-dj] + v[dj] + v[-dk] + v[dk]) / 6;
+                                wanted = (v[-di] + v[di] + v[-dj] + v[dj] + v[-dk] + v[dk]) / 6;
                             } else {
                                 const Beside& b = beside_[std::size_t(entry)];
-                                asked = b.known + b.weight[0] * v[-di] + b.weight[1] * v[di] + b.weight[2] * v[-dj] +
-                                        b.weight[3] * v[dj] + b.weight[4] * v[-dk] + b.weight[5] * v[dk];
+                                wanted = b.known + b.weight[0] * v[-di] + b.weight[1] * v[di] + b.weight[2] * v[-dj] +
+                                         b.weight[3] * v[dj] + b.weight[4] * v[-dk] + b.weight[5] * v[dk];
                             }
-                            const float step = factor * (asked - *v);
+                            const float step = factor * (wanted - *v);
                             *v += step;
                             change = std::max(change, double(std::abs(step)));
                         }
@@ -307,8 +307,8 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     }
     // A plane of any direction crosses up to sqrt(3) edges for each node of a layer, each with two ends.
     const double stops = 2 * std::sqrt(3.0) * double(sections.size()) * std::pow(nodes, 2.0 / 3);
-    cell_ = h * std::ceil(
-                    std::max({1.0, std::cbrt(nodes / double(kMostFieldNodes)), std::sqrt(stops / double(kMostStops))}));
+    cell_ =
+        h * std::ceil(std::max({1.0, std::cbrt(nodes / double(kMaxFieldNodes)), std::sqrt(stops / double(kMaxStops))}));
     std::vector<SectionLevels> levels(sections.size());
     tbb::parallel_for(std::size_t(0), levels.size(), [&](std::size_t n) { levels[n] = levels_of(sections[n], cell_); });
     run.check();

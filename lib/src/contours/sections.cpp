@@ -12,14 +12,15 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMostNodes = 1u << 20;  // of a plane's grid
+constexpr std::size_t kMaxNodes = 1u << 20;  // of a plane's grid
 
 /// Greedily: the largest disc first, none whose centre lies in another.
-std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceGrid& grid, bool inside, double least) {
+std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceGrid& grid, bool inside,
+                                   double minimum) {
     std::vector<std::size_t> order;
     const auto radius = [&](std::size_t n) { return inside ? -double(level[n]) : double(level[n]); };
     for (std::size_t n = 0; n < level.size(); ++n)
-        if (radius(n) >= least) order.push_back(n);
+        if (radius(n) >= minimum) order.push_back(n);
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return radius(a) > radius(b); });
     std::vector<Vec2> centres;
     std::vector<double> radii;
@@ -60,7 +61,7 @@ SliceGrid grid_around(const std::vector<Polygon>& polygons, double cell) {
     const double margin = kContours.network_around * std::max(high[0] - low[0], high[1] - low[1]) + 2 * cell;
     const double width = high[0] - low[0] + 2 * margin, height = high[1] - low[1] + 2 * margin;
     SliceGrid grid;
-    grid.cell = std::max(cell, std::sqrt(width * height / double(kMostNodes)));
+    grid.cell = std::max(cell, std::sqrt(width * height / double(kMaxNodes)));
     grid.origin = {low[0] - margin, low[1] - margin};
     grid.nx = int(width / grid.cell) + 2;
     grid.ny = int(height / grid.cell) + 2;

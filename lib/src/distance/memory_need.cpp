@@ -24,7 +24,7 @@ constexpr double kGrowth = 1.02;       // of the voxel size, while one is sought
 constexpr double kBaseBytes = 8e7;     // of a program that has done nothing yet
 constexpr double kDoubt = 1.2;         // estimates were up to this much too high
 constexpr double kComfort = 0.8;       // share of the budget that the proposed one takes
-constexpr int kMostGrowths = 2000;
+constexpr int kMaxGrowths = 2000;
 
 /// Volume of {d <= r} by r, on a grid that is coarse enough for any domain.
 class CloudVolume {
@@ -74,7 +74,7 @@ void require(const BytesAt& bytes_at, double voxel_size, const char* where, cons
     if (!(needed > kDoubt * budget) || kComfort * budget <= kBaseBytes)
         return;  // a bound that no voxel size would keep
     double fits = voxel_size;
-    for (int n = 0; n < kMostGrowths && bytes_at(fits) > kComfort * budget; ++n) fits *= kGrowth;
+    for (int n = 0; n < kMaxGrowths && bytes_at(fits) > kComfort * budget; ++n) fits *= kGrowth;
     std::ostringstream text;
     text.precision(2);
     text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "
@@ -87,8 +87,9 @@ void require(const BytesAt& bytes_at, double voxel_size, const char* where, cons
 
 void require_tube_memory(const std::vector<Vec3>& points, const Domain& domain, const TubeNeed& need, const char* where,
                          const RunContext& run) {
-    const double most = need.solved ? std::max(kTubeBytes, kBandBytes) : kTubeBytes;
-    if (run.memory_budget == 0 || double(domain.voxel_count()) * most + kBaseBytes <= double(run.memory_budget)) return;
+    const double maximum = need.solved ? std::max(kTubeBytes, kBandBytes) : kTubeBytes;
+    if (run.memory_budget == 0 || double(domain.voxel_count()) * maximum + kBaseBytes <= double(run.memory_budget))
+        return;
     const CloudVolume volume(points, domain, run);
     require(
         [&](double h) {

@@ -99,8 +99,8 @@ std::array<double, 2> brightness_range(const Window& window) {
     };
     const double low = value_at(kEdge.low_percentile), high = value_at(kEdge.high_percentile);
     if (low < high) return {low, high};
-    const auto [least, most] = std::minmax_element(values.begin(), values.end());
-    return {double(*least), double(*most)};
+    const auto [minimum, maximum] = std::minmax_element(values.begin(), values.end());
+    return {double(*minimum), double(*maximum)};
 }
 
 void normalise(Window& window, const EdgeReport& report) {
@@ -194,12 +194,12 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
     for (std::size_t k = series.size() - 1; k-- > 0;) {
         run.check();
         run.report("edge", 1 - double(k + 1) / double(series.size()));
-        const float share = float(series[k]), weight = k == 0 ? 1.0F / 6 : 1.0F / 3;
+        const float step_fraction = float(series[k]), weight = k == 0 ? 1.0F / 6 : 1.0F / 3;
         tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
             const detail::LeafStar star = detail::star_of(window.image, leaf);
             const LeafBounds bounds = known_bounds(domain, band, leaf);
             const auto step = [&](const detail::LeafStar& u) {
-                detail::kernels().mean_step(u, image.leaf(leaf), share, weight, other.leaf(leaf));
+                detail::kernels().mean_step(u, image.leaf(leaf), step_fraction, weight, other.leaf(leaf));
             };
             if (bounds.cuts())
                 step(ClosedStar(star, bounds).star());
@@ -234,7 +234,8 @@ double contrast_of(FloatGrid& slopes, double percentile) {
 
 double automatic_contrast(FloatGrid& s, const EdgeOptions& options, bool is_line) {
     if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
-    return is_line ? kEdge.line_share * contrast_of(s, kEdge.line_percentile) : contrast_of(s, kEdge.slope_percentile);
+    return is_line ? kEdge.line_fraction * contrast_of(s, kEdge.line_percentile)
+                   : contrast_of(s, kEdge.slope_percentile);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ struct EdgeHeuristics {
     /// [percentile] Of the lines at marks that K is chosen from.
     double line_percentile = heuristic("edge.line_percentile", 0.5);
     /// [of that strength] A line that weak still counts.
-    double line_share = heuristic("edge.line_share", 1.0 / 3.0);
+    double line_fraction = heuristic("edge.line_fraction", 1.0 / 3.0);
     /// [standard errors] A line weaker than that may be noise.
     double standard_errors = heuristic("edge.standard_errors", 3.0);
     /// [percentile] Of the brightness that becomes 0.

@@ -87,7 +87,9 @@ private:
     [[nodiscard]] const unsigned long long* active(std::size_t leaf) const {
         return reinterpret_cast<const unsigned long long*>(band_.active(leaf).data());
     }
-    [[nodiscard]] Share* rows(std::size_t leaf) { return reinterpret_cast<Share*>(rows_.data() + leaf * kRowBytes); }
+    [[nodiscard]] Fraction* rows(std::size_t leaf) {
+        return reinterpret_cast<Fraction*>(rows_.data() + leaf * kRowBytes);
+    }
 
     const EvolveOptions& options_;
     const Domain domain_;
@@ -97,7 +99,7 @@ private:
     std::optional<HaloField> phi_, edge_, image_weight_, obstacle_, floor_;
     LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
     bool has_previous_ = false;  // it is from the step before
-    static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Share);
+    static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Fraction);
     std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
     // One for each leaf:
     std::vector<int> active_counts_;

@@ -206,7 +206,7 @@ private:
         marks_.resize(solver_->band().size());
     }
 
-    [[nodiscard]] double inactive_below() const { return kEvolve.inactive_share * options_.tolerance * tau_; }
+    [[nodiscard]] double inactive_below() const { return kEvolve.inactive_fraction * options_.tolerance * tau_; }
 
     // A fixed band. @return how much the surface still moves, voxels a step
     double keep_band(double motion) {

@@ -8,7 +8,7 @@ namespace covol {
 /// much.
 struct EvolveHeuristics {
     /// [of the motion that counts as steady] A leaf that a step moves by less becomes inactive.
-    double inactive_share = heuristic("evolve.inactive_share", 0.2);
+    double inactive_fraction = heuristic("evolve.inactive_fraction", 0.2);
     /// [steps] Between two redistancings of a tracked band.
     int cycle = heuristic("evolve.cycle", 3);
     /// [voxels a step] Below it the time step grows.
@@ -29,7 +29,7 @@ struct MotionHeuristics {
     /// [voxels] The same, that is leaving it.
     double leaving_by = heuristic("motion.leaving_by", 0.4);
     /// [share of the leaves with the surface in them] That have left it; before that it is not worth while.
-    double share_left = heuristic("motion.share_left", 0.1);
+    double fraction_left = heuristic("motion.fraction_left", 0.1);
     /// [crossed edges] A leaf's average over fewer says little.
     int few_crossings = heuristic("motion.few_crossings", 32);
     /// [voxels] Depth of a voxel whose change of sign, anywhere, makes the band follow.

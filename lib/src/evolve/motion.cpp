@@ -215,7 +215,7 @@ std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& 
         deep |= states[leaf] == kDeepDown;
         if (states[leaf] >= kLeaving) leaving.push_back(leaf);
     }
-    if (!deep && double(left) < kMotion.share_left * double(crossed)) leaving.clear();
+    if (!deep && double(left) < kMotion.fraction_left * double(crossed)) leaving.clear();
     return leaving;
 }
 

@@ -19,11 +19,11 @@ namespace fs = std::filesystem;
 namespace {
 
 /// What libraries do not say of a write that failed.
-std::string why_no_room(const std::string& said) {
+std::string why_no_room(const std::string& message) {
     const int why = errno;
     if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};
     const std::string text = std::strerror(why);
-    return said.find(text) == std::string::npos ? ": " + text : std::string();
+    return message.find(text) == std::string::npos ? ": " + text : std::string();
 }
 
 struct Folder {

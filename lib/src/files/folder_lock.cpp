@@ -45,9 +45,9 @@ std::string holder_of(const FileId& file) {
 FolderLock::FolderLock(const fs::path& folder, const RunContext& run, std::chrono::milliseconds patience)
     : file_(folder, O_RDONLY | O_DIRECTORY) {
     if (file_.get() < 0) throw Error(Errc::Io, folder.string() + ": cannot write: " + std::strerror(errno));
-    constexpr std::chrono::milliseconds kPause{20}, kUntilSaid{1000};
+    constexpr std::chrono::milliseconds kPause{20}, kUntilReported{1000};
     const Clock::time_point begin = Clock::now();
-    bool said = false;
+    bool reported = false;
     while (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
         if (errno != EWOULDBLOCK && errno != EINTR) return;
         run.check();
@@ -57,10 +57,10 @@ FolderLock::FolderLock(const fs::path& folder, const RunContext& run, std::chron
                                       " has had a lock (flock) on this folder for " +
                                       std::to_string((waited.count() + 500) / 1000) +
                                       " s; expected it to be free; end that program, or choose another folder");
-        if (waited >= kUntilSaid && !said) {
+        if (waited >= kUntilReported && !reported) {
             run.info(folder.string() + ": waiting for " + holder_of(id()) +
                      ", which has a lock (flock) on this folder");
-            said = true;
+            reported = true;
         }
         std::this_thread::sleep_for(std::min(kPause, patience));
     }

@@ -53,9 +53,9 @@ void expect_own_link(const fs::path& folder, const struct stat& link, const std:
 }  // namespace
 
 OutputPlace place_of_output(const std::string& path) {
-    constexpr int kMostLinks = 40;  // as the kernel
+    constexpr int kMaxLinks = 40;  // as the kernel
     fs::path at = path;
-    for (int links = 0; links <= kMostLinks; ++links) {
+    for (int links = 0; links <= kMaxLinks; ++links) {
         at = detail::without_end_slash(at.string());
         const fs::path folder = real_folder(at, path), name = at.filename();
         if (name.empty() || name == "." || name == "..") return {fs::canonical(at), false};

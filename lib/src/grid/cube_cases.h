@@ -49,7 +49,7 @@ constexpr bool on_face(int edge, int axis, int side) {
     return ((kEdgeStart[edge] & bit) != 0) == (side != 0) && ((edge_end(edge) & bit) != 0) == (side != 0);
 }
 
-constexpr bool share_face(int e, int f) {
+constexpr bool have_common_face(int e, int f) {
     for (int axis = 0; axis < 3; ++axis)
         for (int side = 0; side < 2; ++side)
             if (on_face(e, axis, side) && on_face(f, axis, side)) return true;
@@ -86,7 +86,7 @@ constexpr std::uint16_t allowed_apexes(const CubeLoop& loop) {
     for (int i = 0; i < loop.size; ++i) {
         bool good = true;
         for (int step = 2; step < loop.size - 1; ++step)
-            good = good && !share_face(loop.edges[i], loop.edges[(i + step) % loop.size]);
+            good = good && !have_common_face(loop.edges[i], loop.edges[(i + step) % loop.size]);
         if (good) allowed |= std::uint16_t(1U << i);
     }
     return allowed;

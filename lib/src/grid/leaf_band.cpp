@@ -21,12 +21,12 @@ std::uint64_t pack(const Coord& origin) {
 
 /// Farther apart, two leaves would have one key.
 void require_packable(const std::vector<Coord>& origins) {
-    constexpr std::int64_t kMost = 1 << 24;
+    constexpr std::int64_t kMax = 1 << 24;
     for (int a = 0; a < 3 && !origins.empty(); ++a) {
         const auto [low, high] = std::minmax_element(
             origins.begin(), origins.end(), [a](const Coord& one, const Coord& other) { return one[a] < other[a]; });
         const std::int64_t length = std::int64_t((*high)[a]) - (*low)[a] + kLeafDim;
-        if (length > kMost - 2 * kLeafDim)
+        if (length > kMax - 2 * kLeafDim)
             throw Error(Errc::Unsupported, "the band is " + std::to_string(length) +
                                                " voxels long along an axis, expected less than 2^24; use a larger "
                                                "voxel size");

@@ -28,9 +28,9 @@ struct InImage : GuessOptions {
 };
 
 double longest(const std::array<Vec3, 3>& axes) {
-    double most = 0;
-    for (const Vec3& a : axes) most = std::max(most, length(a));
-    return most;
+    double maximum = 0;
+    for (const Vec3& a : axes) maximum = std::max(maximum, length(a));
+    return maximum;
 }
 
 /// The standard deviation of a mark's place along a direction.
@@ -54,8 +54,8 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& o
     guess::ImpreciseMarks result;
     result.marks = marks;
     result.deviation = options.deviation;
-    if (const double said = longest(options.deviation); options.most_deviation > said && said > 0)
-        result.most_factor = options.most_deviation * options.most_deviation / (said * said);
+    if (const double stated = longest(options.deviation); options.max_deviation > stated && stated > 0)
+        result.max_factor = options.max_deviation * options.max_deviation / (stated * stated);
     result.world = options.faces;
     if (options.normals.size() == marks.size()) result.normals = options.normals;  // none was left out
     return result;
@@ -137,10 +137,10 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
 /// Whether marks beside a face lie along a line around an area, not all over it: then they are the outline of the cut,
 /// whatever the others say.
 bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
-    if (marks.size() < kGuess.least_outline) return false;
+    if (marks.size() < kGuess.min_outline) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
-    return double(surrounded) < kGuess.surrounded_share * double(marks.size());
+    return double(surrounded) < kGuess.surrounded_fraction * double(marks.size());
 }
 
 /// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.
@@ -151,7 +151,7 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, const H
         const Vec3 low = detail::moved(mark, direction, -step), high = detail::moved(mark, direction, step);
         slope = std::hypot(slope, (body.value(high) - body.value(low)) / (2 * step));
     }
-    return body.value(mark) / std::max(slope, kGuess.least_slope);
+    return body.value(mark) / std::max(slope, kGuess.min_slope);
 }
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
@@ -162,7 +162,7 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
     for (const auto& [face, of_face] : by_face(marks, options))
         if (face != nullptr && !is_outline(of_face, *face)) all_over.insert(face);
     for (const Vec3& mark : marks) (all_over.contains(end_beside(mark, options)) ? doubtful : sure).push_back(mark);
-    if (doubtful.empty() || sure.size() < kGuess.least_outline || !guess::span_space(sure)) return marks;
+    if (doubtful.empty() || sure.size() < kGuess.min_outline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kGuess.cut_rounds && held != before;
          ++round) {  // those on its outline tell better where the section ends

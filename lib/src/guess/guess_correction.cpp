@@ -27,7 +27,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kSolved = 1e-6;        // of the right-hand side
 constexpr double kSteepestBump = 2.11;  // largest slope, of the height by the radius: Wendland's function has it
-constexpr int kMostIterations = 1000;
+constexpr int kMaxIterations = 1000;
 
 struct Bump {
     Vec3 center;
@@ -193,7 +193,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
     p = r;
     double norm = dot(r, r);
     const double enough = kSolved * kSolved * norm;
-    for (int iteration = 0; iteration < kMostIterations && norm > enough; ++iteration) {
+    for (int iteration = 0; iteration < kMaxIterations && norm > enough; ++iteration) {
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
             double sum = 0;
             for (const Entry& e : rows[n]) sum += e.value * p[e.column];
@@ -212,15 +212,14 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 }
 
 /// Adds bumps until the targets have their shifts, the farthest first.
-void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double least_radius, double precision) {
+void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
     const auto radius_of = [&](double shift) {
-        return std::max(least_radius,
-                        (shift > 0 ? kCorrection.radius_outward : -kCorrection.radius_of_residual) * shift);
+        return std::max(min_radius, (shift > 0 ? kCorrection.radius_outward : -kCorrection.radius_of_residual) * shift);
     };
     while (!open.empty()) {
         std::vector<double> left;
-        double radius = least_radius;
+        double radius = min_radius;
         for (const Target& t : open) {
             left.push_back(t.shift - sum_of(bumps, t.at));
             radius = std::max(radius, radius_of(left.back()));
@@ -376,7 +375,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
         const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
-        const double least = options.least_radius.value_or(kCorrectionVoxels * h);
+        const double minimum = options.min_radius.value_or(kCorrectionVoxels * h);
         std::vector<Target> on_surface;
         on_surface.reserve(marks.size());
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
@@ -386,7 +385,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         for (int round = 0; round < kCorrection.seed_rounds; ++round) {
             run.check();
             data->bumps.clear();
-            add_bumps(data->bumps, targets, least, precision);
+            add_bumps(data->bumps, targets, minimum, precision);
             const std::size_t before = targets.size();
             for (std::size_t n = 0; n < used.size(); ++n) {
                 const bool in = n < inside.size();
@@ -407,9 +406,9 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         report.before_max = before[1];
         report.after_mean = after[0];
         report.after_max = after[1];
-        report.least_radius = least;
+        report.min_radius = minimum;
         for (const Bump& b : data->bumps) report.largest_radius = std::max(report.largest_radius, b.radius);
-        if (report.largest_radius > least) data->hull = hull_of(surface, targets, marks.size(), h);
+        if (report.largest_radius > minimum) data->hull = hull_of(surface, targets, marks.size(), h);
     });
     return GuessCorrection(data);
 }

@@ -11,7 +11,7 @@ struct GuessHeuristics {
     /// [voxels] Within the section by more: a mark in the cut.
     double inside_voxels = heuristic("guess.inside_voxels", 1.5);
     /// [of a distance's slope] At a section whose body ends right beyond it.
-    double least_slope = heuristic("guess.least_slope", 0.05);
+    double min_slope = heuristic("guess.min_slope", 0.05);
     /// [rounds] Of telling marks in the cut from marks on the surface.
     int cut_rounds = heuristic("guess.cut_rounds", 2);
     /// [ellipsoids around the marks] A surface that goes on beyond does not close; half a ball's marks close it
@@ -27,9 +27,9 @@ struct GuessHeuristics {
     double way_out = heuristic("guess.way_out", 5.0 / 6);
     /// [of the marks in a cut] Without a way out, less of its outline: of twelve marks and more all over it they are a
     /// sixth and more.
-    double surrounded_share = heuristic("guess.surrounded_share", 0.125);
+    double surrounded_fraction = heuristic("guess.surrounded_fraction", 0.125);
     /// [marks] Off the cuts, to say what is inside of them; in a cut, for an outline.
-    std::size_t least_outline = heuristic("guess.least_outline", 8);
+    std::size_t min_outline = heuristic("guess.min_outline", 8);
 };
 COVOL_HEURISTICS GuessHeuristics kGuess{};
 
@@ -70,7 +70,7 @@ struct MarksSurfaceHeuristics {
     /// [parts] That are asked how imprecise marks are.
     std::size_t tried_parts = heuristic("marks_surface.tried_parts", 16);
     /// [of the given variance] Below which marks are exact.
-    double least_factor = heuristic("marks_surface.least_factor", 1e-3);
+    double min_factor = heuristic("marks_surface.min_factor", 1e-3);
     /// [of a part's weight at its centre] Of the whole among parts.
     double whole_weight = heuristic("marks_surface.whole_weight", 1e-3);
 };
@@ -86,17 +86,17 @@ struct VariationalHeuristics {
     /// [steps] Of it.
     int subspace_steps = heuristic("variational.subspace_steps", 12);
     /// [marks] Neighbours, to have a middle.
-    double least_local = heuristic("variational.least_local", 6);
+    double min_local = heuristic("variational.min_local", 6);
     /// [directions] Around the marks, in which the surface may not go on.
     int directions = heuristic("variational.directions", 64);
     /// [steps] Of L-BFGS, at most.
-    int least_energy_steps = heuristic("variational.least_energy_steps", 500);
+    int min_energy_steps = heuristic("variational.min_energy_steps", 500);
     /// [rounds] Of finding the amplitude against which precision counts.
     int amplitude_rounds = heuristic("variational.amplitude_rounds", 3);
     /// [ratio] Of the least to the largest variance of marks in one plane.
     double flat = heuristic("variational.flat", 1e-8);
     /// [of the amplitude] Keeps the matrix regular where marks coincide.
-    double least_lambda = heuristic("variational.least_lambda", 1e-9);
+    double min_lambda = heuristic("variational.min_lambda", 1e-9);
 };
 COVOL_HEURISTICS VariationalHeuristics kVariational{};
 

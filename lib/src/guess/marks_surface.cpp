@@ -79,10 +79,10 @@ struct LikeliestVariance {
 /// each with a variance that is kMarks.variance_step times smaller; a step is taken where they show half of that.
 double step_shows(double marks) { return 0.5 * 0.5 * marks * std::log(kMarks.variance_step); }
 
-LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks,
+LikeliestVariance likeliest_variance(const VariationalSurface& stated, const ImpreciseMarks& marks,
                                      const std::vector<std::size_t>& chosen,
                                      const std::function<Constraints(Constraints)>& complete, const RunContext& run) {
-    const std::vector<Vec3> normals = normals_of(said, marks.marks);
+    const std::vector<Vec3> normals = normals_of(stated, marks.marks);
     const auto with = [&](double factor) {
         Constraints part = complete(part_of(marks, chosen, normals));
         for (double& v : part.variance) v *= factor;
@@ -90,7 +90,7 @@ LikeliestVariance likeliest_variance(const VariationalSurface& said, const Impre
     };
     const double enough = step_shows(double(chosen.size()));
     LikeliestVariance best{1, with(1)};
-    while (best.factor > kMarks.least_factor) {
+    while (best.factor > kMarks.min_factor) {
         run.check();
         std::unique_ptr<VariationalSurface> finer = with(best.factor / kMarks.variance_step);
         if (finer->log_likelihood() - best.surface->log_likelihood() < enough) break;
@@ -117,8 +117,8 @@ double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& norm
     };
     const double enough = step_shows(double(near.size() * near.front().size()));
     double factor = 1, best = log_likelihood(1);
-    while (factor < marks.most_factor) {
-        const double coarser = std::min(factor * kMarks.variance_step, marks.most_factor);
+    while (factor < marks.max_factor) {
+        const double coarser = std::min(factor * kMarks.variance_step, marks.max_factor);
         const double likelihood = log_likelihood(coarser);
         if (likelihood - best < enough) break;
         factor = coarser;
@@ -173,7 +173,7 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         run.check();
     };
     make_whole(is_known ? marks.normals : normals_of(oriented, marks.marks), oriented.amplitude());
-    if (marks.most_factor > 1 && variance_factor_ == 1) {
+    if (marks.max_factor > 1 && variance_factor_ == 1) {
         const Normals normals = normals_of(*whole_, marks.marks);
         variance_factor_ = likeliest_coarser_factor(marks, normals, run);
         if (variance_factor_ > 1) make_whole(normals, 0);
@@ -230,8 +230,8 @@ void MarksSurface::sort_patches() {
     }
     cell_ = radii;
     for (int a = 0; a < 3; ++a) {
-        constexpr double kMostCells = 128;
-        cell_ = std::max(cell_, (high[a] - low_[a]) / kMostCells);
+        constexpr double kMaxCells = 128;
+        cell_ = std::max(cell_, (high[a] - low_[a]) / kMaxCells);
     }
     for (int a = 0; a < 3; ++a) cells_[a] = 1 + int((high[a] - low_[a]) / cell_);
     in_cell_.assign(std::size_t(cells_[0]) * cells_[1] * cells_[2], {});

@@ -14,7 +14,7 @@ struct ImpreciseMarks {
     std::array<Vec3, 3> deviation{};
     /// Of the deviation squared: how much less precise the marks may be than is said, where they fit each other so
     /// badly.
-    double most_factor = 1;
+    double max_factor = 1;
     std::vector<Vec3> seeds;  ///< places that are inside (value < 0) or outside
     std::vector<double> seed_value;
 

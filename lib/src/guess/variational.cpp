@@ -24,7 +24,7 @@ using Vector = Eigen::VectorXd;
 using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
-constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
+constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
 constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
 
 /// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
@@ -207,7 +207,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     std::copy(start.data(), start.data() + size, y);
     lbfgs_parameter_t parameter;
     lbfgs_parameter_init(&parameter);
-    parameter.max_iterations = kVariational.least_energy_steps;
+    parameter.max_iterations = kVariational.min_energy_steps;
     parameter.epsilon = 1e-5;
     parameter.past = 5;
     parameter.delta = 1e-6;
@@ -305,8 +305,8 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
 }
 
 /// From the centroid of each mark's nearest neighbours to the mark: across a tube or a sheet that many are wide around.
-Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double share) {
-    const auto count = std::size_t(share * double(marks));
+Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double fraction) {
+    const auto count = std::size_t(fraction * double(marks));
     Vector directions(3 * marks);
     for (Index n = 0; n < marks; ++n) {
         std::vector<std::pair<double, Index>> others;
@@ -322,14 +322,14 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
 
 /// Of first guesses, `known` ones among them unless there are none, the one that ends at the least energy. A body ends:
 /// where some ends have one sign all around, far from the marks, the others are no bodies.
-Gradients least_energy(const HermiteSystem& system, const Matrix& energy, const Vector& values, const Vector& c,
-                       const std::vector<Point>& nodes, Index marks, const Vector& outward,
-                       const std::vector<Vector>& known, const Inside& in_world) {
+Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Vector& values, const Vector& c,
+                     const std::vector<Point>& nodes, Index marks, const Vector& outward,
+                     const std::vector<Vector>& known, const Inside& in_world) {
     std::vector<Vector> guesses{outward};
     guesses.insert(guesses.end(), known.begin(), known.end());
-    for (const double share : kLocalShares)
-        if (share * double(marks) >= kVariational.least_local)
-            guesses.push_back(away_from_neighbours(nodes, marks, share));
+    for (const double fraction : kLocalFractions)
+        if (fraction * double(marks) >= kVariational.min_local)
+            guesses.push_back(away_from_neighbours(nodes, marks, fraction));
     const Matrix modes = flattest_modes(system.energy(), outward);
     for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k) guesses.push_back(modes.col(k));
     std::vector<Gradients> ends(guesses.size());
@@ -435,7 +435,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     Gradients found;
     const int rounds = amplitude > 0 ? 1 : kVariational.amplitude_rounds;
     for (int round = 0; round < rounds; ++round) {
-        const Vector lambda = (variance / unit_amplitude).cwiseMax(kVariational.least_lambda);
+        const Vector lambda = (variance / unit_amplitude).cwiseMax(kVariational.min_lambda);
         const HermiteSystem system(nodes, marks, lambda);
         double constant = 0;
         const Vector c = system.linear(values, constant) - system.energy() * before;
@@ -444,7 +444,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
             found = descend(energy, c, found.unit);
         else
             found = search == Search::Wide
-                        ? least_energy(system, energy, values, c, nodes, marks, outward, known, in_world)
+                        ? min_energy(system, energy, values, c, nodes, marks, outward, known, in_world)
                         : descend(energy, c, known.front());
         if (!given.axes.empty()) found.energy = found.unit.dot(system.energy() * found.unit) + 2 * c.dot(found.unit);
         if (round + 1 == rounds) f_ = expansion(system, values, found.unit - before, nodes);

@@ -102,10 +102,10 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
     constexpr double kNothing = 1e-8;  // of a place
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
-    const double most = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // all but a few have it
-    Counts total = most > 0 ? all_ : Counts();
+    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // all but a few have it
+    Counts total = maximum > 0 ? all_ : Counts();
     for (std::size_t n = 0; n < counts_.size(); ++n)
-        if (std::abs(weights[n] - most) > kNothing) total.add(counts_[n], weights[n] - most);
+        if (std::abs(weights[n] - maximum) > kNothing) total.add(counts_[n], weights[n] - maximum);
     return total;
 }
 

@@ -60,7 +60,7 @@ public:
         const Scene scene{patches_, *distance_->grid(), domain_, ranges_};
         if (!learn(scene, first)) return false;
         run_.check();
-        ask(scene);
+        query(scene);
         run_.check();
         weigh(first);
         run_.check();
@@ -74,7 +74,7 @@ private:
     bool place_marks(bool first);
     void set_ranges();
     bool learn(const Scene& scene, bool first);
-    void ask(const Scene& scene);
+    void query(const Scene& scene);
     void weigh(bool first);
     void move();
 
@@ -82,7 +82,7 @@ private:
         double prior2, error2, response, slope2;
         std::vector<double> off2;  // by mark
     };
-    [[nodiscard]] Word hear(const OffsetField& field, double prior) const;
+    [[nodiscard]] Word cross_validate(const OffsetField& field, double prior) const;
     [[nodiscard]] std::vector<double> local_error2(const Word& word) const;
     [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
         double sum = 0;
@@ -166,19 +166,19 @@ bool Guide::place_marks(bool first) {
     for (std::size_t m = 0; m < marks_.size(); ++m)
         if (std::abs(residual[m]) < (kGuide.width - 2) * h_) by_patch[patch[m]].push_back(m);
     on_.clear();
-    const std::size_t every = by_patch.size() / kGuide.most_marks + 1;
+    const std::size_t every = by_patch.size() / kGuide.max_marks + 1;
     std::size_t count = 0;
     for (const auto& [i, members] : by_patch) {
         if (count++ % every != 0) continue;
         PatchMark mark;
         mark.patch = i;
-        const double share = 1.0 / double(members.size());
+        const double fraction = 1.0 / double(members.size());
         for (const std::size_t m : members) {
-            mark.residual += share * residual[m];
-            for (int a = 0; a < 3; ++a) mark.at[a] += share * marks_[m][a];
+            mark.residual += fraction * residual[m];
+            for (int a = 0; a < 3; ++a) mark.at[a] += fraction * marks_[m][a];
         }
         const double width = options_.mark_precision ? *options_.mark_precision / kUniformDeviation : patches_.voxel[i];
-        mark.deviation = width * std::sqrt(share / 12);  // of a uniform error
+        mark.deviation = width * std::sqrt(fraction / 12);  // of a uniform error
         on_.push_back(mark);
     }
     if (on_.size() < kGuide.fewest_marks) {
@@ -279,13 +279,13 @@ bool Guide::learn(const Scene& scene, bool first) {
     return true;
 }
 
-void Guide::ask(const Scene& scene) {
+void Guide::query(const Scene& scene) {
     const std::size_t count = patches_.size();
     evidence_.assign(count, {});
     held_out_.assign(count, {});
     nearest_.resize(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        Lesson::Answer answer = lesson_->ask(scene, i, *smooth_);
+        Lesson::Answer answer = lesson_->query(scene, i, *smooth_);
         evidence_[i] = std::move(answer.all);
         held_out_[i] = std::move(answer.held_out);
         nearest_[i] = answer.nearest;
@@ -295,7 +295,7 @@ void Guide::ask(const Scene& scene) {
 /// The field of an image learnt without the nearest mark, for a guess that may be off by `prior` anywhere: how far it
 /// errs at the marks, how much of a wave of the guess, two spacings long, it would undo, and how fast it leaves the
 /// guess with the distance from the marks. Errors are taken a standard error larger, and the last one smaller.
-Guide::Word Guide::hear(const OffsetField& field, double prior) const {
+Guide::Word Guide::cross_validate(const OffsetField& field, double prior) const {
     const std::size_t count = patches_.size();
     const std::vector<double> none(count, 0.0), deviation(count, prior);
     std::vector<double> wave(count);
@@ -357,15 +357,15 @@ void Guide::weigh(bool first) {
     for (std::size_t i = 0; i < count; ++i) {
         distance2[i] = squared(to_mark_[i]);
         const double sagitta = distance2[i] / (2 * size_);
-        least2[i] = squared(kGuide.share_of_sagitta * sagitta);
+        least2[i] = squared(kGuide.fraction_of_sagitta * sagitta);
         if (options_.range) most2[i] = squared(std::min(sagitta, 0.5 * *options_.range));
     }
     std::vector<Word> words;
     if (first) {
-        do words.push_back(hear(field, broad_ * std::pow(0.5, words.size())));
-        while (int(words.size()) < kGuide.priors && words.back().response >= kGuide.least_response);
+        do words.push_back(cross_validate(field, broad_ * std::pow(0.5, words.size())));
+        while (int(words.size()) < kGuide.priors && words.back().response >= kGuide.min_response);
     } else {
-        words.push_back(hear(field, prior_));
+        words.push_back(cross_validate(field, prior_));
     }
     double slope2 = 0;
     for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
@@ -374,7 +374,7 @@ void Guide::weigh(bool first) {
     if (options_.range) needed2 = std::min(needed2, guess2_ + mean(most2));
     Word chosen = words.front();
     for (const Word& w : words)
-        if (w.response >= kGuide.least_response && w.prior2 >= needed2 &&
+        if (w.response >= kGuide.min_response && w.prior2 >= needed2 &&
             w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
             chosen = w;
     prior_ = std::sqrt(chosen.prior2);
@@ -392,10 +392,10 @@ void Guide::weigh(bool first) {
     std::vector<double> left(count), sure(count, 0.0);
     for (std::size_t i = 0; i < count; ++i) {
         const double both = squared(chosen.response) * guess2[i] + error2[i];
-        const double share = options_.weight * std::min(chosen.response * guess2[i] / both, 1.0);
-        offset_[i] = home_[i] + share * (fit.offset[i] - home_[i]);
+        const double fraction = options_.weight * std::min(chosen.response * guess2[i] / both, 1.0);
+        offset_[i] = home_[i] + fraction * (fit.offset[i] - home_[i]);
         left[i] = std::sqrt(guess2[i] * error2[i] / both);
-        if (fit.precision[i] * squared(deviation[i]) > 1 && share > 0.5) sure[i] = 1;
+        if (fit.precision[i] * squared(deviation[i]) > 1 && fraction > 0.5) sure[i] = 1;
     }
     if (misfit_ > 0) {
         // A guess that passes by its marks, such as another tool's, is drawn to them.
@@ -410,7 +410,7 @@ void Guide::weigh(bool first) {
     }
     report_.image_error = std::sqrt(chosen.error2);
     report_.guess_error = std::sqrt(mean2);
-    report_.confident_share = mean(sure);
+    report_.confident_fraction = mean(sure);
     std::vector<double> whole(count);
     report_.max_offset = 0;
     for (std::size_t i = 0; i < count; ++i) {

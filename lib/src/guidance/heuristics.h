@@ -27,16 +27,16 @@ struct GuidanceHeuristics {
     /// [marks] That the image is learnt from.
     std::size_t fewest_marks = heuristic("guidance.fewest_marks", 8);
     /// [marks] That are tested by leaving them out.
-    std::size_t most_marks = heuristic("guidance.most_marks", 400);
+    std::size_t max_marks = heuristic("guidance.max_marks", 400);
     /// [of a unit field] A field that hardly follows the image does not tell how good the image is.
-    double least_response = heuristic("guidance.least_response", 0.25);
+    double min_response = heuristic("guidance.min_response", 0.25);
     /// [marks] Worth of belief that the image is as good everywhere.
     double belief_in_all = heuristic("guidance.belief_in_all", 4);
     /// [variances] That are tried, each half of the one before.
     int priors = heuristic("guidance.priors", 5);
     /// [d² / (2 R)] Error of a surface that bends least, at distance d from marks on a body of size R: about a third of
     /// the sagitta.
-    double share_of_sagitta = heuristic("guidance.share_of_sagitta", 0.3);
+    double fraction_of_sagitta = heuristic("guidance.fraction_of_sagitta", 0.3);
 };
 COVOL_HEURISTICS GuidanceHeuristics kGuide{};
 
@@ -45,7 +45,7 @@ struct LearningHeuristics {
     /// [marks] Fewer say nothing of how the profile varies.
     std::size_t marks_for_places = heuristic("learning.marks_for_places", 40);
     /// [of the way from the surface] Distance from which on a place is its own part's; less a voxel.
-    double own_share = heuristic("learning.own_share", 0.7);
+    double own_fraction = heuristic("learning.own_fraction", 0.7);
     /// [marks] Within the radius of a local profile, about.
     int neighbours = heuristic("learning.neighbours", 12);
 };
@@ -82,13 +82,13 @@ struct MotionHeuristics {
     /// [voxels] To which a translation is found, and the least deviation of offsets.
     double finest_step = heuristic("motion.finest_step", 0.03);
     /// [of the mismatch] A translation leaves less.
-    double least_gain = heuristic("motion.least_gain", 0.9);
+    double min_gain = heuristic("motion.min_gain", 0.9);
     /// [of the samples] That are in the image after a translation.
-    double least_seen = heuristic("motion.least_seen", 0.8);
+    double min_seen = heuristic("motion.min_seen", 0.8);
     /// [patches] That a translation is found from.
-    std::size_t most_patches = heuristic("motion.most_patches", 2000);
+    std::size_t max_patches = heuristic("motion.max_patches", 2000);
     /// [of the variance of brightness] That its noise has at least.
-    double least_noise = heuristic("motion.least_noise", 1e-6);
+    double min_noise = heuristic("motion.min_noise", 1e-6);
     /// [square steps of a fourth of a voxel] Of one patch's offset, at least.
     double variance = heuristic("motion.variance", 0.25);
     /// [of the radius of the body] Over which offsets are alike.

@@ -126,9 +126,9 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
                     const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
                                   x[2] + side * away * normal[2]};
                     // Beyond the middle of a gap or of the body another part of the surface is nearer.
-                    const double room = side * distance(at) - (kLearning.own_share * away - h);
+                    const double room = side * distance(at) - (kLearning.own_fraction * away - h);
                     if (room < 0) break;
-                    checked = s + int(std::max(room - kSeam * h, 0.0) / ((kSteepest + kLearning.own_share) * step));
+                    checked = s + int(std::max(room - kSeam * h, 0.0) / ((kSteepest + kLearning.own_fraction) * step));
                 }
                 if (!line.sample(side * s, row.values[side * s])) {
                     ++(side < 0 ? ends_below : ends_above);
@@ -230,7 +230,7 @@ void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, doubl
     local_ = local;
 }
 
-Lesson::Answer Lesson::ask(const Scene& scene, std::size_t patch, const SmoothImage& image) const {
+Lesson::Answer Lesson::query(const Scene& scene, std::size_t patch, const SmoothImage& image) const {
     Answer answer;
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t n = 0; n < profile_.places().size(); ++n) {

@@ -52,7 +52,7 @@ public:
         OffsetEvidence held_out;  ///< learnt without the nearest mark and those beside it
         std::size_t nearest = 0;  ///< mark
     };
-    [[nodiscard]] Answer ask(const Scene& scene, std::size_t patch, const SmoothImage& image) const;
+    [[nodiscard]] Answer query(const Scene& scene, std::size_t patch, const SmoothImage& image) const;
 
     /// Median brightness at the marks so many steps outward.
     [[nodiscard]] double brightness(int steps) const;

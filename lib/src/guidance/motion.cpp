@@ -161,7 +161,7 @@ private:
     struct Mismatch {
         int first = 0;  ///< offset, steps
         std::vector<double> squares;
-        double least = std::numeric_limits<double>::infinity();  ///< of for_each_offset()
+        double minimum = std::numeric_limits<double>::infinity();  ///< of for_each_offset()
         /// Calls visit(offset, square) at parts of a step: between steps goes a parabola.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
@@ -208,7 +208,7 @@ private:
 
 /// 1 - correlation of the templates with the new image, shifted.
 double Motion::mismatch(const Vec3& shift) const {
-    const std::size_t every = patches_.size() / kMotion.most_patches + 1;
+    const std::size_t every = patches_.size() / kMotion.max_patches + 1;
     std::vector<Moments> of_patch(patches_.size() / every + 1);
     std::vector<double> samples(of_patch.size(), 0.0);
     tbb::parallel_for(std::size_t(0), of_patch.size(), [&](std::size_t n) {
@@ -233,7 +233,7 @@ double Motion::mismatch(const Vec3& shift) const {
         expected += samples[n];
     }
     // A shift out of the image is none.
-    return all.count() < kMotion.least_seen * expected ? 2.0 : 1 - all.correlation();
+    return all.count() < kMotion.min_seen * expected ? 2.0 : 1 - all.correlation();
 }
 
 /// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), from steps as wide as a surface may move down to a fraction of
@@ -241,16 +241,16 @@ double Motion::mismatch(const Vec3& shift) const {
 void Motion::translate() {
     double best = mismatch(translation_);
     const double standing = best;
-    const double most = kMotion.farthest * h_;
-    for (double step = 0.5 * most; step >= kMotion.finest_step * h_; step *= 0.5)
+    const double maximum = kMotion.farthest * h_;
+    for (double step = 0.5 * maximum; step >= kMotion.finest_step * h_; step *= 0.5)
         for (bool moved = true; moved;) {
             moved = false;
             Vec3 to = translation_;
             for (int n = 0; n < 27; ++n) {
                 const Vec3 tried{translation_[0] + (n % 3 - 1) * step, translation_[1] + (n / 3 % 3 - 1) * step,
                                  translation_[2] + (n / 9 - 1) * step};
-                if (*std::max_element(tried.begin(), tried.end()) > most ||
-                    *std::min_element(tried.begin(), tried.end()) < -most)
+                if (*std::max_element(tried.begin(), tried.end()) > maximum ||
+                    *std::min_element(tried.begin(), tried.end()) < -maximum)
                     continue;
                 const double now = mismatch(tried);
                 if (now >= best) continue;
@@ -262,7 +262,7 @@ void Motion::translate() {
             run_.check();
         }
     // What noise gives is no motion.
-    if (!(best < kMotion.least_gain * standing)) translation_ = {0, 0, 0};
+    if (!(best < kMotion.min_gain * standing)) translation_ = {0, 0, 0};
 }
 
 /// Twice: an offset that is found is a few percent too short, for the places between the old surface and the new one
@@ -273,12 +273,12 @@ void Motion::match() {
     const std::vector<Mismatch> of_itself = compare(known_.templates);
     for (int pass = 0; pass < kMotion.passes; ++pass) {
         const std::vector<Mismatch> now = compare(read_now());
-        std::vector<double> least;
+        std::vector<double> minimum;
         for (const Mismatch& m : now)
-            if (!m.squares.empty()) least.push_back(m.least);
+            if (!m.squares.empty()) minimum.push_back(m.minimum);
         const double spread = both_.deviation_x();
-        if (least.empty() || !(spread > 0)) return;
-        const double noise = std::max(cloud::median(least), kMotion.least_noise * spread * spread);
+        if (minimum.empty() || !(spread > 0)) return;
+        const double noise = std::max(cloud::median(minimum), kMotion.min_noise * spread * spread);
         const std::vector<Estimate> seen = estimates(now, noise);
         // Where brightness changes on one side of a place only, the mean of where it may have gone lies on the other,
         // even if it is still there: that is the offset of nothing.
@@ -366,7 +366,8 @@ std::vector<Motion::Mismatch> Motion::compare(const std::vector<Template>& later
             if (result[i].squares.empty()) result[i].first = offset;
             result[i].squares.push_back(sum / count);
         }
-        result[i].for_each_offset([&](double, double square) { result[i].least = std::min(result[i].least, square); });
+        result[i].for_each_offset(
+            [&](double, double square) { result[i].minimum = std::min(result[i].minimum, square); });
     });
     return result;
 }
@@ -381,7 +382,7 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
         const double samples = double(seen) / kStepsPerVoxel;  // closer than a voxel they are one
         double mass = 0, first = 0, second = 0;
         m.for_each_offset([&](double offset, double square) {
-            const double weight = std::exp(-0.5 * samples * (square - m.least) / noise);
+            const double weight = std::exp(-0.5 * samples * (square - m.minimum) / noise);
             mass += weight;
             first += weight * offset;
             second += weight * offset * offset;

@@ -76,7 +76,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
                                   const std::vector<double>& fixed_precision, const std::vector<double>* shift) const {
     const std::size_t count = patches_.size();
     Fit result{mean, std::vector<double>(count, 0.0), {}};
-    const bool asked =
+    const bool requested =
         std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
     // In units of the deviation: the field of unit variance.
     const auto to_units = [&](std::vector<double> values) {
@@ -90,7 +90,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     std::vector<double> field = to_units(mean);
     const std::vector<double> pull = *precision_ * field;
     std::vector<double> site(count, 0.0), believed(count), known(count, 0.0), right(count);
-    for (int round = 0; round < (asked ? kOffsets.rounds : 1); ++round) {
+    for (int round = 0; round < (requested ? kOffsets.rounds : 1); ++round) {
         // What the others say about a patch: the field's value there, the surer the more they know.
         for (std::size_t i = 0; i < count; ++i) {
             believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];

@@ -14,7 +14,7 @@ namespace covol::guidance {
 namespace {
 
 constexpr double kKernelSigmas = 3.0;
-constexpr double kLeastSigma = 0.3;  // voxels; below it a sampled Gaussian is the identity
+constexpr double kMinSigma = 0.3;  // voxels; below it a sampled Gaussian is the identity
 
 }  // namespace
 
@@ -62,7 +62,7 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, 
 
 void SmoothImage::smooth(int axis, double sigma) {
     const int count = size_[axis];
-    if (sigma < kLeastSigma || count < 2) return;
+    if (sigma < kMinSigma || count < 2) return;
     const int radius = int(std::ceil(kKernelSigmas * sigma));
     std::vector<float> kernel(2 * std::size_t(radius) + 1);
     double sum = 0;

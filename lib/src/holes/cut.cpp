@@ -26,7 +26,7 @@ double squared_length(const Point& a, const Point& b) {
     return sum;
 }
 
-bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCut.least_cosine * std::sqrt(dot(a, a) * dot(b, b)); }
+bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCut.min_cosine * std::sqrt(dot(a, a) * dot(b, b)); }
 
 /// Moves vertices close to the line onto it; their value becomes 0 in any case.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
@@ -36,10 +36,10 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
         for (int k = 0; k < 3; ++k)
             for (const auto& [from, to] : {std::pair{t[k], t[(k + 1) % 3]}, {t[(k + 1) % 3], t[k]}}) {
                 if ((values[from] > 0) == (values[to] > 0) || values[from] == 0 || values[to] == 0) continue;
-                const float share = values[from] / (values[from] - values[to]);
-                if (share >= closest[from]) continue;
-                closest[from] = share;
-                moved[from] = between(vertices[from], vertices[to], share);
+                const float fraction = values[from] / (values[from] - values[to]);
+                if (fraction >= closest[from]) continue;
+                closest[from] = fraction;
+                moved[from] = between(vertices[from], vertices[to], fraction);
             }
     std::vector<Point> tried = vertices;
     std::vector<char> moves(values.size());

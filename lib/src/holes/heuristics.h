@@ -20,7 +20,7 @@ struct CutHeuristics {
     /// [edges] A vertex that close to the line is moved onto it.
     float close = heuristic("cut.close", 0.3F);
     /// [cosine] Between a triangle before and after.
-    double least_cosine = heuristic("cut.least_cosine", 0.5);
+    double min_cosine = heuristic("cut.min_cosine", 0.5);
     /// [rounds] Of taking back moves that turn a triangle.
     int undo_rounds = heuristic("cut.undo_rounds", 4);
 };
@@ -30,13 +30,13 @@ COVOL_HEURISTICS CutHeuristics kCut{};
 /// 1993.
 struct MembraneHeuristics {
     /// [rounds] Of solving with new cotangents.
-    int most_rounds = heuristic("membrane.most_rounds", 20);
+    int max_rounds = heuristic("membrane.max_rounds", 20);
     /// [mean edges] Largest move of a round that is the last.
     double steady = heuristic("membrane.steady", 1e-3);
     /// [cotangent] Triangles without area have none.
-    double least_weight = heuristic("membrane.least_weight", 1e-3);
+    double min_weight = heuristic("membrane.min_weight", 1e-3);
     /// [cotangent] The same.
-    double most_weight = heuristic("membrane.most_weight", 100);
+    double max_weight = heuristic("membrane.max_weight", 100);
 };
 COVOL_HEURISTICS MembraneHeuristics kMembrane{};
 

@@ -79,7 +79,7 @@ public:
             if (!cut.kept[t]) gone += own;
         }
         report.distance = distance_;
-        report.share = area > 0 ? gone / area : 0;
+        report.fraction = area > 0 ? gone / area : 0;
         report.loops = find_boundary_loops(holes::kept_part(cut));
         return cut;
     }
@@ -95,10 +95,10 @@ private:
             for (int k = 0; k < 3; ++k) {
                 const std::uint32_t a = t[k], b = t[(k + 1) % 3];
                 if (!(to_points_[a] > far) || to_points_[b] > far) continue;
-                const double share = double(to_points_[a] - far) / double(to_points_[a] - to_points_[b]);
+                const double fraction = double(to_points_[a] - far) / double(to_points_[a] - to_points_[b]);
                 const Vec3 p = mesh_.place(a), q = mesh_.place(b);
-                places.push_back(
-                    {p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2])});
+                places.push_back({p[0] + fraction * (q[0] - p[0]), p[1] + fraction * (q[1] - p[1]),
+                                  p[2] + fraction * (q[2] - p[2])});
             }
         return places;
     }
@@ -132,13 +132,13 @@ private:
             area[root] += area_of(cut.mesh, cut.mesh.triangles[t]);
             for (const std::uint32_t v : cut.mesh.triangles[t]) is_cut[root] = is_cut[root] || ends[v];
         }
-        const double least = M_PI * distance_ * distance_;
+        const double minimum = M_PI * distance_ * distance_;
         for (std::size_t t = 0; t < cut.kept.size(); ++t) {
             const std::uint32_t root = parts.root(cut.mesh.triangles[t][0]);
-            if (cut.kept[t] && is_cut[root] && area[root] < least) cut.kept[t] = 0;
+            if (cut.kept[t] && is_cut[root] && area[root] < minimum) cut.kept[t] = 0;
         }
         std::size_t dropped = 0;
-        for (std::size_t v = 0; v < area.size(); ++v) dropped += is_cut[v] && area[v] < least;
+        for (std::size_t v = 0; v < area.size(); ++v) dropped += is_cut[v] && area[v] < minimum;
         return dropped;
     }
 
@@ -188,7 +188,7 @@ std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector
     return result;
 }
 
-double measure_share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance) {
+double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance) {
     double area = 0, beyond = 0;
     for (const Triangle& t : mesh.triangles) {
         const double own = area_of(mesh, t);
@@ -231,7 +231,7 @@ TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_p
     HolesReport report;
     const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trim_holes");
     report.policy = Holes::Open;
-    return {report.share > 0 ? holes::kept_part(cut) : mesh, std::move(report)};
+    return {report.fraction > 0 ? holes::kept_part(cut) : mesh, std::move(report)};
 }
 
 TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,

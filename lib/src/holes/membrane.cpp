@@ -32,7 +32,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
     for (std::size_t v = 0; v < number.size(); ++v)
         for (int a = 0; a < 3; ++a) at(std::ptrdiff_t(v), a) = mesh.vertices[v][a];
     Eigen::SimplicialLDLT<Matrix> solver;
-    for (int round = 0; round < kMembrane.most_rounds; ++round) {
+    for (int round = 0; round < kMembrane.max_rounds; ++round) {
         run.check();
         std::vector<Eigen::Triplet<double>> entries;
         Positions right = Positions::Zero(count, 3);
@@ -45,7 +45,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                                       v = at.row(b).transpose() - tip;
                 // At first all edges are springs: that spreads the vertices of a bulge over what it is to become.
                 const double w =
-                    round == 0 ? 1 : std::clamp(cotangent(u, v), kMembrane.least_weight, kMembrane.most_weight);
+                    round == 0 ? 1 : std::clamp(cotangent(u, v), kMembrane.min_weight, kMembrane.max_weight);
                 edges += (u - v).norm();
                 ++edge_count;
                 for (const auto& [own, other] : {std::pair{a, b}, {b, a}}) {
@@ -63,13 +63,13 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
         solver.factorize(matrix);
         if (solver.info() != Eigen::Success) throw Error(Errc::Numerical, "the patch hangs at nothing");
         const Positions solved = solver.solve(right);
-        double most = 0;
+        double maximum = 0;
         for (std::size_t v = 0; v < number.size(); ++v) {
             if (number[v] < 0) continue;
-            most = std::max(most, (solved.row(number[v]) - at.row(std::ptrdiff_t(v))).norm());
+            maximum = std::max(maximum, (solved.row(number[v]) - at.row(std::ptrdiff_t(v))).norm());
             at.row(std::ptrdiff_t(v)) = solved.row(number[v]);
         }
-        if (most < kMembrane.steady * edges / edge_count) break;
+        if (maximum < kMembrane.steady * edges / edge_count) break;
     }
     for (std::size_t v = 0; v < number.size(); ++v)
         if (number[v] >= 0)

@@ -38,7 +38,7 @@ BeyondPoints measure_beyond(const FloatGrid& surface, const std::vector<Vec3>& p
                 beyond += own;
         }
     });
-    result.share = area > 0 ? beyond / area : 0;
+    result.fraction = area > 0 ? beyond / area : 0;
     return result;
 }
 

@@ -8,10 +8,10 @@
 namespace covol::detail {
 
 /// The plain surface of a level set, measured, and which share of its area lies farther than `distance` from every
-/// point: measure_share_beyond() of a mesh that is never held.
+/// point: measure_fraction_beyond() of a mesh that is never held.
 struct BeyondPoints {
     StreamedMesh mesh;
-    double share = 0;
+    double fraction = 0;
 };
 [[nodiscard]] BeyondPoints measure_beyond(const FloatGrid& surface, const std::vector<Vec3>& points, double distance,
                                           const RunContext& run);

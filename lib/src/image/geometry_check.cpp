@@ -13,7 +13,7 @@ namespace {
 
 /// Sheared axes are well, but not ones that lie in a plane. @throws Error Unsupported.
 void check_direction(const std::string& where, const ImageGeometry& g) {
-    constexpr double kTolerance = 1e-3, kLeastVolume = 0.05;
+    constexpr double kTolerance = 1e-3, kMinVolume = 0.05;
     const Matrix3& d = g.direction;
     for (int a = 0; a < 3; ++a) {
         const double length = std::sqrt(d[0][a] * d[0][a] + d[1][a] * d[1][a] + d[2][a] * d[2][a]);
@@ -24,12 +24,12 @@ void check_direction(const std::string& where, const ImageGeometry& g) {
                         "direction");
     }
     const double volume = std::abs(determinant(d));
-    if (!(volume >= kLeastVolume))
+    if (!(volume >= kMinVolume))
         throw Error(Errc::Unsupported,
                     where +
                         ": direction: expected axes that span the space, got nearly parallel ones or ones in a plane "
                         "(their parallelepiped has " +
-                        number(volume) + " of a cube's volume, expected " + number(kLeastVolume) +
+                        number(volume) + " of a cube's volume, expected " + number(kMinVolume) +
                         " at least); resample the image, with SimpleITK's Resample() for example",
                     "direction");
 }
@@ -45,9 +45,9 @@ void check_geometry(const std::string& where, const ImageGeometry& g) {
     };
     double finest = kLargestLength;
     for (int a = 0; a < 3; ++a) {
-        if (!(g.spacing[a] >= kLeastLength && g.spacing[a] * g.size[a] <= kLargestLength))
+        if (!(g.spacing[a] >= kMinLength && g.spacing[a] * g.size[a] <= kLargestLength))
             refuse("spacing",
-                   "from " + number(kLeastLength) + ", with " + std::to_string(g.size[a]) + " voxels up to " +
+                   "from " + number(kMinLength) + ", with " + std::to_string(g.size[a]) + " voxels up to " +
                        number(kLargestLength / g.size[a]),
                    g.spacing[a], a, "state it in another unit (`spacing`)");
         finest = std::min(finest, g.spacing[a]);

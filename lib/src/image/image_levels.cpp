@@ -52,9 +52,9 @@ ImageLevels::ImageLevels(Image image) : image_(std::move(image)) {
     levels_.push_back({image_.geometry().size, {1, 1, 1}});
 }
 
-ImageLevels::ImageLevels(Image image, const std::vector<Source>& sources, std::uint64_t most_bytes)
+ImageLevels::ImageLevels(Image image, const std::vector<Source>& sources, std::uint64_t max_bytes)
     : ImageLevels(std::move(image)) {
-    cache_ = std::make_shared<detail::ChunkCache>(most_bytes);
+    cache_ = std::make_shared<detail::ChunkCache>(max_bytes);
     sources_.push_back(sources.front().chunks);
     for (std::size_t n = 1; n < sources.size(); ++n) {
         Level level{sources[n].geometry.size, {1, 1, 1}};
@@ -100,7 +100,7 @@ void ImageLevels::copy(std::size_t level, const VoxelBox& box, float* out, const
 
 /// What the image looks like at large: all of its coarsest level, or blocks of it.
 std::vector<float> ImageLevels::overview(const RunContext& run) const {
-    constexpr std::uint64_t kMostVoxels = std::uint64_t(16) << 20;
+    constexpr std::uint64_t kMaxVoxels = std::uint64_t(16) << 20;
     constexpr int kPlaces = 3, kBlock = 64;  // blocks along each axis, and voxels of one
     const std::size_t level = levels_.size() - 1;
     const Index3& size = levels_[level].size;
@@ -110,7 +110,7 @@ std::vector<float> ImageLevels::overview(const RunContext& run) const {
         values.resize(before + detail::voxel_count(box.size()));
         copy(level, box, values.data() + before, run);
     };
-    if (detail::voxel_count(size) <= kMostVoxels) {
+    if (detail::voxel_count(size) <= kMaxVoxels) {
         add(detail::whole_box(size));
         return values;
     }
@@ -155,7 +155,7 @@ std::array<double, 2> ImageLevels::percentiles(double low, double high, const Ru
 
 ImageLevels::CacheUse ImageLevels::cache() const {
     if (!cache_) return {};
-    return {cache_->bytes(), cache_->most_bytes(), cache_->decoded()};
+    return {cache_->bytes(), cache_->max_bytes(), cache_->decoded()};
 }
 
 }  // namespace covol

@@ -59,7 +59,7 @@ constexpr double kQuickBytes = 1 << 28;  ///< that are read in a second or two
 }  // namespace
 
 template <typename T>
-std::vector<T> Image::values_of_chunks(double most) const {
+std::vector<T> Image::values_of_chunks(double maximum) const {
     const VoxelBox held = in_file(held_);
     std::vector<VoxelBox> boxes;
     const auto add = [&](std::uint64_t chunk) {
@@ -87,7 +87,7 @@ std::vector<T> Image::values_of_chunks(double most) const {
     }
     double voxels = 0;
     for (const VoxelBox& box : boxes) voxels += double(detail::voxel_count(box.size()));
-    const auto step = static_cast<std::size_t>(std::max(1.0, std::ceil(voxels / most)));
+    const auto step = static_cast<std::size_t>(std::max(1.0, std::ceil(voxels / maximum)));
     std::vector<T> values, part;
     std::size_t next = 0;  // counted through all boxes
     for (const VoxelBox& box : boxes) {

@@ -40,14 +40,14 @@ public:
     }
     /// Largest less smallest value; none where the window leaves the image.
     [[nodiscard]] std::optional<double> range(int around) const {
-        double least = std::numeric_limits<double>::infinity(), most = -least;
+        double minimum = std::numeric_limits<double>::infinity(), maximum = -minimum;
         for (int at = around - kWindow; at <= around + kWindow; ++at) {
             const std::optional<Index3> index = voxel(at);
             if (!index) return {};
             const double value = image_.at((*index)[0], (*index)[1], (*index)[2]);
-            least = std::min(least, value), most = std::max(most, value);
+            minimum = std::min(minimum, value), maximum = std::max(maximum, value);
         }
-        return most - least;
+        return maximum - minimum;
     }
 
     /// Between the two voxels before and the two behind; none where they leave the image.
@@ -138,7 +138,7 @@ ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places
     ImageSupport support;
     support.places = at_places.size();
     if (at_places.empty()) return support;
-    support.share = probability_above(at_places, beside);
+    support.fraction = probability_above(at_places, beside);
     const double a = double(at_places.size()), b = double(beside.size());
     support.error = std::sqrt((a + b + 1) / (12 * a * b));
     return support;
@@ -165,20 +165,20 @@ StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3
             if (std::abs(mean[at]) > std::abs(mean[found])) found = at;
         return found;
     };
-    const int own = strongest(kReach - 1, kReach + 1), most = strongest(0, kPlaces - 1);
+    const int own = strongest(kReach - 1, kReach + 1), maximum = strongest(0, kPlaces - 1);
     StrongestBorder result;
-    result.at = most - kReach;
+    result.at = maximum - kReach;
     const auto along = [&](const Strengths& line, int at) { return mean[at] < 0 ? -*line[at] : *line[at]; };
     double sum = 0, squares = 0;
     for (const Strengths& line : lines) {
-        if (!line[own] || !line[most]) continue;
-        const double more = along(line, most) - along(line, own);
+        if (!line[own] || !line[maximum]) continue;
+        const double more = along(line, maximum) - along(line, own);
         sum += more;
         squares += more * more;
         ++result.lines;
     }
-    if (own == most || mean[most] == 0 || result.lines == 0) return result;
-    result.share = std::abs(mean[own] / mean[most]);
+    if (own == maximum || mean[maximum] == 0 || result.lines == 0) return result;
+    result.fraction = std::abs(mean[own] / mean[maximum]);
     const auto count = double(result.lines);
     const double variance = std::max(0.0, squares / count - sum * sum / (count * count));
     result.errors = variance > 0 ? sum / count / std::sqrt(variance / count) : 0;

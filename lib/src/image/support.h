@@ -9,7 +9,8 @@ namespace covol::detail {
 /// Whether an image varies more at some places than beside them, whatever it shows there, a step or a line.
 struct ImageSupport {
     std::size_t places = 0;  ///< that lie in the image, with the windows beside them
-    double share = 0;  ///< probability that the range of values at a place exceeds that beside a place; ties are half
+    double fraction =
+        0;             ///< probability that the range of values at a place exceeds that beside a place; ties are half
     double error = 0;  ///< of `share`, standard
 };
 
@@ -30,7 +31,7 @@ enum class BorderKind { Slope, Line };
 /// are.
 struct StrongestBorder {
     std::size_t lines = 0;  ///< that count: with the surface, and the place of the strongest border, in the image
-    double share = 1;       ///< of the mean strength there that the surface has, within a step; its sign does not count
+    double fraction = 1;    ///< of the mean strength there that the surface has, within a step; its sign does not count
     int at = 0;             ///< steps from the surface, along the normals
     double errors = 0;      ///< standard errors of the mean that both differ by
 };

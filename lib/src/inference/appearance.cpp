@@ -58,9 +58,9 @@ Field ImageFeatures::edge(const Lattice& lattice, const std::vector<Vec3>& place
     return result;
 }
 
-std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t most) {
+std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t maximum) {
     std::vector<std::size_t> some;
-    const std::size_t count = std::min(most, nodes.size());
+    const std::size_t count = std::min(maximum, nodes.size());
     for (std::size_t m = 0; m < count; ++m) some.push_back(nodes[(2 * m + 1) * nodes.size() / (2 * count)]);
     return some;
 }

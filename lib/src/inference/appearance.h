@@ -35,7 +35,7 @@ private:
 };
 
 /// `most` of the nodes at most, evenly.
-[[nodiscard]] std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t most);
+[[nodiscard]] std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t maximum);
 
 struct Sample {
     Features at{};

@@ -192,7 +192,7 @@ std::vector<std::size_t> surely_outside(const Scene& scene) {
 /// Log odds of inside at all nodes.
 Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance& appearance, const Solid* refine) {
     const Lattice& lattice = scene.lattice;
-    const double most = kInference.most_odds, cell = lattice.finest();
+    const double maximum = kInference.max_odds, cell = lattice.finest();
     Field coarse;
     if (refine != nullptr) coarse = signed_distance(refine->lattice, refine->inside);
     Field odds(lattice.count());
@@ -205,21 +205,21 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
             add_guess(row[std::size_t(i)], double(scene.to_mark[n]), cell, at);
             const double above =
                 std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
-            double value = std::clamp(appearance.log_odds(at), -most, most);
-            value = std::max(value - kInference.hull_odds * above, -most);
+            double value = std::clamp(appearance.log_odds(at), -maximum, maximum);
+            value = std::max(value - kInference.hull_odds * above, -maximum);
             if (refine != nullptr) {
                 const double off = refine->lattice.value(coarse, lattice.place(i, j, k)) / refine->lattice.finest();
-                if (std::abs(off) > kInference.fine_band) value = off < 0 ? most : -most;
+                if (std::abs(off) > kInference.fine_band) value = off < 0 ? maximum : -maximum;
             }
             odds[n] = float(value);
         }
     });
-    for (const std::size_t n : scene.known_inside) odds[n] = float(kKnown * most);
-    for (const std::size_t n : scene.known_outside) odds[n] = float(-kKnown * most);
+    for (const std::size_t n : scene.known_inside) odds[n] = float(kKnown * maximum);
+    for (const std::size_t n : scene.known_outside) odds[n] = float(-kKnown * maximum);
     return odds;
 }
 
-Solid least_body(const Scene& scene, const Field& odds, const RunContext& run) {
+Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
     const Lattice& lattice = scene.lattice;
     const double reach = std::hypot(scene.marks.spacing, lattice.finest());
     Field cost(odds.size()), weight(odds.size()), u(odds.size());
@@ -246,7 +246,7 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     }
     std::size_t inside = 0;
     for (std::size_t n = 0; n < solid.inside.size(); ++n) {
-        if (marked[std::size_t(parts.number[n])] < kInference.least_part * std::max(all, 1.0)) solid.inside[n] = 0;
+        if (marked[std::size_t(parts.number[n])] < kInference.min_part * std::max(all, 1.0)) solid.inside[n] = 0;
         inside += std::size_t(solid.inside[n] != 0);
     }
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
@@ -358,7 +358,7 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
     if (proposal.is_compared) candidate.bits = held_out_bits(samples.all(), kInference.ridge, kFolds);
     const Appearance appearance(samples.all(), kInference.ridge);
     run.check();
-    Solid solid = least_body(scene, odds_of(scene, *guess, appearance, proposal.refine), run);
+    Solid solid = min_body(scene, odds_of(scene, *guess, appearance, proposal.refine), run);
     keep_marked_parts(scene, solid);
     if (!solid.empty() && proposal.is_compared) candidate.score = score_of(scene, solid, candidate.bits);
     candidate.solid = std::move(solid);

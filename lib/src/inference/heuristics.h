@@ -13,9 +13,9 @@ struct InferenceHeuristics {
     /// [nodes] Of the lattice of the result, at most.
     double fine_nodes = heuristic("inference.fine_nodes", 400000);
     /// [voxels] Of a box around the marks: a larger one takes long to read.
-    double most_voxels = heuristic("inference.most_voxels", 6.4e7);
+    double max_voxels = heuristic("inference.max_voxels", 6.4e7);
     /// [of the memory limit] That this box may take as single precision.
-    double most_of_memory = heuristic("inference.most_of_memory", 0.25);
+    double max_memory_fraction = heuristic("inference.max_memory_fraction", 0.25);
     /// [marks] That guesses are made of; the others are predicted.
     std::size_t guess_marks = heuristic("inference.guess_marks", 150);
     /// [marks] Fewer teach nothing.
@@ -29,7 +29,7 @@ struct InferenceHeuristics {
     /// [spacings] Above the hull, beyond which the image shows what is outside.
     double surely_outside = heuristic("inference.surely_outside", 0.5);
     /// [log odds] That one place may say.
-    double most_odds = heuristic("inference.most_odds", 4);
+    double max_odds = heuristic("inference.max_odds", 4);
     /// [cells of surface] That a cell of one nat is worth.
     double odds_weight = heuristic("inference.odds_weight", 0.6);
     /// [of a cell of surface] What it costs at a mark, where the image is even.
@@ -51,15 +51,15 @@ struct InferenceHeuristics {
     /// [rounds] In which they do.
     int rounds = heuristic("inference.rounds", 2);
     /// [of the marks that the body reaches] A part with fewer is none of it.
-    double least_part = heuristic("inference.least_part", 0.05);
+    double min_part = heuristic("inference.min_part", 0.05);
     /// [cells] From the coarse body's surface, beyond which the fine lattice follows it.
     double fine_band = heuristic("inference.fine_band", 2.5);
     /// [places] Known to be inside, or outside, that are used: as far apart as can be.
-    std::size_t most_places = heuristic("inference.most_places", 200);
+    std::size_t max_places = heuristic("inference.max_places", 200);
     /// [cells] From the body's surface, beyond which it has left a mark.
     double off_cells = heuristic("inference.off_cells", 2);
     /// [of the marks] That a body may leave.
-    double most_off = heuristic("inference.most_off", 0.15);
+    double max_off = heuristic("inference.max_off", 0.15);
     /// [marks] Of fewer none is called wrong: a body of so few lacks parts.
     std::size_t wrong_from_marks = heuristic("inference.wrong_from_marks", 40);
     /// [of the marks] That are thought to be wrong before anything is known.
@@ -67,7 +67,7 @@ struct InferenceHeuristics {
     /// [cells] From right marks to the body, in the mean.
     double usual_off = heuristic("inference.usual_off", 0.3);
     /// [of the marks] That may be wrong: where more seem to be it is the body that is.
-    double most_wrong = heuristic("inference.most_wrong", 0.2);
+    double max_wrong = heuristic("inference.max_wrong", 0.2);
     /// [spacings] Within which two other suspects say that a mark is right, and the body lacks a part.
     double beside_spacings = heuristic("inference.beside_spacings", 3);
     /// [rounds] In which wrong marks are left out.

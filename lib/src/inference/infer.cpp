@@ -169,7 +169,7 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
     }
     const double given = double(marks_.places.size() + wrong_.size());
     // Of a single one nobody knows whether it is wrong, or the body lacks a part.
-    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.most_wrong * given)
+    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.max_wrong * given)
         return false;
     wrong_ = std::move(all);
     marks_ = marks_.without(wrong_, image_.geometry());
@@ -246,10 +246,10 @@ class Predictions {
 public:
     /// @param shrink  of the body's errors on a finer lattice
     Predictions(const HeldOut& held, double cell, double shrink) : small_(kInference.usual_off * cell) {
-        const double most = kFarthestMiss * cell;
+        const double maximum = kFarthestMiss * cell;
         for (std::size_t n = 0; n < held.of_body.size(); ++n)
-            off_.push_back(
-                {std::clamp(shrink * held.of_body[n], -most, most), std::clamp(held.of_guess[n], -most, most)});
+            off_.push_back({std::clamp(shrink * held.of_body[n], -maximum, maximum),
+                            std::clamp(held.of_guess[n], -maximum, maximum)});
     }
 
     /// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
@@ -344,7 +344,7 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
 /// In the image's frame; of very many some, spread out.
 void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, std::vector<Vec3>& places) {
     if (world.empty()) return;
-    for (const std::size_t n : guess::spread_out(world, kInference.most_places))
+    for (const std::size_t n : guess::spread_out(world, kInference.max_places))
         places.push_back(to_frame(geometry, world[n]));
 }
 
@@ -387,13 +387,13 @@ double error_slope(const HeldOut& held, double guess_weight, double shrink) {
 /// and the Dice coefficient go together was measured: kInference.expected_scale.
 std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell, const Overlap& body) {
     if (held.of_body.size() < kInference.fewest_marks || !(body.volume > 0)) return {};
-    constexpr double kMostCells = 8, kLeastCells = 0.1;
-    const double most = kMostCells * cell;
+    constexpr double kMaxCells = 8, kMinCells = 0.1;
+    const double maximum = kMaxCells * cell;
     double error = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        error += std::min(std::abs(held.of_both(n, guess_weight)), most) / double(held.of_body.size());
+        error += std::min(std::abs(held.of_both(n, guess_weight)), maximum) / double(held.of_body.size());
     }
-    error = std::max(error, kLeastCells * cell);
+    error = std::max(error, kMinCells * cell);
     const double lost =
         kInference.expected_scale * std::pow(error * body.area / body.volume, kInference.expected_power);
     const auto dice = [&](double factor) { return std::max(1 - lost * factor, 0.0); };
@@ -466,7 +466,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
                            : "the surface of least bending predicts marks better");
             return;
         }
-        if (fraction_off(geometry, result.marks, body, level) > kInference.most_off) {
+        if (fraction_off(geometry, result.marks, body, level) > kInference.max_off) {
             report.expected.reset();
             reject_body("the likeliest body by the image leaves many marks");
             return;

@@ -82,7 +82,7 @@ double Lattice::value(const Field& field, const Vec3& place) const {
     return mix(across(first[2]), across(next[2]), part[2]);
 }
 
-Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double most) {
+Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double maximum) {
     Lattice lattice;
     Vec3 first, last;
     for (int a = 0; a < 3; ++a) {
@@ -108,12 +108,12 @@ Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, 
         return double(lattice.count());
     };
     double cell = 0;
-    if (with(cell) <= most) return lattice;
+    if (with(cell) <= maximum) return lattice;
     double fine = geometry.smallest_spacing(), coarse = fine;
-    while (with(coarse) > most) coarse *= 2;
+    while (with(coarse) > maximum) coarse *= 2;
     for (int round = 0; round < 30; ++round) {
         cell = 0.5 * (fine + coarse);
-        (with(cell) > most ? fine : coarse) = cell;
+        (with(cell) > maximum ? fine : coarse) = cell;
     }
     with(coarse);
     return lattice;
@@ -130,8 +130,9 @@ bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const R
     double voxels = 1;
     for (int a = 0; a < 3; ++a) voxels *= (lattice.size[a] - 1) * lattice.spacing[a] / geometry.spacing[a] + 1;
     // A copy of the box is not held, but chunks of it are.
-    return voxels > kInference.most_voxels ||
-           (run.memory_budget > 0 && sizeof(float) * voxels > kInference.most_of_memory * double(run.memory_budget));
+    return voxels > kInference.max_voxels ||
+           (run.memory_budget > 0 &&
+            sizeof(float) * voxels > kInference.max_memory_fraction * double(run.memory_budget));
 }
 
 Field sample(const Image& image, const Lattice& lattice, const RunContext& run) {

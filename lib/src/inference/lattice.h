@@ -44,7 +44,7 @@ struct Lattice {
 
 /// Covers a box of the frame, within the image, with at most `most` nodes. Nodes are voxels where that is enough, and
 /// lie symmetrically about the middle of the box otherwise, so that a mirror image has the same.
-[[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double most);
+[[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double maximum);
 
 /// A level set at all nodes.
 [[nodiscard]] std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u);

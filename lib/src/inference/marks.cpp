@@ -70,9 +70,9 @@ Marks Marks::without(const std::vector<Vec3>& left_out, const ImageGeometry& geo
 }
 
 double Marks::above_hull(const Vec3& place) const {
-    double most = -std::numeric_limits<double>::infinity();
-    for (const auto& [direction, offset] : hull) most = std::max(most, dot(direction, place) - offset);
-    return most;
+    double maximum = -std::numeric_limits<double>::infinity();
+    for (const auto& [direction, offset] : hull) maximum = std::max(maximum, dot(direction, place) - offset);
+    return maximum;
 }
 
 void Marks::choose_spread() {

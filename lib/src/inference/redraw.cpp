@@ -167,12 +167,13 @@ void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const 
 
 void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside) {
     const Appearance appearance(samples_, kInference.ridge);
-    const double most = kInference.most_odds, cell = lattice_.finest();
+    const double maximum = kInference.max_odds, cell = lattice_.finest();
     Field cost(lattice_.count()), weight = image_.edge(lattice_, places_of(misses_)), u(lattice_.count());
     tbb::parallel_for(std::size_t(0), lattice_.count(), [&](std::size_t n) {
-        const double sure = known(n), side = is_inside(n) ? most : -most;
+        const double sure = known(n), side = is_inside(n) ? maximum : -maximum;
         double odds = kKnown * side;
-        if (sure < 1) odds = (1 - sure) * std::clamp(appearance.log_odds(image_.at(n)), -most, most) + sure * side;
+        if (sure < 1)
+            odds = (1 - sure) * std::clamp(appearance.log_odds(image_.at(n)), -maximum, maximum) + sure * side;
         cost[n] = float(-kInference.odds_weight * odds);
         u[n] = odds > 0 ? 1.0F : 0.0F;
     });
@@ -190,10 +191,10 @@ void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& o
         for (int a = 0; a < 3; ++a)
             to_guess[a] = (miss.outside ? -1 : 1) * lattice_.value(slope[std::size_t(a)], miss.place);
         for (double way = 1.5 * cell; way < miss.off; way += 0.5 * cell)
-            hold(plus(miss.place, way, unit(to_guess)), miss.outside ? most : -most);
+            hold(plus(miss.place, way, unit(to_guess)), miss.outside ? maximum : -maximum);
     }
-    for (const Vec3& world : inside) hold(to_frame(geometry_, world), kKnown * most);
-    for (const Vec3& world : outside) hold(to_frame(geometry_, world), -kKnown * most);
+    for (const Vec3& world : inside) hold(to_frame(geometry_, world), kKnown * maximum);
+    for (const Vec3& world : outside) hold(to_frame(geometry_, world), -kKnown * maximum);
     Solid body = solve_body(lattice_, weight, cost, std::move(u), run_);
     for (const bool of_inside : {true, false}) drop_loose_parts(body.inside, of_inside);
     level_ = body.level();
@@ -251,13 +252,13 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
         for (Miss& miss : misses) miss.off = std::max(std::abs(wide.lattice.value(distance, miss.place)), miss.off);
         std::erase_if(misses, [&](const Miss& miss) { return miss.off <= missed; });
         if (misses.empty()) return;
-        double sum = 0, most = 0;
+        double sum = 0, maximum = 0;
         for (const Miss& miss : misses) {
             sum += miss.off / double(misses.size());
-            most = std::max(most, miss.off);
+            maximum = std::max(maximum, miss.off);
         }
         const Lattice lattice =
-            around(geometry, misses, (kInference.redrawn + 1) * most + kInference.around_voxels * voxel);
+            around(geometry, misses, (kInference.redrawn + 1) * maximum + kInference.around_voxels * voxel);
         if (is_too_large(lattice, geometry, run)) {
             result.reason = "the image's box around the marks that the guess misses is too large to be read as a whole";
             return;

@@ -201,8 +201,8 @@ double computed_by(pid_t process) {
 /// @param pipe  hung up when it ends
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
-    constexpr int kLongestPause = 20;   // milliseconds
-    constexpr double kMostPauses = 10;  // of a program that computes nothing: a slow disk
+    constexpr int kLongestPause = 20;  // milliseconds
+    constexpr double kMaxPauses = 10;  // of a program that computes nothing: a slow disk
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
     double computed_before = 0;
@@ -216,7 +216,7 @@ void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const R
             computed_before = computed;
         }
         if (computed - computed_before > seconds) break;
-        if (std::chrono::duration<double>(Clock::now() - since).count() > kMostPauses * seconds) break;
+        if (std::chrono::duration<double>(Clock::now() - since).count() > kMaxPauses * seconds) break;
         pollfd hung_up{pipe, 0, 0};
         if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // it is about to end
     }
@@ -311,9 +311,9 @@ std::vector<Trial> try_pieces(const std::string& program, std::uint32_t task, co
             batch.begin = run_program(program, orders, results, batch, seconds, run);
     };
     // To start it and load its libraries takes tens of milliseconds.
-    constexpr std::size_t kLeastOfBatch = 8, kMostOfBatch = 64, kBatchesOfThread = 2;
+    constexpr std::size_t kMinOfBatch = 8, kMaxOfBatch = 64, kBatchesOfThread = 2;
     const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
-    const std::size_t size = std::clamp(count / (kBatchesOfThread * threads), kLeastOfBatch, kMostOfBatch);
+    const std::size_t size = std::clamp(count / (kBatchesOfThread * threads), kMinOfBatch, kMaxOfBatch);
     tbb::parallel_for(std::size_t(0), (count + size - 1) / size,
                       [&](std::size_t b) { do_batch(b * size, std::min((b + 1) * size, count)); });
     run.check();
@@ -347,9 +347,9 @@ int serve_pieces(int count, char** arguments, const std::function<void(const Pie
     _exit(0);  // no destructors: those of libraries may crash, too
 }
 
-double most_seconds_for_pixels(std::uint64_t bytes) {
+double max_seconds_for_pixels(std::uint64_t bytes) {
     constexpr double kSecondsOfByte = 1e-6;
-    return kMostSecondsForHeader + kSecondsOfByte * double(bytes);
+    return kMaxSecondsForHeader + kSecondsOfByte * double(bytes);
 }
 
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {

@@ -83,9 +83,9 @@ struct PieceAtWork {
 int serve_pieces(int count, char** arguments, const std::function<void(const PieceAtWork&)>& work);
 
 /// Seconds that a library may compute for a header, or a voxel: far beyond what sound files need.
-constexpr double kMostSecondsForHeader = 10;
+constexpr double kMaxSecondsForHeader = 10;
 /// The same for pixels of so many bytes: text and JPEG 2000 take a twentieth of it.
-[[nodiscard]] double most_seconds_for_pixels(std::uint64_t bytes);
+[[nodiscard]] double max_seconds_for_pixels(std::uint64_t bytes);
 
 /// Why `library` cannot read the image `path`; nothing where it can.
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library);

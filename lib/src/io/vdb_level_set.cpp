@@ -65,11 +65,11 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
         throw Error(Errc::Unsupported,
                     path + ": grid '" + grid->getName() + "': expected a level set, got a fog volume");
     if (grid->getGridClass() == openvdb::GRID_LEVEL_SET || grid->background() != 0) return grid;
-    const auto [least, most] = range_of(*grid);
-    if (least < 0 || !(most > 0)) return grid;
-    run.warn(path + ": grid '" + grid->getName() + "' has no class, and values from 0 to " + detail::number(most) +
-             ", as an indicator of the inside has: its border is taken at " + detail::number(most / 2));
-    make_level_set(*grid, most / 2);
+    const auto [minimum, maximum] = range_of(*grid);
+    if (minimum < 0 || !(maximum > 0)) return grid;
+    run.warn(path + ": grid '" + grid->getName() + "' has no class, and values from 0 to " + detail::number(maximum) +
+             ", as an indicator of the inside has: its border is taken at " + detail::number(maximum / 2));
+    make_level_set(*grid, maximum / 2);
     return grid;
 }
 

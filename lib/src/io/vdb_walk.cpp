@@ -64,12 +64,12 @@ void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t
 /// behind a 0; the second may be missing.
 /// @param length  of it all; more than 0
 void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t file_bytes) {
-    constexpr std::int64_t kLeastLeaf = 64;  // bytes: its mask
+    constexpr std::int64_t kMinLeaf = 64;  // bytes: its mask
     constexpr std::uint32_t kMissing = 0xFFFFFFFF;
     using vdb_io::DelayedLoadMetadata;
     const auto begin = stream.tellg();
     const std::int64_t leaves = read<std::uint32_t>(stream);
-    if (leaves > file_bytes / kLeastLeaf) throw std::runtime_error("more leaves than fit into the file");
+    if (leaves > file_bytes / kMinLeaf) throw std::runtime_error("more leaves than fit into the file");
     for (const std::size_t width :
          {sizeof(DelayedLoadMetadata::MaskType), sizeof(DelayedLoadMetadata::CompressedSizeType)}) {
         const auto packed = read<std::uint32_t>(stream);

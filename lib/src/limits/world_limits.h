@@ -8,7 +8,7 @@
 namespace covol::detail {
 
 // Volumes are cubes of lengths, and some are held in single precision.
-constexpr double kLeastLength = 1e-12, kLargestLength = 1e12;
+constexpr double kMinLength = 1e-12, kLargestLength = 1e12;
 // From 0: double precision then has a million places within a voxel.
 constexpr double kFarthestVoxel = 4294967296.0;
 

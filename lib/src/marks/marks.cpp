@@ -12,7 +12,7 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kMostInLines = 4;  // structures; of more only warnings are logged
+constexpr std::size_t kMaxInLines = 4;  // structures; of more only warnings are logged
 
 /// Hints of the points that `marks` ends with. Lists are made once a cloud has something for them.
 void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, Marks& marks) {
@@ -97,10 +97,10 @@ void add_contours(Marks& marks, PointCloud cloud, const std::optional<ImageGeome
     marks.contours.push_back(std::move(cloud));
 }
 
-void thin_points(Marks& marks, std::size_t most, const RunContext& run) {
+void thin_points(Marks& marks, std::size_t maximum, const RunContext& run) {
     const std::size_t given = marks.points.size();
     const std::vector<std::uint32_t> used =
-        order_spatially(marks.points, most > 0 ? most : std::numeric_limits<std::size_t>::max());
+        order_spatially(marks.points, maximum > 0 ? maximum : std::numeric_limits<std::size_t>::max());
     for (std::vector<Vec3>* list : {&marks.points, &marks.hints.normals, &marks.hints.to_sensor}) take(*list, used);
     if (used.size() == given) return;
     marks.thinned = used.size();
@@ -164,7 +164,7 @@ void number_labels(std::vector<Marks>& structures) {
 RunContext speaking_for(const std::string& name, std::size_t structures, const RunContext& run) {
     RunContext named = run;
     if (!name.empty() && run.log)
-        named.log = [log = run.log, name, brief = structures > kMostInLines](LogLevel level, const std::string& line) {
+        named.log = [log = run.log, name, brief = structures > kMaxInLines](LogLevel level, const std::string& line) {
             if (!brief || level == LogLevel::Warning) log(level, name + ": " + line);
         };
     return named;

@@ -68,12 +68,12 @@ private:
     /// Where no ear is left, as of a polygon that crosses itself, the corner that comes nearest.
     std::uint32_t find_ear(std::uint32_t at, std::size_t left) const {
         std::uint32_t best = at;
-        double most = -INFINITY;
+        double maximum = -INFINITY;
         for (std::size_t n = 0; n < left; ++n, at = next_[at]) {
             const double area = turn(flat_[previous_[at]], flat_[at], flat_[next_[at]]);
             if (area > 0 && is_empty(at)) return at;
-            if (area > most) {
-                most = area;
+            if (area > maximum) {
+                maximum = area;
                 best = at;
             }
         }
@@ -104,7 +104,7 @@ std::vector<std::array<std::uint32_t, 3>> cut_polygon(const std::vector<Vec3>& c
     bool fans = true;
     for (std::size_t n = 2; fans && n < flat.size(); ++n) fans = turn(flat[0], flat[n - 1], flat[n]) >= 0;
     if (fans) return fan(corners.size());
-    if (corners.size() > kMostPolygonCorners) return {};
+    if (corners.size() > kMaxPolygonCorners) return {};
     return Clipper(flat).cut();
 }
 

@@ -21,10 +21,10 @@ inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), f
 
 /// Three for each triangle. @throws Error Unsupported where 32 bits cannot number them.
 inline std::uint32_t corner_count(std::uint64_t triangles) {
-    constexpr std::uint64_t kMost = (~std::uint32_t(0)) / 3;
-    if (triangles > kMost)
+    constexpr std::uint64_t kMax = (~std::uint32_t(0)) / 3;
+    if (triangles > kMax)
         throw Error(Errc::Unsupported, "the mesh has " + std::to_string(triangles) + " triangles, expected at most " +
-                                           std::to_string(kMost) + "; use a larger voxel size");
+                                           std::to_string(kMax) + "; use a larger voxel size");
     return static_cast<std::uint32_t>(3 * triangles);
 }
 

@@ -100,7 +100,7 @@ public:
     /// Before each call of decimate(), which asks for all vertices.
     void begin_pass() {
         chosen_.assign(mesh_->vertices.size(), HalfEdges::HalfedgeHandle());
-        asked_ = kNobody;
+        requested_ = kNobody;
     }
     [[nodiscard]] std::size_t left() const { return left_; }
 
@@ -126,7 +126,7 @@ public:
             mesh_->triangles[change.number] = change.corners;
             finder_->grow(change.number);
         }
-        asked_ = kNobody;
+        requested_ = kNobody;
         left_ -= gone_.size();
         if (left_ >= refreshed_ / 2) return;
         finder_->rebuild();  // boxes only grow
@@ -148,15 +148,15 @@ private:
     /// one again when its turn has come.
     bool is_chosen(HalfEdges::HalfedgeHandle edge) {
         const auto lost = mesh().from_vertex_handle(edge);
-        const bool again = asked_ == number(lost);
+        const bool again = requested_ == number(lost);
         if (chosen_[number(lost)] == edge && (!again || queued_)) return is_free_still(edge);
         if (!again) {
-            asked_ = number(lost);
+            requested_ = number(lost);
             choose(lost);
             queued_ = false;
         }
-        queued_ = queued_ || chosen_[asked_] == edge;
-        return chosen_[asked_] == edge;
+        queued_ = queued_ || chosen_[requested_] == edge;
+        return chosen_[requested_] == edge;
     }
 
     void choose(HalfEdges::VertexHandle vertex) {
@@ -255,7 +255,7 @@ private:
     std::vector<std::uint8_t> holds_;
     bool trust_ = false;
     std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and when the finder was put in order
-    std::uint32_t asked_ = kNobody;                  // the vertex whose edges the decimater asks for
+    std::uint32_t requested_ = kNobody;              // the vertex whose edges the decimater asks for
     bool queued_ = false;                            // whether it has had the chosen one
     std::vector<HalfEdges::HalfedgeHandle> chosen_;  // that leaves each vertex; none where no collapse is possible
     std::vector<float> cost_;                        // of that collapse

@@ -53,7 +53,7 @@ struct LevelHeuristics {
     /// [of the slope of a distance] No direction to go.
     double flat = heuristic("level.flat", 0.05);
     /// [of the slope of a distance] Between two walls it has none.
-    double least_slope = heuristic("level.least_slope", 0.5);
+    double min_slope = heuristic("level.min_slope", 0.5);
     /// [voxels] Between places of a triangle that are looked at.
     double sampling = heuristic("level.sampling", 0.75);
 };

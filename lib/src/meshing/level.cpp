@@ -161,7 +161,7 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
 
 double Level::distance(const Vec3& world) const {
     const Sample here = sample(world);
-    return std::abs(here.value) / std::max(length(here.gradient), kLevel.least_slope);
+    return std::abs(here.value) / std::max(length(here.gradient), kLevel.min_slope);
 }
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {

@@ -121,9 +121,9 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
 }
 
 double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
-    constexpr std::size_t kMostRays = 512;
-    constexpr double kThinShare = 0.01;  // a sliver of a triangle or two says nothing of the wall
-    const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMostRays);
+    constexpr std::size_t kMaxRays = 512;
+    constexpr double kThinFraction = 0.01;  // a sliver of a triangle or two says nothing of the wall
+    const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMaxRays);
     std::vector<double> walls(rays, std::numeric_limits<double>::infinity());
     with_threads(run, [&] {
         const std::vector<std::unique_ptr<detail::TriangleTree>> trees = detail::trees_of(mesh);
@@ -141,7 +141,7 @@ double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
     });
     std::erase(walls, std::numeric_limits<double>::infinity());
     if (walls.empty()) return -1;
-    const auto thin = walls.begin() + std::ptrdiff_t(kThinShare * double(walls.size()));
+    const auto thin = walls.begin() + std::ptrdiff_t(kThinFraction * double(walls.size()));
     std::nth_element(walls.begin(), thin, walls.end());
     return *thin;
 }

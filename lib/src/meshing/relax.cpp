@@ -277,12 +277,12 @@ private:
     /// The corner that faces it.
     [[nodiscard]] std::uint32_t shortest_side(std::uint32_t t) const {
         std::uint32_t best = 3 * t;
-        double least = std::numeric_limits<double>::max();
+        double minimum = std::numeric_limits<double>::max();
         for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) {
             const double size =
                 length(minus(at(table_.vertex(CornerTable::next(c))), at(table_.vertex(CornerTable::previous(c)))));
-            if (size >= least) continue;
-            least = size;
+            if (size >= minimum) continue;
+            minimum = size;
             best = c;
         }
         return best;

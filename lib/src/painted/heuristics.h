@@ -28,7 +28,7 @@ struct OutlineHeuristics {
     /// [of the line's length] The same, at most.
     double window_of_line = heuristic("outline.window_of_line", 0.15);
     /// [voxels] That smoothing may move a place.
-    double most_shift = heuristic("outline.most_shift", 0.5);
+    double max_shift = heuristic("outline.max_shift", 0.5);
     /// [voxels] Of a scribble.
     int widest_stroke = heuristic("outline.widest_stroke", 4);
     /// [widths] Of a scribble, at least.

@@ -144,7 +144,7 @@ Polygon smoothed(const Polygon& outline) {
         }
         const Vec2& old = outline[std::size_t(v)];
         for (int a = 0; a < 2; ++a)
-            line[std::size_t(v)][a] = std::clamp(mean[a], old[a] - kOutline.most_shift, old[a] + kOutline.most_shift);
+            line[std::size_t(v)][a] = std::clamp(mean[a], old[a] - kOutline.max_shift, old[a] + kOutline.max_shift);
     }
     return line;
 }

@@ -24,7 +24,7 @@ namespace {
 using painted::AxisPaint;
 using painted::Paint;
 
-constexpr std::size_t kMostListed = 8;
+constexpr std::size_t kMaxListed = 8;
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
 std::string to_text(const Index3& p) {
@@ -39,7 +39,7 @@ std::string size_text(const Index3& n) {
 std::string list_text(const std::vector<int>& numbers) {
     std::ostringstream text;
     for (std::size_t n = 0; n < numbers.size(); ++n) {
-        if (numbers.size() > kMostListed && n == kMostListed - 2) {
+        if (numbers.size() > kMaxListed && n == kMaxListed - 2) {
             text << ", ..., " << numbers.back();
             break;
         }
@@ -177,10 +177,10 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
                 result.views.push_back(view_of(paint, *a, with_tips(axes[*a]), source));
         if (result.views.empty() && as == PaintedAs::Slices) {
             // The axis along which the fewest slices of the paint's box hold any.
-            const auto share = [&](int a) { return double(axes[a].painted.size()) / box.size()[a]; };
+            const auto fraction = [&](int a) { return double(axes[a].painted.size()) / box.size()[a]; };
             int best = 2;
             for (const int a : {1, 0})
-                if (share(a) < share(best)) best = a;
+                if (fraction(a) < fraction(best)) best = a;
             result.views.push_back(view_of(paint, best, axes[best].painted, source));
         }
         for (const PaintedView& view : result.views)

@@ -43,7 +43,7 @@ public:
 
     void remove_outliers(CloudCleanupReport& report) {
         report.outliers += remove_isolated();
-        while (report.outlier_passes < kCleanup.most_passes && entries_.size() >= kFewest) {
+        while (report.outlier_passes < kCleanup.max_passes && entries_.size() >= kFewest) {
             run_.check();
             const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
             run_.check();
@@ -87,12 +87,12 @@ public:
                                   ? *options_.wlop_radius
                                   : kCleanup.rings *
                                         CGAL::compute_average_spacing<Tag>(entries_, kCleanup.ring, parameters()) /
-                                        std::sqrt(options_.wlop_share);
+                                        std::sqrt(options_.wlop_fraction);
         run_.check();
         std::vector<Point> points;
         CGAL::wlop_simplify_and_regularize_point_set<Tag>(
             entries_, std::back_inserter(points),
-            parameters().select_percentage(100 * options_.wlop_share).neighbor_radius(radius));
+            parameters().select_percentage(100 * options_.wlop_fraction).neighbor_radius(radius));
         run_.check();
         std::erase_if(points, [](const Point& p) { return !is_finite(p); });
         entries_.clear();

@@ -11,16 +11,16 @@ struct NeighboursHeuristics {
     /// [spacings] In which they are looked for first; time, not the result.
     double first_radius = heuristic("neighbours.first_radius", 2);
     /// [spacings] Beyond which they are given up.
-    double most_radius = heuristic("neighbours.most_radius", 40);
+    double max_radius = heuristic("neighbours.max_radius", 40);
 };
 COVOL_HEURISTICS NeighboursHeuristics kNear{};
 
 /// Scans whose layer of points is thicker than their spacing: scan_noise.cpp.
 struct ScanNoiseHeuristics {
     /// [voxels] Mean distance to the local plane at which a voxel size holds a layer.
-    double thin_share = heuristic("scan_noise.thin_share", 0.35);
+    double thin_fraction = heuristic("scan_noise.thin_fraction", 0.35);
     /// [voxels] The same where larger ones bend; scans as thick as their spacing is wide have 0.3 to 0.45.
-    double clean_share = heuristic("scan_noise.clean_share", 0.25);
+    double clean_fraction = heuristic("scan_noise.clean_fraction", 0.25);
     /// [voxels] Radius of the local plane.
     double plane_voxels = heuristic("scan_noise.plane_voxels", 2.5);
     /// [ratio] Of a voxel size that is tried to the one below.
@@ -30,7 +30,7 @@ struct ScanNoiseHeuristics {
     /// [points] Whose planes are looked at.
     std::size_t samples = heuristic("scan_noise.samples", 3000);
     /// [points] That make a plane, and one more.
-    std::size_t least_neighbours = heuristic("scan_noise.least_neighbours", 6);
+    std::size_t min_neighbours = heuristic("scan_noise.min_neighbours", 6);
     /// [passes] Of averaging layers.
     int passes = heuristic("scan_noise.passes", 2);
 };
@@ -46,15 +46,15 @@ COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 /// Marks that a click went astray for: isolated_points.cpp.
 struct IsolatedHeuristics {
     /// [points] Fewer tell nothing of what is usual.
-    std::size_t least_points = heuristic("isolated.least_points", 10);
+    std::size_t min_points = heuristic("isolated.min_points", 10);
     /// [points] More are no marks, but a cloud.
-    std::size_t most_points = heuristic("isolated.most_points", 4000);
+    std::size_t max_points = heuristic("isolated.max_points", 4000);
     /// [longest links] Marks that lie closer to each other are one that was read or clicked twice.
     double same_place = heuristic("isolated.same_place", 1e-3);
     /// [points] That are linked more closely, and apart from the others, at most: four already enclose something.
-    std::size_t most_together = heuristic("isolated.most_together", 3);
+    std::size_t max_group = heuristic("isolated.max_group", 3);
     /// [share of the points] That lie apart, at most.
-    double most_share = heuristic("isolated.most_share", 0.1);
+    double max_fraction = heuristic("isolated.max_fraction", 0.1);
     /// [ratio] Of the shortest link to one of them to the longest between the others: of marks on seven structures,
     /// evenly and on outlines, successive links differ by 1.4 at most.
     double gap = heuristic("isolated.gap", 2.0);
@@ -67,7 +67,7 @@ COVOL_HEURISTICS IsolatedHeuristics kIsolated{};
 /// Cleaning on demand: cloud_cleanup.cpp.
 struct CleanupHeuristics {
     /// [passes] Of removing outliers; each lowers the mean distance that they have raised.
-    int most_passes = heuristic("cleanup.most_passes", 10);
+    int max_passes = heuristic("cleanup.max_passes", 10);
     /// [distances to 6 neighbours] Radius of WLOP: two rings of new neighbours; CGAL's own 8 spacings flatten what is
     /// curved.
     double rings = heuristic("cleanup.rings", 2.5);

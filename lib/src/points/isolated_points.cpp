@@ -50,12 +50,12 @@ public:
     explicit Groups(std::size_t points) : sets_(points), size_(points, 1), places_(points) {}
     std::uint32_t of(std::size_t point) { return sets_.root(std::uint32_t(point)); }
     void join(const Link& link) {
-        const auto [least, other] = std::minmax({of(link.from), of(link.to)});
-        sets_.unite(least, other);
-        large_ -= is_large(least) + is_large(other);
-        size_[least] += size_[other];
-        large_ += is_large(least);
-        if (size_[least] > size_[largest_]) largest_ = least;
+        const auto [minimum, other] = std::minmax({of(link.from), of(link.to)});
+        sets_.unite(minimum, other);
+        large_ -= is_large(minimum) + is_large(other);
+        size_[minimum] += size_[other];
+        large_ += is_large(minimum);
+        if (size_[minimum] > size_[largest_]) largest_ = minimum;
     }
     /// Two points at one place count once. @pre no link between places was joined
     void merge(const Link& link) {
@@ -66,11 +66,11 @@ public:
     [[nodiscard]] std::uint32_t largest() const { return largest_; }
     /// Whether all others have no more points than clicks that went astray together, and few in all.
     [[nodiscard]] bool largest_is_all_but_few() const {
-        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.most_share) * double(places_);
+        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.max_fraction) * double(places_);
     }
 
 private:
-    [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.most_together; }
+    [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.max_group; }
 
     detail::DisjointSets sets_;
     std::vector<std::size_t> size_;  ///< places of each group
@@ -96,7 +96,7 @@ std::vector<IsolatedPoint> points_outside(std::uint32_t group, Groups& groups, c
 }  // namespace
 
 std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points) {
-    if (points.size() < kIsolated.least_points || points.size() > kIsolated.most_points) return {};
+    if (points.size() < kIsolated.min_points || points.size() > kIsolated.max_points) return {};
     const std::vector<Link> links = shortest_tree(points);
     Groups groups(points.size());
     // Marks that were read or clicked twice: beside the distance between them every other one is long.
@@ -105,7 +105,7 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
                                      [](double length, const Link& link) { return length < link.length; }) -
                     links.begin());
     for (std::size_t n = 0; n < first; ++n) groups.merge(links[n]);
-    if (groups.places() < kIsolated.least_points) return {};
+    if (groups.places() < kIsolated.min_points) return {};
     const double usual = links[(first + links.size()) / 2].length;
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);

@@ -58,7 +58,7 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
                         const double x = q[0] - p[0], y = q[1] - p[1], z = q[2] - p[2], d2 = x * x + y * y + z * z;
                         if (d2 <= r * r && m != n) near.push_back({d2, m});
                     }
-                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kNear.most_radius * spacing)
+                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kNear.max_radius * spacing)
                     break;
             }
             const std::size_t kept = std::min(count, near.size());

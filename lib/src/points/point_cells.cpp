@@ -12,7 +12,7 @@ namespace covol::cloud {
 namespace {
 
 constexpr int kKeyBits = 20;  // for each axis
-constexpr std::int64_t kMostRowsPerCell = 4;
+constexpr std::int64_t kMaxRowsPerCell = 4;
 
 std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
     return (std::uint64_t(i) << (2 * kKeyBits)) | (std::uint64_t(j) << kKeyBits) | std::uint64_t(k);
@@ -58,7 +58,7 @@ PointCells::PointCells(const std::vector<Vec3>& points, double edge) : edge_(edg
 
 void PointCells::index_rows() {
     const std::int64_t count = count_[0] * count_[1];
-    if (count > kMostRowsPerCell * std::int64_t(keys_.size())) return;
+    if (count > kMaxRowsPerCell * std::int64_t(keys_.size())) return;
     rows_.assign(std::size_t(count) + 1, 0);
     for (const std::uint64_t k : keys_)
         ++rows_[std::size_t((k >> (2 * kKeyBits)) * std::uint64_t(count_[1]) +

@@ -85,7 +85,7 @@ Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
         squares += w * v * v.transpose();
         ++plane.points;
     });
-    if (plane.points <= kScan.least_neighbours || !(total > 0)) return {};
+    if (plane.points <= kScan.min_neighbours || !(total > 0)) return {};
     sum /= total;
     const Eigen::Matrix3d covariance = squares / total - sum * sum.transpose();
     plane.center = origin + sum;
@@ -139,7 +139,7 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
         const double h = spacing * std::pow(kScan.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;
         const ScanVoxelSize finer{h, measure_layer_thickness(points, kScan.plane_voxels * h, run)};
-        const bool holds = finer.thickness <= (thick && !thin ? kScan.clean_share : kScan.thin_share) * h;
+        const bool holds = finer.thickness <= (thick && !thin ? kScan.clean_fraction : kScan.thin_fraction) * h;
         if (thin && !holds) break;
         if (holds || !any) choice = finer;
         any = true;

@@ -34,14 +34,14 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
     tbb::parallel_sort(items.begin(), items.end(),
                        [](const Item& a, const Item& b) { return a.key != b.key ? a.key < b.key : a.index < b.index; });
     std::vector<std::uint8_t> keep(points.size(), 0);
-    const double least = 0.25 * cell * cell;
+    const double minimum = 0.25 * cell * cell;
     std::vector<std::size_t> kept;  // in the cell at hand; few, for they are at least cell/2 apart
     for (std::size_t n = 0; n < items.size(); ++n) {
         if (n == 0 || items[n].key != items[n - 1].key) kept.clear();
         const Vec3& point = points[items[n].index];
         const bool close = std::any_of(kept.begin(), kept.end(), [&](std::size_t other) {
             const double distance = squared_distance(points[other], point);
-            return distance == 0 || distance < least;
+            return distance == 0 || distance < minimum;
         });
         if (close) continue;
         kept.push_back(items[n].index);
@@ -53,8 +53,8 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
     return result;
 }
 
-std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most) {
-    if (most == 0) throw Error(Errc::InvalidOptions, "most: expected > 0, got 0");
+std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t maximum) {
+    if (maximum == 0) throw Error(Errc::InvalidOptions, "most: expected > 0, got 0");
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
         throw Error(Errc::InvalidInput, "points: expected fewer than 2^32, got " + std::to_string(points.size()));
     if (points.empty()) return {};
@@ -72,7 +72,7 @@ std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std:
         keyed[n] = {key, static_cast<std::uint32_t>(n)};
     });
     tbb::parallel_sort(keyed.begin(), keyed.end());
-    std::vector<std::uint32_t> order(std::min(points.size(), most));
+    std::vector<std::uint32_t> order(std::min(points.size(), maximum));
     const double step = double(points.size()) / double(order.size());
     for (std::size_t n = 0; n < order.size(); ++n)
         order[n] = keyed[order.size() < points.size() ? std::size_t((double(n) + 0.5) * step) : n].second;

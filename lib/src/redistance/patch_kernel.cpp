@@ -36,8 +36,8 @@ COVOL_INLINE Real unit(Real x) {
 template <typename Real>
 COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
     Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;
-    const auto keep_least = [](Real & least, Real squared) __attribute__((always_inline)) {
-        least = squared < least ? squared : least;
+    const auto keep_min = [](Real & minimum, Real squared) __attribute__((always_inline)) {
+        minimum = squared < minimum ? squared : minimum;
     };
     const Real first = dot(arm, fan.triangles[0].from);
     Real from = first;
@@ -52,13 +52,13 @@ COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
 
         const Real along = unit(from * t.inverse_from);
         const Real spoke[3] = {arm[0] - along * t.from[0], arm[1] - along * t.from[1], arm[2] - along * t.from[2]};
-        keep_least(within, spoke[0] * spoke[0] + spoke[1] * spoke[1] + spoke[2] * spoke[2]);
+        keep_min(within, spoke[0] * spoke[0] + spoke[1] * spoke[1] + spoke[2] * spoke[2]);
 
         const Real side[3] = {arm[0] - t.from[0], arm[1] - t.from[1], arm[2] - t.from[2]};
         const Real on_edge = unit(dot(side, t.edge) * t.inverse_edge);
         const Real rest[3] = {side[0] - on_edge * t.edge[0], side[1] - on_edge * t.edge[1],
                               side[2] - on_edge * t.edge[2]};
-        keep_least(outline, rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
+        keep_min(outline, rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
         from = to;
     }
     return {within < outline ? within : outline, within < outline};
@@ -74,11 +74,11 @@ COVOL_INLINE Float8 ceil_of(Float8 x) {
 /// Positions first, first + 1, ... along an axis that may lie within `half` of a place that moves from lane to lane.
 struct Positions {
     Float8 first;
-    int most;
+    int maximum;
     Int8 meet_leaf;
     COVOL_INLINE Positions(Float8 center, float half)
         : first(ceil_of(center - half)),
-          most(static_cast<int>(2 * half) + 1),
+          maximum(static_cast<int>(2 * half) + 1),
           meet_leaf((first <= 7.0F) & (center + half >= 0.0F)) {}
 };
 
@@ -86,7 +86,7 @@ COVOL_INLINE Int8 is_in_leaf(Int8 at) { return (at & ~7) == 0; }
 
 /// No more than the squared distance to a polygon that lies in a cylinder, from a position `along` its axis and with
 /// the square `outside` off it.
-COVOL_INLINE Float8 least_square(const PatchCylinder& cylinder, Float8 along, Float8 outside) {
+COVOL_INLINE Float8 min_square(const PatchCylinder& cylinder, Float8 along, Float8 outside) {
     const Float8 above = positive((along < 0.0F ? -along : along) - cylinder.patch_height);
     // (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r²: no root.
     const Float8 excess = positive(outside - cylinder.patch_radius * cylinder.patch_radius);
@@ -151,14 +151,14 @@ COVOL_CLONES void offer_patch(const PatchOutline& outline, const PatchCylinder& 
     const Int8 in_m = (arm_m <= half) & (arm_m >= -half) & at_u.meet_leaf & at_v.meet_leaf;
     if (!any(in_m)) return;
     const Int8 voxel_m = __builtin_convertvector(lane * float(kStride[m]), Int8);
-    for (int du = 0; du < at_u.most; ++du) {
+    for (int du = 0; du < at_u.maximum; ++du) {
         const Float8 pu = at_u.first + float(du);
         const Int8 iu = __builtin_convertvector(pu, Int8);
         const Int8 in_u = in_m & is_in_leaf(iu);
         if (!any(in_u)) continue;
         const Float8 arm_u = pu - cylinder.center[u];
         const Float8 along_u = arm_m * axis[m] + arm_u * axis[u], square_u = arm_m * arm_m + arm_u * arm_u;
-        for (int dv = 0; dv < at_v.most; ++dv) {
+        for (int dv = 0; dv < at_v.maximum; ++dv) {
             const Float8 pv = at_v.first + float(dv);
             const Int8 iv = __builtin_convertvector(pv, Int8);
             const Float8 arm_v = pv - cylinder.center[v];
@@ -169,7 +169,7 @@ COVOL_CLONES void offer_patch(const PatchOutline& outline, const PatchCylinder& 
             const Int8 voxel = here & (voxel_m + iu * kStride[u] + iv * kStride[v]);
             Float8 known;
             for (int n = 0; n < 8; ++n) known[n] = leaf.squared[voxel[n]];
-            const Int8 open = here & (least_square(cylinder, along, outside) < known);
+            const Int8 open = here & (min_square(cylinder, along, outside) < known);
             if (!any(open)) continue;
             if (fan.count == 0) fan.make(outline);
             Float8 arm[3];

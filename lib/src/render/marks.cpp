@@ -28,12 +28,12 @@ void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& ca
     }
     std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) { return a.depth < b.depth; });
     for (const Seen& ball : seen) {
-        const double share = ball.veiled ? 0.45 : 1;
+        const double fraction = ball.veiled ? 0.45 : 1;
         const Rect& clip = camera.at;
-        canvas.disc(ball.x, ball.y, radius + std::max(0.5, 0.18 * radius), gray(0.08), 0.8 * share, clip);
-        canvas.disc(ball.x, ball.y, radius, ball.color, share, clip);
+        canvas.disc(ball.x, ball.y, radius + std::max(0.5, 0.18 * radius), gray(0.08), 0.8 * fraction, clip);
+        canvas.disc(ball.x, ball.y, radius, ball.color, fraction, clip);
         if (radius > 2.2)
-            canvas.disc(ball.x - 0.3 * radius, ball.y - 0.3 * radius, 0.3 * radius, gray(1), 0.55 * share, clip);
+            canvas.disc(ball.x - 0.3 * radius, ball.y - 0.3 * radius, 0.3 * radius, gray(1), 0.55 * fraction, clip);
     }
 }
 

@@ -20,13 +20,13 @@ struct Directions {
 };
 Directions directions_of(const ImageGeometry& geometry) {
     Directions best;
-    double most = -1;
+    double maximum = -1;
     std::array<int, 3> order{0, 1, 2};
     do {
         double sum = 0;
         for (int a = 0; a < 3; ++a) sum += std::abs(geometry.direction[order[a]][a]);
-        if (sum <= most + 1e-9) continue;
-        most = sum;
+        if (sum <= maximum + 1e-9) continue;
+        maximum = sum;
         best.world = order;
     } while (std::next_permutation(order.begin(), order.end()));
     for (int a = 0; a < 3; ++a) best.reversed[a] = geometry.direction[best.world[a]][a] < 0;
@@ -105,7 +105,7 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
 }
 
 MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeometry& geometry) {
-    constexpr double kNear = 0.1, kMost = 0.9;  // of an index; share of the marks
+    constexpr double kNear = 0.1, kMax = 0.9;  // of an index; share of the marks
     MarkedSlices found;
     double fewest = 0.6;  // share of the slices between the first and the last mark
     for (const int a : {2, 1, 0}) {
@@ -117,10 +117,10 @@ MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeome
             slices.insert(int(std::lround(at)));
             ++on;
         }
-        if (slices.empty() || double(on) < kMost * double(marks.size()) || 2 * slices.size() > marks.size()) continue;
-        const double share = double(slices.size()) / (*slices.rbegin() - *slices.begin() + 1.0);
-        if (share >= fewest && slices.size() > 1) continue;
-        fewest = share;
+        if (slices.empty() || double(on) < kMax * double(marks.size()) || 2 * slices.size() > marks.size()) continue;
+        const double fraction = double(slices.size()) / (*slices.rbegin() - *slices.begin() + 1.0);
+        if (fraction >= fewest && slices.size() > 1) continue;
+        fewest = fraction;
         found = {a, {slices.begin(), slices.end()}};
     }
     return found;
@@ -155,7 +155,7 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
             if (slice >= all[0] && slice <= all[1]) candidates.push_back(slice);
     if (candidates.empty())
         for (int n = int(std::ceil(all[0])); n <= int(std::floor(all[1])); ++n) candidates.push_back(n);
-    int best = int(std::lround(middle)), most = -1;
+    int best = int(std::lround(middle)), maximum = -1;
     double nearest = 0;
     for (const int slice : candidates) {
         int cut = 0;
@@ -166,9 +166,9 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
             cut += slice >= range[0] + tip && slice <= range[1] - tip ? 1 : 0;
         }
         const double away = std::abs(slice - middle);
-        if (cut < most || (cut == most && away >= nearest)) continue;
+        if (cut < maximum || (cut == maximum && away >= nearest)) continue;
         best = slice;
-        most = cut;
+        maximum = cut;
         nearest = away;
     }
     return std::clamp(best, 0, geometry.size[axis] - 1);

@@ -28,7 +28,7 @@ constexpr double kVeil = 0.35, kVolumeVeil = 0.16;
 constexpr double kVolumeDensity = 4.0;
 constexpr double kBytesPerPixel = 90;  // what colours, depths and normals take while a picture is made
 constexpr int kPlanes = 3;
-constexpr std::size_t kMostBalls = 3000;
+constexpr std::size_t kMaxBalls = 3000;
 
 /// Text is as large as a picture of that size bears.
 double text_size(int width, int height) { return std::max(9.0, 0.0185 * std::sqrt(double(width) * height)); }
@@ -54,7 +54,7 @@ public:
             bodies_.push_back({structure.surface, to_color(structure.color), opacity_of(bodies_.size())});
         }
         all_marks_.insert(all_marks_.end(), scene.marks.begin(), scene.marks.end());
-        radius_ = mark_radius(text_, std::min(kMostBalls, all_marks_.size()));
+        radius_ = mark_radius(text_, std::min(kMaxBalls, all_marks_.size()));
     }
 
     Picture go() {
@@ -251,7 +251,7 @@ private:
 
     /// Of very many marks some: they would hide the surface.
     void add_balls(const std::vector<Vec3>& marks, const Color& color, std::vector<Ball>& balls) const {
-        const std::size_t stride = all_marks_.size() / kMostBalls + 1;
+        const std::size_t stride = all_marks_.size() / kMaxBalls + 1;
         for (std::size_t n = 0; n < marks.size(); n += stride) balls.push_back({marks[n], color});
     }
 

@@ -15,10 +15,10 @@
 namespace covol::figure {
 namespace {
 
-constexpr std::size_t kMostMarks = 120;
-constexpr int kMostSamples = 4;  // of the image along each side of a pixel
-constexpr float kFar = 1e6F;     // pixels
-constexpr double kFlat = 0.2;    // slope below which the surface lies in the plane rather than across it
+constexpr std::size_t kMaxMarks = 120;
+constexpr int kMaxSamples = 4;  // of the image along each side of a pixel
+constexpr float kFar = 1e6F;    // pixels
+constexpr double kFlat = 0.2;   // slope below which the surface lies in the plane rather than across it
 
 /// The image's values in one plane.
 class Slice {
@@ -119,7 +119,7 @@ private:
     void draw_image() const {
         const Slice slice(*scene_.image, plane_, region_, run_);
         const double finest = std::min(geometry_.spacing[plane_.across], geometry_.spacing[plane_.down]);
-        const int samples = std::clamp(int(std::lround(style_.pixel / finest)), 1, kMostSamples);
+        const int samples = std::clamp(int(std::lround(style_.pixel / finest)), 1, kMaxSamples);
         const double span = style_.window[1] - style_.window[0], scale = span > 0 ? 1 / span : 0;
         tbb::parallel_for(0, at_.height, [&](int y) {
             for (int x = 0; x < at_.width; ++x) {
@@ -162,12 +162,12 @@ private:
             for (int x = 0; x < width && !run_.cancelled(); ++x)
                 values[std::size_t(y) * width + x] = float(field.value(world(at_.x + x - 0.5, at_.y + y - 0.5)));
         });
-        const float least = float(kFlat * style_.pixel);
+        const float minimum = float(kFlat * style_.pixel);
         tbb::parallel_for(0, at_.height, [&](int y) {
             for (int x = 0; x < at_.width; ++x) {
                 const float* const v = values.data() + std::size_t(y + 1) * width + x + 1;
                 const float slope = 0.5F * std::hypot(v[1] - v[-1], v[width] - v[-width]);
-                nearest[std::size_t(y) * at_.width + x].take(n, v[0] / std::max(slope, least));
+                nearest[std::size_t(y) * at_.width + x].take(n, v[0] / std::max(slope, minimum));
             }
         });
     }
@@ -189,9 +189,9 @@ private:
                 };
                 const auto draw = [&](int rank, bool is_rim) {
                     if (near.structure[rank] < 0) return;
-                    const double share = covered(near.away[rank], is_rim ? rim + 0.5 : 0.5);
+                    const double fraction = covered(near.away[rank], is_rim ? rim + 0.5 : 0.5);
                     const Color color = is_rim ? gray(0) : to_color(scene_.structures[near.structure[rank]].color);
-                    canvas_.blend(at_.x + x, at_.y + y, color, is_rim ? 0.55 * share : share);
+                    canvas_.blend(at_.x + x, at_.y + y, color, is_rim ? 0.55 * fraction : fraction);
                 };
                 const int under = near.structure[0] < near.structure[1] ? 0 : 1;
                 for (const bool is_rim : {true, false})
@@ -229,7 +229,7 @@ private:
                 places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
         }
         // Of very many some: they would hide the outline.
-        const std::size_t stride = places.size() / kMostMarks + 1;
+        const std::size_t stride = places.size() / kMaxMarks + 1;
         for (std::size_t n = 0; n < places.size(); n += stride) {
             const auto [x, y] = places[n];
             canvas_.disc(x, y, style_.mark_radius + std::max(0.6, 0.05 * style_.text), gray(0.05), 0.9, at_);

@@ -20,7 +20,7 @@ namespace {
 
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
-constexpr int kMostHits = 12;                            // of one ray with one translucent body
+constexpr int kMaxHits = 12;                             // of one ray with one translucent body
 constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
 constexpr double kOneWall = 1;                           // voxels: bodies closer than that share a wall
 constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
@@ -40,7 +40,7 @@ struct Hit {
 /// What one ray sees.
 struct Seen {
     Color color{0, 0, 0};
-    float share = 0, depth = kMissing, solid = kMissing;
+    float fraction = 0, depth = kMissing, solid = kMissing;
     std::array<float, 3> normal{0, 0, 0};
     int body = -1;
 };
@@ -68,16 +68,16 @@ public:
             const Body& body = bodies_[hit.body];
             const double facing = std::abs(dot(hit.normal, camera_.basis.to_eye));
             // A slanted layer is thicker along the ray.
-            const double share = body.opacity >= 1 ? 1 : 1 - std::pow(1 - body.opacity, 1 / std::max(0.2, facing));
-            const double adds = (1 - seen.share) * share;
+            const double fraction = body.opacity >= 1 ? 1 : 1 - std::pow(1 - body.opacity, 1 / std::max(0.2, facing));
+            const double adds = (1 - seen.fraction) * fraction;
             seen.color = sum(seen.color, scaled(lights_.shade(body.color, hit.normal), adds));
-            seen.share += float(adds);
+            seen.fraction += float(adds);
             if (seen.body < 0) {
                 seen.body = hit.body;
                 seen.depth = float(hit.depth);
                 seen.normal = {float(hit.normal[0]), float(hit.normal[1]), float(hit.normal[2])};
             }
-            if (seen.share > kOpaque) {
+            if (seen.fraction > kOpaque) {
                 seen.solid = float(hit.depth);
                 break;
             }
@@ -99,8 +99,8 @@ private:
         const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
         double from = openvdb::math::Delta<double>::value();  // 0 is before all that a ray meets
         const double h = fields_[n].voxel_size();
-        const int most = bodies_[n].opacity >= 1 ? 1 : kMostHits;
-        for (int tries = 0, found = 0; tries < kMostHits && found < most; ++tries) {
+        const int maximum = bodies_[n].opacity >= 1 ? 1 : kMaxHits;
+        for (int tries = 0, found = 0; tries < kMaxHits && found < maximum; ++tries) {
             const openvdb::math::Ray<double> ray(to_vdb(origin), to_vdb(times(-1, to_eye)), from, 2 * reach_);
             openvdb::Vec3d at;
             if (!intersectors_[n].intersectsWS(ray, at)) return;
@@ -157,7 +157,7 @@ bool is_edge(const Seen& a, const Seen& b, double pixel) {
     if (a.body != b.body) return true;
     if (a.body < 0) return false;
     const float cosine = a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2];
-    return cosine < kCosEdge || std::abs(a.depth - b.depth) > 12 * pixel || std::abs(a.share - b.share) > 0.08;
+    return cosine < kCosEdge || std::abs(a.depth - b.depth) > 12 * pixel || std::abs(a.fraction - b.fraction) > 0.08;
 }
 
 class View {
@@ -188,14 +188,14 @@ public:
         });
         Layer layer{width_, height_, {}, {}, {}, {}};
         layer.color.resize(first_.size());
-        for (auto* values : {&layer.share, &layer.depth, &layer.solid}) values->resize(first_.size());
+        for (auto* values : {&layer.fraction, &layer.depth, &layer.solid}) values->resize(first_.size());
         for_rows([&](int y) {
             Tracer& trace = tracers.local();
             for (int x = 0; x < width_; ++x) {
                 const Seen seen = at_edge(x, y) ? finer(trace, x, y) : first(x, y);
                 const std::size_t n = std::size_t(y) * width_ + x;
                 layer.color[n] = seen.color;
-                layer.share[n] = seen.share;
+                layer.fraction[n] = seen.fraction;
                 layer.depth[n] = first_[n].depth;
                 layer.solid[n] = first_[n].solid;
             }
@@ -228,7 +228,7 @@ private:
             const Seen one =
                 trace(camera_.at.x + x + (s % kFiner + 0.5) / kFiner, camera_.at.y + y + (s / kFiner + 0.5) / kFiner);
             mean.color = sum(mean.color, scaled(one.color, 1.0 / (kFiner * kFiner)));
-            mean.share += one.share / (kFiner * kFiner);
+            mean.fraction += one.fraction / (kFiner * kFiner);
         }
         return mean;
     }
@@ -251,7 +251,7 @@ void compose(const Layer& layer, const Rect& at, Canvas& canvas) {
         for (int x = 0; x < layer.width; ++x) {
             const std::size_t n = std::size_t(y) * layer.width + x;
             Color& pixel = canvas.at(at.x + x, at.y + y);
-            pixel = sum(layer.color[n], scaled(pixel, 1 - layer.share[n]));
+            pixel = sum(layer.color[n], scaled(pixel, 1 - layer.fraction[n]));
         }
     });
 }

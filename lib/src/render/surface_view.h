@@ -19,7 +19,7 @@ struct Body {
 struct Layer {
     int width = 0, height = 0;
     std::vector<Color> color;
-    std::vector<float> share;
+    std::vector<float> fraction;
     std::vector<float> depth;  ///< of the first surface, towards the eye from the camera's center; far away: -infinity
     std::vector<float> solid;  ///< the same of the first that hides all behind it
 };

@@ -10,9 +10,9 @@
 namespace covol::figure {
 namespace {
 
-constexpr double kMostVoxels = 3.2e7;
-constexpr double kMostRays = 1.2e6;
-constexpr int kMostSteps = 1200;
+constexpr double kMaxVoxels = 3.2e7;
+constexpr double kMaxRays = 1.2e6;
+constexpr int kMaxSteps = 1200;
 constexpr double kDark = 0.12;  // is taken for nothing
 
 Index3 thinning(const VoxelBox& region, const Vec3& spacing) {
@@ -22,7 +22,7 @@ Index3 thinning(const VoxelBox& region, const Vec3& spacing) {
         for (int a = 0; a < 3; ++a) n *= std::ceil(double(region.size()[a]) / step[a]);
         return n;
     };
-    while (count() > kMostVoxels) {
+    while (count() > kMaxVoxels) {
         int finest = 0;
         for (int a = 1; a < 3; ++a)
             if (spacing[a] * step[a] < spacing[finest] * step[finest]) finest = a;
@@ -63,9 +63,9 @@ Volume::Volume(const Image& image, const VoxelBox& region, const std::array<doub
                 float* const to = means.data() + std::size_t(j / lines) * n[0];
                 for (std::size_t i = 0; i < row.size(); ++i) to[i / std::min(step[0], whole[0])] += row[i];
             }
-        const double share = 1.0 / (double(layers) * lines * std::min(step[0], whole[0]));
+        const double fraction = 1.0 / (double(layers) * lines * std::min(step[0], whole[0]));
         std::transform(means.begin(), means.end(), voxels_.begin() + std::ptrdiff_t(means.size()) * k, [&](float v) {
-            return std::uint8_t(std::lround(std::clamp((double(v) * share - window[0]) * scale, 0.0, 255.0)));
+            return std::uint8_t(std::lround(std::clamp((double(v) * fraction - window[0]) * scale, 0.0, 255.0)));
         });
     });
     run.check();
@@ -96,7 +96,7 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
     const Rect& at = camera.at;
     // Rays need not be finer than voxels; between them colours are interpolated.
     const double coarse =
-        std::max({1.0, 0.6 * finest / camera.pixel, std::sqrt(double(at.width) * at.height / kMostRays)});
+        std::max({1.0, 0.6 * finest / camera.pixel, std::sqrt(double(at.width) * at.height / kMaxRays)});
     const int width = std::max(2, int(std::ceil(at.width / coarse)) + 1);
     const int height = std::max(2, int(std::ceil(at.height / coarse)) + 1);
     double thinnest = 1e300, longest = 0;
@@ -104,12 +104,12 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
         thinnest = std::min(thinnest, g.size[a] * g.spacing[a]);
         longest += std::pow(g.size[a] * g.spacing[a], 2);
     }
-    const double step = std::max(0.7 * finest, std::sqrt(longest) / kMostSteps);
+    const double step = std::max(0.7 * finest, std::sqrt(longest) / kMaxSteps);
     const double absorption = 6 * density * step / thinnest;
     const Vec3 zero = g.world_to_index({0, 0, 0});
     const Vec3 slope = times(-1, minus(g.world_to_index(camera.basis.to_eye), zero));  // of the index along the ray
     std::vector<Color> colors(std::size_t(width) * height);
-    std::vector<float> shares(colors.size());
+    std::vector<float> fractions(colors.size());
     tbb::parallel_for(0, height, [&](int y) {
         for (int x = 0; x < width && !run.cancelled(); ++x) {
             const Vec3 start = g.world_to_index(camera.place(at.x + x * coarse, at.y + y * coarse));
@@ -121,21 +121,21 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
                 from = std::max(from, std::min(low / slope[a], high / slope[a]));
                 to = std::min(to, std::max(low / slope[a], high / slope[a]));
             }
-            double share = 0, light = 0;
-            for (double t = from + 0.5 * step; t < to && share < 0.995; t += step) {
+            double fraction = 0, light = 0;
+            for (double t = from + 0.5 * step; t < to && fraction < 0.995; t += step) {
                 const double value = std::max(0.0, (volume.at(plus(start, times(t, slope))) - kDark) / (1 - kDark));
-                const double adds = (1 - share) * (1 - std::exp(-absorption * value * std::sqrt(value)));
+                const double adds = (1 - fraction) * (1 - std::exp(-absorption * value * std::sqrt(value)));
                 light += adds * (on_white ? 0.80 - 0.65 * value : 0.15 + 0.85 * value);
-                share += adds;
+                fraction += adds;
             }
             colors[std::size_t(y) * width + x] = gray(light);
-            shares[std::size_t(y) * width + x] = float(share);
+            fractions[std::size_t(y) * width + x] = float(fraction);
         }
     });
     run.check();
     Layer layer{at.width, at.height, {}, {}, {}, {}};
     layer.color.resize(std::size_t(at.width) * at.height);
-    layer.share.resize(layer.color.size());
+    layer.fraction.resize(layer.color.size());
     tbb::parallel_for(0, at.height, [&](int y) {
         const double v = std::min((y + 0.5) / coarse, height - 1.001);
         for (int x = 0; x < at.width; ++x) {
@@ -145,8 +145,8 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
             const std::size_t n = std::size_t(y) * at.width + x;
             layer.color[n] =
                 mix(mix(colors[corner], colors[corner + 1], s), mix(colors[below], colors[below + 1], s), t);
-            layer.share[n] = float((1 - t) * ((1 - s) * shares[corner] + s * shares[corner + 1]) +
-                                   t * ((1 - s) * shares[below] + s * shares[below + 1]));
+            layer.fraction[n] = float((1 - t) * ((1 - s) * fractions[corner] + s * fractions[corner + 1]) +
+                                      t * ((1 - s) * fractions[below] + s * fractions[below + 1]));
         }
     });
     return layer;

@@ -11,8 +11,9 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kGrowth = 1.15;     // of the cells, until the triangles are few enough
-constexpr double kFirstShare = 0.8;  // of the edge at which that is expected: too fine costs a turn, too coarse detail
+constexpr double kGrowth = 1.15;  // of the cells, until the triangles are few enough
+constexpr double kFirstFraction =
+    0.8;  // of the edge at which that is expected: too fine costs a turn, too coarse detail
 constexpr std::uint64_t kAxisBits = 21;  // of a cell's number
 
 struct Box {
@@ -105,17 +106,17 @@ std::vector<std::array<float, 3>> representatives(const TriangleMesh& mesh, cons
 
 }  // namespace
 
-PageMesh cluster(PageMesh in, std::int64_t most) {
+PageMesh cluster(PageMesh in, std::int64_t maximum) {
     const TriangleMesh& mesh = in.mesh;
-    if (std::int64_t(mesh.triangles.size()) <= most) return in;
+    if (std::int64_t(mesh.triangles.size()) <= maximum) return in;
     const Box box = box_of(mesh);
     const double longest = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]});
     // Cells no finer than their number holds; a mesh with a size has cells that grow until one holds all of it.
-    double edge = std::max(kFirstShare * std::sqrt(2 * area_of(mesh) / double(most)), longest / double(1 << 20));
+    double edge = std::max(kFirstFraction * std::sqrt(2 * area_of(mesh) / double(maximum)), longest / double(1 << 20));
     if (!(edge > 0) || !std::isfinite(edge)) return in;
     Cells cells = cells_of(mesh, box, edge);
     auto triangles = triangles_of(mesh, cells);
-    while (std::int64_t(triangles.size()) > most) {
+    while (std::int64_t(triangles.size()) > maximum) {
         edge *= kGrowth;
         cells = cells_of(mesh, box, edge);
         triangles = triangles_of(mesh, cells);

@@ -19,6 +19,6 @@ struct PageMesh {
 /// vertex that is left lies where it lay; values are the cells' means. Time grows with the mesh alone; where a part is
 /// thinner than a cell the result need not be manifold.
 /// @pre most > 0; values as many as vertices
-[[nodiscard]] PageMesh cluster(PageMesh mesh, std::int64_t most);
+[[nodiscard]] PageMesh cluster(PageMesh mesh, std::int64_t maximum);
 
 }  // namespace covol::detail

@@ -105,8 +105,8 @@ CodedValues encode(const std::vector<float>& values, const std::vector<std::uint
     const float range = coded.max - coded.min;
     std::uint8_t before = 0;
     for (const std::uint32_t v : from) {
-        const float share = !std::isfinite(values[v]) ? 1.0F : range > 0 ? (values[v] - coded.min) / range : 0.0F;
-        const auto at = std::uint8_t(std::lround(255.0F * std::clamp(share, 0.0F, 1.0F)));
+        const float fraction = !std::isfinite(values[v]) ? 1.0F : range > 0 ? (values[v] - coded.min) / range : 0.0F;
+        const auto at = std::uint8_t(std::lround(255.0F * std::clamp(fraction, 0.0F, 1.0F)));
         coded.steps.push_back(std::uint8_t(at - before));
         before = at;
     }

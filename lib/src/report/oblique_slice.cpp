@@ -13,11 +13,11 @@
 namespace covol {
 namespace {
 
-constexpr double kMostOfCode = 65535;
+constexpr double kMaxOfCode = 65535;
 constexpr int kFastest = 1;  // zlib's level: a person waits for it
-constexpr int kMostPixels = 1024;
-constexpr int kTile = 32;            // pixels: the box of voxels around a tile is small, whatever its direction
-constexpr double kMostOfTile = 1e7;  // voxels of that box
+constexpr int kMaxPixels = 1024;
+constexpr int kTile = 32;           // pixels: the box of voxels around a tile is small, whatever its direction
+constexpr double kMaxOfTile = 1e7;  // voxels of that box
 
 Vec3 place_of(const ObliqueRequest& wanted, double x, double y) {
     Vec3 place{};
@@ -63,9 +63,9 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
                              const RunContext& run) {
     for (const Vec3* const v : {&wanted.first, &wanted.right, &wanted.down})
         if (!(length(*v) < 1e9)) throw Error(Errc::InvalidOptions, "oblique slice: expected finite numbers");
-    if (wanted.count < 1 || wanted.count > kMostPixels)
+    if (wanted.count < 1 || wanted.count > kMaxPixels)
         throw Error(Errc::InvalidOptions,
-                    "oblique slice: expected 1 to " + std::to_string(kMostPixels) + " pixels along each side");
+                    "oblique slice: expected 1 to " + std::to_string(kMaxPixels) + " pixels along each side");
     const double pixel = std::clamp(std::min(length(wanted.right), length(wanted.down)), 1.0, double(1 << 20));
     // A power of two: levels are.
     const std::size_t at = image.level_for(1 << int(std::floor(std::log2(pixel))));
@@ -82,7 +82,7 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
     };
     const auto count = std::size_t(wanted.count);
     std::vector<std::uint8_t> bytes(2 * count * count);
-    const double scale = range[1] > range[0] ? kMostOfCode / (range[1] - range[0]) : 0;
+    const double scale = range[1] > range[0] ? kMaxOfCode / (range[1] - range[0]) : 0;
     const int tiles = (wanted.count + kTile - 1) / kTile;
     tbb::parallel_for(0, tiles * tiles, [&](int tile) {
         if (run.cancelled()) return;
@@ -101,7 +101,7 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
         const VoxelBox box = box_around(low, high, level.size);
         const Index3 size = box.size();
         // Pixels that are far apart are looked at one by one.
-        const bool is_whole = double(size[0]) * size[1] * size[2] <= kMostOfTile;
+        const bool is_whole = double(size[0]) * size[1] * size[2] <= kMaxOfTile;
         std::vector<float> values;
         const auto load = [&](const VoxelBox& part) {
             const Index3 of = part.size();
@@ -117,7 +117,7 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
                 const VoxelBox own = is_whole ? box : box_around(place, place, level.size);
                 if (!is_whole) load(own);
                 const double value = sample(values, own, place);
-                const auto code = std::uint16_t(std::lround(std::clamp((value - range[0]) * scale, 0.0, kMostOfCode)));
+                const auto code = std::uint16_t(std::lround(std::clamp((value - range[0]) * scale, 0.0, kMaxOfCode)));
                 const std::size_t n = 2 * (std::size_t(y) * count + std::size_t(x));
                 bytes[n] = std::uint8_t(code & 255U);
                 bytes[n + 1] = std::uint8_t(code >> 8U);

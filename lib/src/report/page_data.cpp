@@ -15,7 +15,7 @@
 namespace covol {
 namespace {
 
-constexpr double kMostCode = 65535;
+constexpr double kMaxCode = 65535;
 constexpr int kFast = 1;  // zlib's level: a person waits for it
 
 template <typename T>
@@ -80,7 +80,7 @@ void code_rows(const ImageLevels& image, const SlicePlan& plan, int first, int l
     const std::int64_t row = box.size()[plan.right];
     std::vector<float> values(std::size_t(row) * std::size_t(box.size()[plan.down]));
     image.copy(plan.level, box, values.data(), run);
-    const double scale = range[1] > range[0] ? kMostCode / (range[1] - range[0]) : 0;
+    const double scale = range[1] > range[0] ? kMaxCode / (range[1] - range[0]) : 0;
     for (int y = first; y <= last; ++y) {
         const auto [top, bottom] = voxels_of(part.y + y, plan.rows, plan.size[plan.down]);
         for (int x = 0; x < part.width; ++x) {
@@ -91,7 +91,7 @@ void code_rows(const ImageLevels& image, const SlicePlan& plan, int first, int l
                 for (std::int32_t i = left; i <= right; ++i) sum += double(from[i - box.min[plan.right]]);
             }
             const double mean = sum / (double(right - left + 1) * (bottom - top + 1));
-            const auto code = std::uint16_t(std::lround(std::clamp((mean - range[0]) * scale, 0.0, kMostCode)));
+            const auto code = std::uint16_t(std::lround(std::clamp((mean - range[0]) * scale, 0.0, kMaxCode)));
             *out++ = std::uint8_t(code & 255U);
             *out++ = std::uint8_t(code >> 8U);
         }

@@ -91,12 +91,12 @@ std::vector<float> shrink(const Image& image, const SlicePlan& plan, int k) {
 }  // namespace
 
 SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held, const std::vector<Vec3>& places,
-                      std::int64_t most) {
+                      std::int64_t maximum) {
     SlicePlan plan;
     plan.region = held;
-    if (count_of(held.size()) > most && !places.empty()) plan.region = around(geometry, held, places);
+    if (count_of(held.size()) > maximum && !places.empty()) plan.region = around(geometry, held, places);
     plan.size = shown_size(plan.region, plan.step);
-    while (count_of(plan.size) > most) {
+    while (count_of(plan.size) > maximum) {
         int finest = -1;
         for (int a = 0; a < 3; ++a) {
             if (plan.size[a] <= kFewest) continue;

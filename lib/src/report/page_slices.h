@@ -19,7 +19,7 @@ struct SlicePlan {
 /// much the voxels around `places`, thinned, the finest axis first.
 /// @param places  world units; none: the whole image counts
 [[nodiscard]] SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held,
-                                    const std::vector<Vec3>& places, std::int64_t most);
+                                    const std::vector<Vec3>& places, std::int64_t maximum);
 
 /// Slices along k, each a grey JPEG: black and white are the intensities that 0.2 % and 99.8 % of the voxels stay
 /// below.

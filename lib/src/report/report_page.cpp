@@ -28,8 +28,8 @@ Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
 // it.
 Vec3 origin_of(const ReportPage& page) { return page.structures.front().mesh->origin; }
 
-std::string packed_marks(const std::vector<Vec3>& marks, const Vec3& origin, std::int64_t most) {
-    const std::size_t stride = marks.size() / std::size_t(most + 1) + 1;
+std::string packed_marks(const std::vector<Vec3>& marks, const Vec3& origin, std::int64_t maximum) {
+    const std::size_t stride = marks.size() / std::size_t(maximum + 1) + 1;
     std::vector<float> numbers;
     for (std::size_t n = 0; n < marks.size(); n += stride)
         for (int a = 0; a < 3; ++a) numbers.push_back(float(marks[n][a] - origin[a]));
@@ -51,7 +51,7 @@ Json to_json(const Evidence& evidence, const Vec3& origin) {
             {"suggestions", suggestions}};
 }
 
-detail::PageMesh page_mesh(const PageStructure& structure, const Vec3& origin, std::int64_t most) {
+detail::PageMesh page_mesh(const PageStructure& structure, const Vec3& origin, std::int64_t maximum) {
     detail::PageMesh mesh{*structure.mesh, {}};
     move_mesh_origin(mesh.mesh, origin);
     const auto add = [&](const char* name, const std::vector<float>& values) {
@@ -61,12 +61,12 @@ detail::PageMesh page_mesh(const PageStructure& structure, const Vec3& origin, s
         add("distance_to_marks", structure.evidence->distance_to_marks);
         add("edge_strength", structure.evidence->edge_strength);
     }
-    return cluster(std::move(mesh), most);
+    return cluster(std::move(mesh), maximum);
 }
 
 Json to_json(const PageStructure& structure, const Vec3& origin, const ReportPageOptions& options,
-             std::int64_t most_triangles, ReportPageSummary& summary) {
-    const detail::PageMesh shown = page_mesh(structure, origin, most_triangles);
+             std::int64_t max_triangles, ReportPageSummary& summary) {
+    const detail::PageMesh shown = page_mesh(structure, origin, max_triangles);
     const detail::CodedMesh coded = detail::encode(shown.mesh);
     summary.triangles += coded.triangle_count;
     Json values = Json::object();
@@ -87,7 +87,7 @@ Json to_json(const PageStructure& structure, const Vec3& origin, const ReportPag
           {"corners", pack(coded.corners)},
           {"values", values}}},
         {"marks",
-         {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, origin, options.most_marks)}}}};
+         {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, origin, options.max_marks)}}}};
     if (structure.evidence != nullptr) json["evidence"] = to_json(*structure.evidence, origin);
     return json;
 }
@@ -160,13 +160,13 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
     for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
     for (const PageStructure& structure : page.structures) {
         run.check();
-        const double share = double(structure.mesh->triangles.size()) / all;
-        const auto most = std::max<std::int64_t>(100, std::int64_t(share * double(options.most_triangles)));
-        data["structures"].push_back(to_json(structure, origin_of(page), options, most, summary));
+        const double fraction = double(structure.mesh->triangles.size()) / all;
+        const auto maximum = std::max<std::int64_t>(100, std::int64_t(fraction * double(options.max_triangles)));
+        data["structures"].push_back(to_json(structure, origin_of(page), options, maximum, summary));
     }
     if (page.image == nullptr) return data;
     const detail::SlicePlan plan =
-        detail::plan_slices(page.image->geometry(), page.image->held(), places_of(page), options.most_voxels);
+        detail::plan_slices(page.image->geometry(), page.image->held(), places_of(page), options.max_voxels);
     try {
         data["image"] = to_json(*page.image, plan, origin_of(page), options, run);
         summary.slices_size = plan.size;

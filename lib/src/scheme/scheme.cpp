@@ -25,9 +25,9 @@ constexpr int kLeafSize = 512;
 
 const SchemeKernels& choose() {
     const std::vector<const SchemeKernels*> available = available_kernels();
-    const char* asked = std::getenv("COVOL_SIMD");
+    const char* requested = std::getenv("COVOL_SIMD");
     for (const SchemeKernels* set : available)
-        if (asked != nullptr && std::strcmp(set->name, asked) == 0) return *set;
+        if (requested != nullptr && std::strcmp(set->name, requested) == 0) return *set;
     return *available.back();
 }
 
@@ -65,7 +65,7 @@ void mirror_outside(float* values, const int lo[3], const int hi[3]) {
                 for (int j = -1; j <= 8; ++j) values[padded(i, j, k)] = values[padded(i, j, from)];
 }
 
-void close_faces(Share* c, const int lo[3], const int hi[3]) {
+void close_faces(Fraction* c, const int lo[3], const int hi[3]) {
     const auto is_inner = [&](int axis, int at) { return at > lo[axis] && at < hi[axis]; };
     const bool inner_k = lo[2] < 0 && hi[2] > 7;
     for (int n = 0; n < kLeafSize; ++n) {
@@ -78,15 +78,17 @@ void close_faces(Share* c, const int lo[3], const int hi[3]) {
         int closed = 0;
         for (int axis = 0; axis < 3; ++axis) {
             outside |= at[axis] < lo[axis] || at[axis] > hi[axis];
-            if (at[axis] == lo[axis]) closed += std::exchange(c[share_at(2 * axis, n)], Share{0});
-            if (at[axis] == hi[axis]) closed += std::exchange(c[share_at(2 * axis + 1, n)], Share{0});
+            if (at[axis] == lo[axis]) closed += std::exchange(c[fraction_at(2 * axis, n)], Fraction{0});
+            if (at[axis] == hi[axis]) closed += std::exchange(c[fraction_at(2 * axis + 1, n)], Fraction{0});
         }
         // c = a/(1+S): without the closed share x of S it becomes a/(1+S-x) = c / (1 - closed).
-        const double scale = outside ? 0.0 : closed < kShareUnit ? 1.0 / (1.0 - double(closed) / kShareUnit) : 1.0;
+        const double scale = outside                  ? 0.0
+                             : closed < kFractionUnit ? 1.0 / (1.0 - double(closed) / kFractionUnit)
+                                                      : 1.0;
         if (scale != 1.0)
             for (int f = 0; f < 6; ++f) {
-                Share& share = c[share_at(f, n)];
-                share = static_cast<Share>(std::min(share * scale + 0.5, double(kShareUnit)));
+                Fraction& fraction = c[fraction_at(f, n)];
+                fraction = static_cast<Fraction>(std::min(fraction * scale + 0.5, double(kFractionUnit)));
             }
     }
 }

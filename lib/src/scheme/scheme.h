@@ -21,13 +21,13 @@ enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
 /// Marks a value of d or g that is not known; no pull acts across a face with one.
 inline constexpr float kUnknown = -1.0F;
 
-/// A coefficient of a row, 0 to 1, in units of 1/kShareUnit: in half a float's memory, for that is what a sweep waits
-/// for.
-using Share = unsigned short;
-inline constexpr int kShareUnit = 65535;
+/// A coefficient of a row, 0 to 1, in units of 1/kFractionUnit: in half a float's memory, for that is what a sweep
+/// waits for.
+using Fraction = unsigned short;
+inline constexpr int kFractionUnit = 65535;
 /// Where a leaf's rows have the share of face f of voxel n: eight voxels along k side by side, face after face, so that
 /// a sweep reads one stream.
-inline constexpr int share_at(int f, int n) { return (n >> 3) * 48 + f * 8 + (n & 7); }
+inline constexpr int fraction_at(int f, int n) { return (n >> 3) * 48 + f * 8 + (n & 7); }
 
 /// A leaf's own 512 values and those of the leaves across its faces, by Face.
 struct LeafStar {
@@ -40,7 +40,7 @@ using RowMask = unsigned long long;
 
 struct NextRows {
     const float* b = nullptr;
-    const Share* c = nullptr;
+    const Fraction* c = nullptr;
 };
 
 struct SchemeConstants {
@@ -70,19 +70,19 @@ struct SchemeKernels {
     /// @param rho    512 factors on ρ; null means 1
     /// @param active 512 bits; other voxels get c = 0 (u_p = b_p); rows of
     ///               eight without an active voxel are left as they are
-    /// @param c      6 x 512, see share_at()
+    /// @param c      6 x 512, see fraction_at()
     RowFacts (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
-                         const unsigned long long* active, const SchemeConstants& constants, Share* c);
+                         const unsigned long long* active, const SchemeConstants& constants, Fraction* c);
 
     /// `inner` SOR sweeps in four colours in place over a leaf's rows of eight with an active voxel.
     /// @param next  b and c of the leaf that comes next, to be asked from memory meanwhile
     /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
-    double (*relax)(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega,
+    double (*relax)(const LeafStar& u, const float* b, const Fraction* c, const unsigned long long* active, float omega,
                     int inner, const NextRows& next);
 
     /// out = share * image + weight * Σ_q u_q - out on every voxel, the sum over the six neighbours: a step of
     /// Clenshaw's recurrence in their mean.
-    void (*mean_step)(const LeafStar& u, const float* image, float share, float weight, float* out);
+    void (*mean_step)(const LeafStar& u, const float* image, float fraction, float weight, float* out);
 
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
     void (*mean_gradient)(const float* u, float* out);
@@ -112,7 +112,7 @@ struct SchemeKernels {
 void mirror_outside(float* padded_values, const int lo[3], const int hi[3]);
 
 /// Takes the faces on that boundary out of the rows, and rows outside it altogether.
-void close_faces(Share* c, const int lo[3], const int hi[3]);
+void close_faces(Fraction* c, const int lo[3], const int hi[3]);
 
 /// The fastest that this processor runs; COVOL_SIMD=baseline|avx2|avx512 in the environment chooses another.
 const SchemeKernels& kernels();

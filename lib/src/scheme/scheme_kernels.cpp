@@ -171,19 +171,19 @@ inline Lanes lanes_of(unsigned bits) {
 
 /// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets
 /// one unit less on each face.
-inline void store_shares(const Lanes a[6], Lanes scale, Share* c) {
+inline void store_fractions(const Lanes a[6], Lanes scale, Fraction* c) {
     // Unsigned: shares of what is not finite, which nobody uses, may overflow.
-    UnsignedLanes share[6], total = UnsignedLanes{};
+    UnsignedLanes fraction[6], total = UnsignedLanes{};
     for (int f = 0; f < 6; ++f) {
-        share[f] = UnsignedLanes(__builtin_convertvector(a[f] * scale + 0.5F, LaneBits));
-        total += share[f];
+        fraction[f] = UnsignedLanes(__builtin_convertvector(a[f] * scale + 0.5F, LaneBits));
+        total += fraction[f];
     }
-    const LaneBits full = LaneBits(total) >= kShareUnit;  // -1 where true
-    for (int f = 0; f < 6; ++f) store(c + f * 8, LaneBits(share[f] + UnsignedLanes(full & (share[f] != 0))));
+    const LaneBits full = LaneBits(total) >= kFractionUnit;  // -1 where true
+    for (int f = 0; f < 6; ++f) store(c + f * 8, LaneBits(fraction[f] + UnsignedLanes(full & (fraction[f] != 0))));
 }
 
 RowFacts assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
-                  const SchemeConstants& constants, Share* c) {
+                  const SchemeConstants& constants, Fraction* c) {
     Vertices vertices;
     vertex_values(u, vertices);
     const RowMask rows = active_rows(active);
@@ -218,7 +218,7 @@ RowFacts assemble(const float* u, const float* phi, const float* g, const float*
             largest_sum = max(largest_sum, is_active * row_sum);
             const Lanes scale = is_active / (1.0F + row_sum);
             residual += (scale * pulls) * (scale * pulls);
-            store_shares(a, float(kShareUnit) * scale, c + share_at(0, row));
+            store_fractions(a, float(kFractionUnit) * scale, c + fraction_at(0, row));
         }
     return {largest(largest_sum), sum(residual)};
 }
@@ -268,23 +268,25 @@ inline double relax_rows(const LeafStar& u, RowMask rows, float omega, int inner
     return sum(residual);
 }
 
-double relax(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega,
+double relax(const LeafStar& u, const float* b, const Fraction* c, const unsigned long long* active, float omega,
              int inner, const NextRows& next) {
     return relax_rows(u, active_rows(active), omega, inner, [b, c, next](const RowStar& beside, int row) {
-        constexpr float kUnit = 1.0F / kShareUnit;
-        __builtin_prefetch(next.c + share_at(0, row));
-        __builtin_prefetch(next.c + share_at(5, row));
+        constexpr float kUnit = 1.0F / kFractionUnit;
+        __builtin_prefetch(next.c + fraction_at(0, row));
+        __builtin_prefetch(next.c + fraction_at(5, row));
         __builtin_prefetch(next.b + row);
         const Lanes old = load(b + row);
-        const auto share = [shares = c + share_at(0, row)](int face) { return load_shares(shares + face * 8); };
-        const auto pull = [&](int face, const float* from) { return share(face) * (load(from) - old); };
+        const auto fraction = [fractions = c + fraction_at(0, row)](int face) {
+            return load_fractions(fractions + face * 8);
+        };
+        const auto pull = [&](int face, const float* from) { return fraction(face) * (load(from) - old); };
         const Lanes pulls = (pull(kMinusI, beside.minus_i) + pull(kPlusI, beside.plus_i)) +
                             (pull(kMinusJ, beside.minus_j) + pull(kPlusJ, beside.plus_j));
-        return RowEquation{old + kUnit * pulls, kUnit * share(kMinusK), kUnit * share(kPlusK), old};
+        return RowEquation{old + kUnit * pulls, kUnit * fraction(kMinusK), kUnit * fraction(kPlusK), old};
     });
 }
 
-void mean_step(const LeafStar& u, const float* image, float share, float weight, float* out) {
+void mean_step(const LeafStar& u, const float* image, float fraction, float weight, float* out) {
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {
             const int at = (i * 8 + j) * 8;
@@ -294,7 +296,7 @@ void mean_step(const LeafStar& u, const float* image, float share, float weight,
             const Lanes sum = (load(beside.minus_i) + load(beside.plus_i)) +
                               (load(beside.minus_j) + load(beside.plus_j)) +
                               (shifted_up(now, below) + shifted_down(now, above));
-            store(out + at, share * load(image + at) + (weight * sum - load(out + at)));
+            store(out + at, fraction * load(image + at) + (weight * sum - load(out + at)));
         }
 }
 
@@ -371,20 +373,20 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
             const float* q = cut + at * 8;
             const Lanes cut_i = load(q), cut_j = load(q + 512), cut_k = load(q + 1024);
             const bool is_cut = any((cut_i > 0.0F) | (cut_j > 0.0F) | (cut_k > 0.0F));
-            const auto along = [&](Lanes cuts, Lanes least) {
-                return Arrival{cuts > 0.0F ? Lanes{} : least, cuts > 0.0F ? cuts : one};
+            const auto along = [&](Lanes cuts, Lanes minimum) {
+                return Arrival{cuts > 0.0F ? Lanes{} : minimum, cuts > 0.0F ? cuts : one};
             };
-            const Lanes least_i = min(load(row - kI), load(row + kI)), least_j = min(load(row - kJ), load(row + kJ));
-            const Arrival ai = along(cut_i, least_i), aj = along(cut_j, least_j);
+            const Lanes min_i = min(load(row - kI), load(row + kI)), min_j = min(load(row - kJ), load(row + kJ));
+            const Arrival ai = along(cut_i, min_i), aj = along(cut_j, min_j);
             const Lanes before = load(row), below = broadcast(row[-1]), above = broadcast(row[8]);
             Lanes now = before;
             // Along k until nothing falls any more.
             for (bool falls = true; falls;) {
-                const Lanes least_k = min(shifted_up(now, below), shifted_down(now, above));
-                const Arrival ak = along(cut_k, least_k);
+                const Lanes min_k = min(shifted_up(now, below), shifted_down(now, above));
+                const Arrival ak = along(cut_k, min_k);
                 // Nothing comes from where the values are no lower.
                 if (!any(now > min(ai.v, min(aj.v, ak.v)))) break;
-                const Lanes to = is_cut ? arrive(ai, aj, ak) : arrive(least_i, least_j, least_k);
+                const Lanes to = is_cut ? arrive(ai, aj, ak) : arrive(min_i, min_j, min_k);
                 const LaneBits fall = now - to > tolerance;
                 now = min(now, to);
                 const Lanes fallen = fall ? now : broadcast(kFar);
@@ -395,10 +397,10 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
             const LaneBits fall = before - now > tolerance;
             if (!any(fall)) continue;
             fell |= RowMask{1} << at;
-            const auto tell = [&](bool is_here, int stride, int shift) {
+            const auto notify = [&](bool is_here, int stride, int shift) {
                 if (is_here && any(fall & (load(row + stride) > now + kDownwind))) due |= RowMask{1} << (at + shift);
             };
-            tell(i > 0, -kI, -8), tell(i < 7, kI, 8), tell(j > 0, -kJ, -1), tell(j < 7, kJ, 1);
+            notify(i > 0, -kI, -8), notify(i < 7, kI, 8), notify(j > 0, -kJ, -1), notify(j < 7, kJ, 1);
         }
     }
     return fell;
@@ -415,17 +417,17 @@ inline void for_neighbours(const float* row, Visit visit) {
 }
 
 void cut_edges(const float* u, float* cut) {
-    constexpr float kLeast = 1e-4F;  // voxels
+    constexpr float kMin = 1e-4F;  // voxels
     const Lanes one = broadcast(1.0F);
     for (int row = 0; row < 64; ++row) {
         const float* at = u + padded(row >> 3, row & 7, 0);
         const Lanes p = load(at), size = absolute(p);
-        Lanes most[3] = {};
+        Lanes maximum[3] = {};
         for_neighbours(at, [&](int axis, Lanes q) {
-            const Lanes along = max(size / (size + absolute(q)), broadcast(kLeast));
-            most[axis] = max(most[axis], (q < 0.0F) != (p < 0.0F) ? one / along : Lanes{});
+            const Lanes along = max(size / (size + absolute(q)), broadcast(kMin));
+            maximum[axis] = max(maximum[axis], (q < 0.0F) != (p < 0.0F) ? one / along : Lanes{});
         });
-        for (int axis = 0; axis < 3; ++axis) store(cut + axis * 512 + row * 8, most[axis]);
+        for (int axis = 0; axis < 3; ++axis) store(cut + axis * 512 + row * 8, maximum[axis]);
     }
 }
 

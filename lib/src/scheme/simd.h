@@ -20,7 +20,7 @@ typedef unsigned UnsignedLanes __attribute__((vector_size(32)));
 inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
 inline void store(float* p, Lanes v) { *reinterpret_cast<LooseLanes*>(p) = v; }
 /// Eight whole numbers of 16 bits, 0 to 65535.
-inline Lanes load_shares(const unsigned short* p) {
+inline Lanes load_fractions(const unsigned short* p) {
 #if defined(__AVX2__)
     const LaneBits whole = (LaneBits)_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
 #else

@@ -14,7 +14,7 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr double kMostReach = 1 << 22;  // voxels from a lattice's origin, with room around
+constexpr double kMaxReach = 1 << 22;  // voxels from a lattice's origin, with room around
 
 /// What there is decides which terms of Eq. (3) can act.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
@@ -32,7 +32,7 @@ EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remar
 
 // One wild point makes a domain that no lattice holds.
 void check_extent(const std::vector<Vec3>& points, double h) {
-    if (points.size() < 8 || std::sqrt(3.0) * longest_side(bounding_box(points)) < kMostReach * h) return;
+    if (points.size() < 8 || std::sqrt(3.0) * longest_side(bounding_box(points)) < kMaxReach * h) return;
     Vec3 middle{};
     for (int a = 0; a < 3; ++a) {
         std::vector<double> values;
@@ -44,10 +44,10 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const auto farthest = std::max_element(away.begin(), away.end()) - away.begin();
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
-    const double most = away[away.size() * 99 / 100];
-    if (far < kAutomatic.wild_point * most || far < kMostReach * h) return;
+    const double maximum = away[away.size() * 99 / 100];
+    if (far < kAutomatic.wild_point * maximum || far < kMaxReach * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
-                                        number(far) + " from the middle of all points, " + number(far / most) +
+                                        number(far) + " from the middle of all points, " + number(far / maximum) +
                                         " times as far as 99 % of them: leave it out, if it is a mistake");
 }
 
@@ -60,7 +60,7 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
     }
     return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance &&
            !problem.has_seeds() && problem.image == nullptr && uses_points(evolve) && can_enclose(points) &&
-           (points.size() > kAutomatic.most_guess_marks ||
+           (points.size() > kAutomatic.max_guess_marks ||
             cloud::fill_a_solid(points, measure_spacing(points).median, problem.run));
 }
 
@@ -69,12 +69,12 @@ StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points
     const SegmentOptions& o = problem.options;
     if (is_any<GuessStart>(o.start)) return StartMethod::Guess;
     if (is_any<TagStart>(o.start) || !problem.is_guided() || o.contours || o.tag_distance ||
-        points.size() > kAutomatic.most_guess_marks)
+        points.size() > kAutomatic.max_guess_marks)
         return StartMethod::Tagged;
     // A layer: tagging tells what it needs.
     if (problem.image == nullptr && !can_enclose(points)) return StartMethod::Tagged;
     remarks.choose("start", "guess",
-                   std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.most_guess_marks),
+                   std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.max_guess_marks),
                    problem.run);
     return StartMethod::Guess;
 }
@@ -90,11 +90,11 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
 // A thick layer of points, or several beside each other, has its surface in the middle.
 std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
     const double radius = kAutomatic.scan_radius_voxels * h, thickness = measure_layer_thickness(points, radius, run);
-    if (!(thickness > kAutomatic.noisy_share * h)) return points;
+    if (!(thickness > kAutomatic.noisy_fraction * h)) return points;
     points = average_layers(points, radius, run);
     remarks.choose("points_averaged", "within " + number(radius),
                    "they lie " + number(thickness) + " from their local plane on the mean, more than " +
-                       number(kAutomatic.noisy_share) + " voxels",
+                       number(kAutomatic.noisy_fraction) + " voxels",
                    run);
     return points;
 }
@@ -196,12 +196,12 @@ Resolved resolve(const Problem& problem) {
         // What closes the surface of a scan may be far larger than what the points lie on.
         const double area =
             area_of(c.cloud->orientation.screened ? *c.cloud->orientation.screened : *c.cloud->orientation.indicator);
-        const double least = std::sqrt(area / (kAutomatic.most_facets * double(c.cloud->points.size())));
-        if (least > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
-            c.h = least;
+        const double minimum = std::sqrt(area / (kAutomatic.max_facets * double(c.cloud->points.size())));
+        if (minimum > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
+            c.h = minimum;
             remarks.choose(
-                "voxel_size", number(least),
-                "finer ones would be more than " + number(kAutomatic.most_facets) + " of the surface for each point",
+                "voxel_size", number(minimum),
+                "finer ones would be more than " + number(kAutomatic.max_facets) + " of the surface for each point",
                 run);
         }
     }
@@ -237,15 +237,16 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
         double area = 0;
         for (int a = 0; a < 3; ++a)
             area += 2 * (box.max[a] - box.min[a]) * (box.max[(a + 1) % 3] - box.min[(a + 1) % 3]);
-        if (const double least = std::sqrt(area / kAutomatic.most_box_voxels); least > std::min(times, 1.0) * spacing)
-            return VoxelSizeChoice{least, number(kAutomatic.most_box_voxels) +
-                                              " of them on the sides of the points' box; their median distance is " +
-                                              number(spacing)};
+        if (const double minimum = std::sqrt(area / kAutomatic.max_box_voxels);
+            minimum > std::min(times, 1.0) * spacing)
+            return VoxelSizeChoice{minimum, number(kAutomatic.max_box_voxels) +
+                                                " of them on the sides of the points' box; their median distance is " +
+                                                number(spacing)};
         if (times >= 1) return nearest(spacing);
         return VoxelSizeChoice{times * spacing, "finer than the median distance between neighbouring points, " +
                                                     number(spacing) + ", for there are few"};
     };
-    if (distinct.size() > kAutomatic.most_guess_marks) {
+    if (distinct.size() > kAutomatic.max_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
         const double h = kAutomatic.cloud_noise * scale.noise;
         if (h <= scale.nearest) return nearest(scale.nearest);
@@ -253,7 +254,7 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     }
     const double spacing = measure_spacing(distinct).median;
     // A guess is known between its points, noise or not: it has as many voxels as one of the most points.
-    if (!tagged) return finer(spacing, double(kAutomatic.most_guess_marks));
+    if (!tagged) return finer(spacing, double(kAutomatic.max_guess_marks));
     const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
     // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
     // them.

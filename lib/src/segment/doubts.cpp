@@ -82,12 +82,12 @@ Remarks doubt_isolated_marks(const Problem& problem) {
     Remarks remarks;
     const std::vector<IsolatedPoint> isolated = find_isolated_points(problem.given);
     if (isolated.empty()) return remarks;
-    constexpr std::size_t kTold = 3;
+    constexpr std::size_t kMaxReported = 3;
     std::string places;
-    for (std::size_t n = 0; n < std::min(isolated.size(), kTold); ++n)
+    for (std::size_t n = 0; n < std::min(isolated.size(), kMaxReported); ++n)
         places += (n == 0 ? "" : "; ") + place_of(problem.image, problem.given[isolated[n].index]) + ", " +
                   number(isolated[n].distance) + " away";
-    if (isolated.size() > kTold) places += "; ...";
+    if (isolated.size() > kMaxReported) places += "; ...";
     remarks.warn(std::to_string(isolated.size()) + " of " + std::to_string(problem.given.size()) +
                      " marks lie apart from all others (" + places +
                      "): the surface goes there, too; look whether they are mistakes" +
@@ -110,7 +110,7 @@ bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGr
     const std::vector<double> levels = detail::levels_at(u, start.marks.trusted);
     const auto far =
         std::count_if(levels.begin(), levels.end(), [&](double level) { return std::abs(level) > beyond; });
-    return double(far) > kDoubts.missed_share * double(start.marks.trusted.size());
+    return double(far) > kDoubts.missed_fraction * double(start.marks.trusted.size());
 }
 
 }  // namespace covol::pipeline

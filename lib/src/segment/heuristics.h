@@ -9,7 +9,7 @@ namespace covol {
 /// Values left to us: choices.cpp.
 struct AutomaticHeuristics {
     /// [marks] Of a guess, or of a start that they correct: more take long, and are dense.
-    std::size_t most_guess_marks = heuristic("automatic.most_guess_marks", 4000);
+    std::size_t max_guess_marks = heuristic("automatic.max_guess_marks", 4000);
     /// [voxels] Range of the points after tagging with an image: what is farther from marks is the image's. Measured on
     /// brain, spleen and nucleus with 300 points each.
     double tag_attraction_voxels = heuristic("automatic.tag_attraction_voxels", 8.0);
@@ -17,11 +17,11 @@ struct AutomaticHeuristics {
     double few_points = heuristic("automatic.few_points", 1000);
     /// [voxels] Most on the sides of the box around few points: time. Of a ball's there are 35,000, of thin parts ten
     /// times as many; of points on curves more would be, the closer they lie.
-    double most_box_voxels = heuristic("automatic.most_box_voxels", 3e5);
+    double max_box_voxels = heuristic("automatic.max_box_voxels", 3e5);
     /// [cells of the indicator] Voxel size of a cloud that encloses nothing, or fills a solid.
     double view_voxel = heuristic("automatic.view_voxel", 0.5);
     /// [voxels] Of the surface for each point, at most: of clouds on closed surfaces 4 to 8.
-    double most_facets = heuristic("automatic.most_facets", 20);
+    double max_facets = heuristic("automatic.max_facets", 20);
     /// [noises] Voxel size of a cloud, at least.
     double cloud_noise = heuristic("automatic.cloud_noise", 0.6);
     /// [voxels] Seeds closer than this are one position.
@@ -40,7 +40,7 @@ struct AutomaticHeuristics {
     /// [voxels] Layers of a scan within it are averaged.
     double scan_radius_voxels = heuristic("automatic.scan_radius_voxels", 2.5);
     /// [voxels] A layer of points thicker than this is averaged.
-    double noisy_share = heuristic("automatic.noisy_share", 0.3);
+    double noisy_fraction = heuristic("automatic.noisy_fraction", 0.3);
 };
 COVOL_HEURISTICS AutomaticHeuristics kAutomatic{};
 
@@ -75,7 +75,7 @@ struct FlowHeuristics {
     /// [voxels] That the surface may sink below the start where the points enclose nothing.
     double hold_depth = heuristic("flow.hold_depth", 0.75);
     /// [volumes of the grown start] A flow that leaves less has lost the edges.
-    double least_of_grown = heuristic("flow.least_of_grown", 0.5);
+    double min_of_grown = heuristic("flow.min_of_grown", 0.5);
     /// [voxels] Farther from its marks than the start: what flowed has left them.
     double leaves_voxels = heuristic("flow.leaves_voxels", 0.25);
     /// [distances between marked slices] How far the image may move the body between contours in one pass.
@@ -92,9 +92,9 @@ struct CoarseLevelHeuristics {
     /// [ratio] Of its voxel size.
     double refinement = heuristic("coarse_level.refinement", 2.0);
     /// [voxels of the coarse level] Presmoothing of the image, at least.
-    double least_coarse_sigma = heuristic("coarse_level.least_coarse_sigma", 0.5);
+    double min_coarse_sigma = heuristic("coarse_level.min_coarse_sigma", 0.5);
     /// [voxels of the coarse level] Range of the points, at least.
-    double least_coarse_attraction = heuristic("coarse_level.least_coarse_attraction", 3.0);
+    double min_coarse_attraction = heuristic("coarse_level.min_coarse_attraction", 3.0);
     /// [voxels a step] A surface far from all that pulls moves slowly, too.
     double coarse_tolerance = heuristic("coarse_level.coarse_tolerance", 5e-3);
     /// [voxels of the coarse level] Time step, where it is automatic: the result is but a start.
@@ -102,7 +102,7 @@ struct CoarseLevelHeuristics {
     /// [voxels of the coarse level] That the fine level starts outside of the result.
     double step_back = heuristic("coarse_level.step_back", 2.0);
     /// [voxels] A smaller domain has little to gain, and thin things to lose.
-    int least_coarsened = heuristic("coarse_level.least_coarsened", 64);
+    int min_coarsened = heuristic("coarse_level.min_coarsened", 64);
 };
 COVOL_HEURISTICS CoarseLevelHeuristics kCoarse{};
 
@@ -119,9 +119,9 @@ struct DoubtsHeuristics {
     /// [diagonals of the marks' box] From every mark: there the surface is not the marks' any more.
     double far_diagonals = heuristic("doubts.far_diagonals", 0.5);
     /// [share of the surface] That far off.
-    double far_share = heuristic("doubts.far_share", 0.05);
+    double far_fraction = heuristic("doubts.far_fraction", 0.05);
     /// [share of the marks] That a surface may miss.
-    double missed_share = heuristic("doubts.missed_share", 0.1);
+    double missed_fraction = heuristic("doubts.missed_fraction", 0.1);
     /// [radii of the largest ball inside a guess] Between a mark and the guess, above which the guess says little about
     /// the body there: of 60 masks of five thin structures that lacked a quarter, with 5 to 30 marks, 15 had one that
     /// lay farther, 9 of which became worse, as did 3 of the others.
@@ -139,13 +139,13 @@ struct DoubtsHeuristics {
     /// them: 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a nucleus with poor
     /// labels); below 0.5 for 15 of these 34 where the marks are of a body 0.6 times as large, for 25 where it is 1.5
     /// times.
-    double border_share = heuristic("doubts.border_share", 0.6);
+    double border_fraction = heuristic("doubts.border_fraction", 0.6);
     /// [standard errors] Between both, on the mean of the marks: the largest of twenty stays below in noise.
     double border_errors = heuristic("doubts.border_errors", 4.0);
     /// [Dice] Expected of a result, below which it is doubted: of 26 results below 0.8 24 are, of 94 above 0.9 two.
-    double least_expected_dice = heuristic("doubts.least_expected_dice", 0.87);
+    double min_expected_dice = heuristic("doubts.min_expected_dice", 0.87);
     /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
-    double least_gain = heuristic("doubts.least_gain", 0.05);
+    double min_gain = heuristic("doubts.min_gain", 0.05);
     /// [probability] The support above which a low gain alone says nothing: at most 0.62 where marks that were shifted,
     /// mirrored or put anywhere have one, 0.59 to 0.86 for marks of their own on dim nuclei, which have one, too.
     double clear_support = heuristic("doubts.clear_support", 0.65);
@@ -162,7 +162,7 @@ COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 /// Clouds without an inside: solve/vanished.cpp.
 struct VanishedHeuristics {
     /// [longest extents] Thinner clouds are flat.
-    double thin_share = heuristic("vanished.thin_share", 0.02);
+    double thin_fraction = heuristic("vanished.thin_fraction", 0.02);
     /// [spacings] Of a layer around points without an inside: closes the gaps of random points.
     double layer_spacings = heuristic("vanished.layer_spacings", 4.5);
     /// [longest sides] Such a ball fits into no body within it.
@@ -200,7 +200,7 @@ struct StartsHeuristics {
     /// [share of the given normals] Against the result, above which there is a warning.
     double warn_disagreeing = heuristic("starts.warn_disagreeing", 0.1);
     /// [longest sides] Beyond the points of a cloud: where they leave holes the surface bulges.
-    double margin_share = heuristic("starts.margin_share", 0.1);
+    double margin_fraction = heuristic("starts.margin_fraction", 0.1);
     /// [slices] Radius of a correction: a mark on a slice tells of the next one.
     double radius_spacings = heuristic("starts.radius_spacings", 2.0);
     /// [voxels] A tag distance beyond this starts from the closing instead.

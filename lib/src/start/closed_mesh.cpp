@@ -82,7 +82,7 @@ ClosedMesh close_holes(const TriangleMesh& mesh) {
             } while (path.size() > 1);
         }
     const double area = area_of(mesh, 0);
-    if (closed.holes > 0 && area > 0) closed.cap_share = area_of(closed.mesh, given) / area;
+    if (closed.holes > 0 && area > 0) closed.cap_fraction = area_of(closed.mesh, given) / area;
     return closed;
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 using openvdb::Coord;
 
-constexpr std::size_t kMostVoxels = 24u << 20;
+constexpr std::size_t kMaxVoxels = 24u << 20;
 
 struct Spread {
     double middle = 0, width = 0;  // median, and the standard deviation that the median deviation tells of
@@ -110,13 +110,13 @@ public:
                              double(all[std::size_t(0.005 * double(all.size() - 1))]);
         if (!(range > 0)) return "the image is the same everywhere";
         inside_ = spread_of(inside);
-        inside_.width = std::max(inside_.width, kGrow.least_spread * range);
+        inside_.width = std::max(inside_.width, kGrow.min_spread * range);
         Spread surface = spread_of(shell);
-        surface.width = std::max({surface.width, inside_.width, 2 * kGrow.least_spread * range});
+        surface.width = std::max({surface.width, inside_.width, 2 * kGrow.min_spread * range});
         const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) {
             return std::abs(v - surface.middle) > kGrow.unlike * surface.width;
         });
-        if (double(unlike) > kGrow.unlike_share * double(inside.size()))
+        if (double(unlike) > kGrow.unlike_fraction * double(inside.size()))
             return "the image inside it is not as it is on its surface";
         return {};
     }
@@ -214,7 +214,7 @@ private:
         });
         std::sort(near.begin(), near.end());
         const double away = std::abs(double(image_[n]) - inside_.middle) / (kGrow.speed_spreads * inside_.width);
-        const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kGrow.least_speed);
+        const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kGrow.min_speed);
         double time = near[0] + slowness, sum = near[0], squares = near[0] * near[0];
         for (int m = 1; m < 3 && near[m] < time; ++m) {
             sum += near[m];
@@ -284,7 +284,7 @@ FloatGridPtr level_set_of(const Box& box, std::vector<float> region, const Domai
 GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigma, const RunContext& run) {
     const Domain domain = domain_of(start);
     const openvdb::CoordBBox active = start.evalActiveVoxelBoundingBox();
-    int pad = std::max(int(kGrow.least_pad), int(active.dim()[active.dim().maxIndex()]));
+    int pad = std::max(int(kGrow.min_pad), int(active.dim()[active.dim().maxIndex()]));
     for (;; pad *= 2) {
         Coord lo, hi;
         for (int a = 0; a < 3; ++a) {
@@ -292,7 +292,7 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
             hi[a] = std::min(domain.max[a], active.max()[a] + pad);
         }
         const Box box(lo, hi);
-        if (box.count() > kMostVoxels) return {nullptr, "too large a part of the image to look at"};
+        if (box.count() > kMaxVoxels) return {nullptr, "too large a part of the image to look at"};
         std::vector<float> values(box.count()), level(box.count());
         image.sample(domain, {lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}, values.data());
         image.release();

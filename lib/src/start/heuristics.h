@@ -10,17 +10,17 @@ namespace covol {
 /// Trans. Pattern Anal. Mach. Intell. 17(2), 1995, has the front; where it stops is ours.
 struct GrowHeuristics {
     /// [voxels] Around the start that are looked at first.
-    double least_pad = heuristic("grow.least_pad", 12);
+    double min_pad = heuristic("grow.min_pad", 12);
     /// [of the image's range] Differences below it say nothing.
-    double least_spread = heuristic("grow.least_spread", 0.01);
+    double min_spread = heuristic("grow.min_spread", 0.01);
     /// [spreads of the start's surface] A voxel inside that differs more is not like it.
     double unlike = heuristic("grow.unlike", 4);
     /// [share of the inside] More of them, and the start holds something already.
-    double unlike_share = heuristic("grow.unlike_share", 0.03);
+    double unlike_fraction = heuristic("grow.unlike_fraction", 0.03);
     /// [spreads] A difference at which the front's speed is a half.
     double speed_spreads = heuristic("grow.speed_spreads", 2);
     /// [of the speed where nothing differs] The front's, at least.
-    double least_speed = heuristic("grow.least_speed", 1e-4);
+    double min_speed = heuristic("grow.min_speed", 1e-4);
     /// [of the best front's edge] A start with as much lies at an edge.
     double at_hand = heuristic("grow.at_hand", 0.5);
     /// [spreads] A mean change across the front that noise does not make.
@@ -39,7 +39,7 @@ COVOL_HEURISTICS GrowHeuristics kGrow{};
 /// A start from seeds: start_from_seeds.cpp.
 struct SeedsHeuristics {
     /// [seeds] Whose links are searched one by one: time.
-    std::size_t most_joined = heuristic("seeds.most_joined", 2000);
+    std::size_t max_joined = heuristic("seeds.max_joined", 2000);
 };
 COVOL_HEURISTICS SeedsHeuristics kSeeds{};
 

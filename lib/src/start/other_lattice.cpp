@@ -50,7 +50,7 @@ private:
 };
 
 Sampler between_voxels(const FloatGrid& grid, const ToSource& to_source) {
-    constexpr openvdb::Index64 kMostCopied = 24 * 24 * 24;
+    constexpr openvdb::Index64 kMaxCopied = 24 * 24 * 24;
     return [&](const Coord& lo, const Coord& hi, float* values) {
         const auto for_all = [&](const auto& sample) {
             for (int i = lo.x(); i <= hi.x(); ++i)
@@ -58,7 +58,7 @@ Sampler between_voxels(const FloatGrid& grid, const ToSource& to_source) {
                     for (int k = lo.z(); k <= hi.z(); ++k) *values++ = sample(to_source(i, j, k));
         };
         const openvdb::CoordBBox box = to_source.box(lo, hi);
-        if (box.volume() <= kMostCopied) {
+        if (box.volume() <= kMaxCopied) {
             const DenseBlock block(grid, box);
             for_all([&, first = box.min().asVec3d()](const openvdb::Vec3d& at) { return block.sample(at - first); });
         } else {

@@ -73,47 +73,47 @@ private:
 };
 
 void SampledLeaves::sample(const Coord& origin, Entry& entry) const {
-    if ((entry.asked & kWholeLeaf) != 0) {
+    if ((entry.requested & kWholeLeaf) != 0) {
         sample_(origin, origin.offsetBy(kEnd), entry.values->data());
         entry.known = kWholeLeaf | (kWholeLeaf - 1);
         return;
     }
     std::array<float, kLeafDim * kLeafDim> layer;
     for (int axis = 0; axis < 3; ++axis) {
-        if ((entry.asked & ~entry.known & 1U << axis) == 0) continue;
+        if ((entry.requested & ~entry.known & 1U << axis) == 0) continue;
         const CoordBBox box = first_layer(axis);
         sample_(origin + box.min(), origin + box.max(), layer.data());
         const float* next = layer.data();
         for_each_in(box, [&](int at) { (*entry.values)[at] = *next++; });
     }
-    entry.known |= entry.asked;
+    entry.known |= entry.requested;
 }
 
-void SampledLeaves::ask(const std::vector<Wish>& wishes) {
+void SampledLeaves::request(const std::vector<Wish>& wishes) {
     std::vector<std::pair<const Coord, Entry>*> due;
     for (const Wish& wish : wishes) {
         const auto entry = leaves_.try_emplace(wish.origin).first;
-        const bool is_due = entry->second.asked != entry->second.known;
-        entry->second.asked |= wish.parts;
-        if (!is_due && (entry->second.asked & ~entry->second.known) != 0) due.push_back(&*entry);
+        const bool is_due = entry->second.requested != entry->second.known;
+        entry->second.requested |= wish.parts;
+        if (!is_due && (entry->second.requested & ~entry->second.known) != 0) due.push_back(&*entry);
     }
     tbb::parallel_for(std::size_t(0), due.size(), [&](std::size_t n) {
         Entry& entry = due[n]->second;
         if (entry.values == nullptr) entry.values = std::make_unique<Values>();
         sample(due[n]->first, entry);
-        entry.asked = entry.known;
+        entry.requested = entry.known;
     });
 }
 
-void SampledLeaves::ask_with_next(const std::vector<Coord>& leaves) {
+void SampledLeaves::request_with_next(const std::vector<Coord>& leaves) {
     std::vector<Wish> wishes;
     for (const Coord& o : leaves)
         for (int n = 0; n < 8; ++n) wishes.push_back({WithNext::at(o, n), n == 0 ? kWholeLeaf : kFirstLayers});
-    ask(wishes);
+    request(wishes);
 }
 
 std::vector<Coord> SampledLeaves::crossed_by(const std::vector<Coord>& leaves) {
-    ask_with_next(leaves);
+    request_with_next(leaves);
     std::vector<char> crosses(leaves.size());
     tbb::parallel_for(std::size_t(0), leaves.size(),
                       [&](std::size_t n) { crosses[n] = WithNext(*this, leaves[n]).is_mixed(); });
@@ -176,12 +176,12 @@ Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
     std::vector<Wish> wishes;
     for (const Coord& o : beside)
         if (leaves_.find(o) == leaves_.end()) wishes.push_back({o, kOneLayer});
-    ask(wishes);
+    request(wishes);
     std::vector<Wish> others;  // that another part of the surface passes
     for (const Coord& o : beside)
         if (const Entry& entry = leaves_.at(o); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
             others.push_back({o, kWholeLeaf});
-    ask(others);
+    request(others);
     return [this](const Coord& lo, const Coord&, float* values) {
         const Entry& entry = leaves_.at(lo);
         const Values& known = *entry.values;

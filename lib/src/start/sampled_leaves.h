@@ -35,7 +35,7 @@ public:
 private:
     using Values = std::array<float, kLeafSize>;
     struct Entry {
-        LeafParts known = 0, asked = 0;
+        LeafParts known = 0, requested = 0;
         std::unique_ptr<Values> values;
         [[nodiscard]] bool has_one_sign() const;
     };
@@ -44,9 +44,9 @@ private:
         LeafParts parts;
     };
     class WithNext;
-    void ask(const std::vector<Wish>& wishes);
+    void request(const std::vector<Wish>& wishes);
     void sample(const Coord& origin, Entry& entry) const;
-    void ask_with_next(const std::vector<Coord>& leaves);
+    void request_with_next(const std::vector<Coord>& leaves);
 
     const Sampler& sample_;
     std::map<Coord, Entry> leaves_;

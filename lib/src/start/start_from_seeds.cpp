@@ -19,7 +19,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 /// Half of the longest link of the shortest tree that joins the seeds (Prim).
 double joining_radius(const std::vector<Vec3>& seeds) {
-    if (seeds.size() > kSeeds.most_joined) {
+    if (seeds.size() > kSeeds.max_joined) {
         double widest = 0;  // dense paint: neighbours are close, patches may stay apart
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));

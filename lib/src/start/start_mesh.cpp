@@ -77,16 +77,16 @@ void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh
 
 /// The mesh with its holes closed, which a warning tells. @throws Error InvalidInput where it is hardly closed at all.
 TriangleMesh closed_or_refused(const TriangleMesh& mesh, const RunContext& run) {
-    constexpr double kMostCaps = 0.5;
+    constexpr double kMaxCaps = 0.5;
     detail::ClosedMesh closed = detail::close_holes(mesh);
     if (closed.holes == 0) return mesh;
     const std::string holes = std::to_string(closed.holes) + (closed.holes > 1 ? " holes" : " hole");
-    const std::string share = detail::number(std::round(1000 * closed.cap_share) / 10) + " % of its area";
-    if (closed.cap_share > kMostCaps)
+    const std::string fraction = detail::number(std::round(1000 * closed.cap_fraction) / 10) + " % of its area";
+    if (closed.cap_fraction > kMaxCaps)
         throw Error(Errc::InvalidInput, "the mesh of the start is not closed: expected one with an inside, got " +
-                                            holes + " that would take " + share +
+                                            holes + " that would take " + fraction +
                                             " to close; close it in the program that made it");
-    run.warn("the mesh of the start is not closed: " + holes + ", closed by " + share +
+    run.warn("the mesh of the start is not closed: " + holes + ", closed by " + fraction +
              " between rim and centre; look at the result there");
     return std::move(closed.mesh);
 }

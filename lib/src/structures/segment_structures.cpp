@@ -22,11 +22,11 @@
 namespace covol {
 namespace {
 
-constexpr double kRightTo = 0.25;          // voxels of the image
-constexpr double kWeakLine = 0.93;         // 1 - g where the image is 1.2 times as bright as the band's median
-constexpr double kLargeOverlap = 0.02;     // of the smaller structure
-constexpr double kLeastCorrelation = 0.5;  // of brightness along a surface, from frame to frame
-constexpr int kBesideBand = 5;             // voxels beside the surface's band that tell how steep slopes are here
+constexpr double kRightTo = 0.25;        // voxels of the image
+constexpr double kWeakLine = 0.93;       // 1 - g where the image is 1.2 times as bright as the band's median
+constexpr double kLargeOverlap = 0.02;   // of the smaller structure
+constexpr double kMinCorrelation = 0.5;  // of brightness along a surface, from frame to frame
+constexpr int kBesideBand = 5;           // voxels beside the surface's band that tell how steep slopes are here
 
 /// Where edges are looked up for a surface that was found without them.
 FloatGridPtr around(const FloatGrid& surface) {
@@ -39,12 +39,12 @@ FloatGridPtr around(const FloatGrid& surface) {
 }
 
 /// How far from a mark the surface that bends least is right to a fourth of a voxel of the image: at a distance d it is
-/// off by kGuide.share_of_sagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area.
+/// off by kGuide.fraction_of_sagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area.
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
     const double voxel = image.geometry().smallest_spacing();
-    return std::max(std::sqrt(2 * radius * kRightTo * voxel / kGuide.share_of_sagitta), voxel);
+    return std::max(std::sqrt(2 * radius * kRightTo * voxel / kGuide.fraction_of_sagitta), voxel);
 }
 
 /// What belongs to the surface: as segment() measures it.
@@ -163,7 +163,7 @@ StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks
             Followed followed = last.look->follow(frame, own);
             marks[n].start = LevelSetStart{std::move(followed.u), true};
             motions[n] = followed.report;
-            if (followed.report.correlation < kLeastCorrelation)
+            if (followed.report.correlation < kMinCorrelation)
                 own.warn("the image around the surface is not what it was in the frame before (correlation " +
                          pipeline::number(std::round(100 * followed.report.correlation) / 100) +
                          "): it may have lost the structure; mark this frame");

@@ -14,8 +14,8 @@ namespace {
 using nlohmann::json;
 using act = StudyActions;
 
-constexpr std::size_t kMostKeyBytes = 100;
-constexpr int kMostWhole = 1 << 30;
+constexpr std::size_t kMaxKeyBytes = 100;
+constexpr int kMaxWhole = 1 << 30;
 
 using detail::refuse;
 
@@ -33,7 +33,7 @@ public:
     }
     [[nodiscard]] StudyId id(const char* name) const {
         const json& value = at(name);
-        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMostId)
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMaxId)
             refuse(std::string("'") + name + "': expected a number from 1");
         return value.get<StudyId>();
     }
@@ -48,10 +48,10 @@ public:
         return value.get<bool>();
     }
     /// From 0 to `most`.
-    [[nodiscard]] int whole(const char* name, int most) const {
+    [[nodiscard]] int whole(const char* name, int maximum) const {
         const json& value = at(name);
-        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t(most))
-            refuse(std::string("'") + name + "': expected a whole number from 0 to " + std::to_string(most));
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t(maximum))
+            refuse(std::string("'") + name + "': expected a whole number from 0 to " + std::to_string(maximum));
         return value.get<int>();
     }
     [[nodiscard]] double number(const char* name) const { return number_of(at(name), name); }
@@ -74,7 +74,7 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kMostId = std::uint64_t(1) << 53;  // what a browser counts exactly
+    static constexpr std::uint64_t kMaxId = std::uint64_t(1) << 53;  // what a browser counts exactly
 
     static double number_of(const json& value, const char* name) {
         if (!value.is_number() || !std::isfinite(value.get<double>()))
@@ -93,7 +93,7 @@ template <typename Enum>
 Enum word_of(const std::string& name, const std::string& word, const char* expected) {
     for (std::size_t n = 0; n < kWords<Enum>.size(); ++n)
         if (word == kWords<Enum>[n]) return Enum(n);
-    refuse("'" + name + "': expected " + expected + ", got '" + word.substr(0, kMostKeyBytes) + "'");
+    refuse("'" + name + "': expected " + expected + ", got '" + word.substr(0, kMaxKeyBytes) + "'");
 }
 
 MarkKind kind_of(const std::string& word) { return word_of<MarkKind>("kind", word, "surface, inside or outside"); }
@@ -268,7 +268,7 @@ struct Form<act::AddStroke> {
         stroke.radius = f.number("radius");
         if (f.has("axis")) {
             stroke.axis = f.whole("axis", 2);
-            stroke.at = f.whole("at", kMostWhole);
+            stroke.at = f.whole("at", kMaxWhole);
         }
         stroke.world = f.places("world");
         return {f.id("structure"), std::move(stroke)};
@@ -294,7 +294,7 @@ template <>
 struct Form<act::SetGuess> {
     static constexpr const char* word = "set_guess";
     static act::SetGuess read(const Fields& f) {
-        return {f.id("structure"), {f.text("path"), f.text("digest"), f.whole("label", kMostWhole)}};
+        return {f.id("structure"), {f.text("path"), f.text("digest"), f.whole("label", kMaxWhole)}};
     }
     static void write(const act::SetGuess& a, json& j) {
         j["structure"] = a.structure;
@@ -318,7 +318,7 @@ struct Form<act::AddLabels> {
         if (!labels.is_array()) refuse("'labels': expected a list of objects with 'label' and 'name'");
         for (const json& one : labels) {
             const Fields fields(one);
-            a.labels.push_back({fields.whole("label", kMostWhole), fields.text("name")});
+            a.labels.push_back({fields.whole("label", kMaxWhole), fields.text("name")});
         }
         return a;
     }
@@ -369,12 +369,12 @@ template <typename... Actions>
 StudyAction read_action(const std::string& word, const Fields& fields, const std::variant<Actions...>* /*types*/) {
     std::optional<StudyAction> found;
     ((word == Form<Actions>::word ? (found.emplace(Form<Actions>::read(fields)), true) : false) || ...);
-    if (!found) refuse("'do': no action is called '" + word.substr(0, kMostKeyBytes) + "'");
+    if (!found) refuse("'do': no action is called '" + word.substr(0, kMaxKeyBytes) + "'");
     return *std::move(found);
 }
 
 void require_key(const std::string& key) {
-    if (key.size() > kMostKeyBytes || !std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; }))
+    if (key.size() > kMaxKeyBytes || !std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; }))
         refuse("'key': expected at most 100 printable ASCII characters");
 }
 

@@ -13,14 +13,14 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kMostStructures = 10'000, kMostMarks = 1'000'000, kMostCorners = 100'000, kMostNameBytes = 200,
-                      kMostStrokes = 100'000, kMostPathBytes = 4096;
+constexpr std::size_t kMaxStructures = 10'000, kMaxMarks = 1'000'000, kMaxCorners = 100'000, kMaxNameBytes = 200,
+                      kMaxStrokes = 100'000, kMaxPathBytes = 4096;
 
 using detail::refuse;
 
 void require_name(const std::string& name) {
     if (name.empty()) refuse("a structure needs a name");
-    if (name.size() > kMostNameBytes) refuse("expected a name of at most " + std::to_string(kMostNameBytes) + " bytes");
+    if (name.size() > kMaxNameBytes) refuse("expected a name of at most " + std::to_string(kMaxNameBytes) + " bytes");
     const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 127; };
     if (std::any_of(name.begin(), name.end(), is_control)) refuse("a name holds no control characters");
 }
@@ -56,21 +56,21 @@ struct StudyHistory::Planning {
                 refuse("a mark lies outside of the image");
     }
     static void require_file(const std::string& path, const std::string& digest) {
-        if (path.empty() || path.size() > kMostPathBytes || path.find('\0') != std::string::npos)
-            refuse("expected a path of 1 to " + std::to_string(kMostPathBytes) + " bytes");
-        if (digest.empty() || digest.size() > kMostNameBytes) refuse("expected a digest of the file");
+        if (path.empty() || path.size() > kMaxPathBytes || path.find('\0') != std::string::npos)
+            refuse("expected a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes");
+        if (digest.empty() || digest.size() > kMaxNameBytes) refuse("expected a digest of the file");
     }
     void require_outline(const StudyOutline& outline) const {
         const std::size_t fewest = outline.closed ? 3 : 2;
         if (outline.world.size() < fewest)
             refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
                    std::to_string(outline.world.size()));
-        if (outline.world.size() > kMostCorners) refuse("an outline has too many corners");
+        if (outline.world.size() > kMaxCorners) refuse("an outline has too many corners");
         if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at)) refuse("an outline lies on no slice");
         for (const Vec3& corner : outline.world) require_inside(corner);
     }
     void add_outline(StudyStructure& structure, const StudyOutline& outline) {
-        if (structure.outlines.size() >= kMostMarks) refuse("'" + structure.name + "' has too many outlines");
+        if (structure.outlines.size() >= kMaxMarks) refuse("'" + structure.name + "' has too many outlines");
         structure.outlines.push_back(outline);
         structure.outlines.back().id = next++;
     }
@@ -85,7 +85,7 @@ struct StudyHistory::Planning {
         return {before, after, place};
     }
     [[nodiscard]] Change added(std::shared_ptr<StudyStructure> structure) {
-        if (history.state_.size() >= kMostStructures) refuse("too many structures");
+        if (history.state_.size() >= kMaxStructures) refuse("too many structures");
         structure->id = next++;
         return {nullptr, std::move(structure), history.state_.size()};
     }
@@ -143,7 +143,7 @@ struct StudyHistory::Planning {
     Changes operator()(const StudyActions::AddMark& a) {
         require_inside(a.world);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (s.marks.size() >= kMostMarks) refuse("'" + s.name + "' has too many marks");
+            if (s.marks.size() >= kMaxMarks) refuse("'" + s.name + "' has too many marks");
             s.marks.push_back({next++, a.kind, a.world});
         })};
     }
@@ -158,8 +158,7 @@ struct StudyHistory::Planning {
         if (count + a.outlines.size() == 0) refuse("expected marks, got none");
         for (const StudyOutline& outline : a.outlines) require_outline(outline);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (count > kMostMarks - std::min(s.marks.size(), kMostMarks))
-                refuse("'" + s.name + "' has too many marks");
+            if (count > kMaxMarks - std::min(s.marks.size(), kMaxMarks)) refuse("'" + s.name + "' has too many marks");
             for (const auto& [kind, places] : lists)
                 for (const Vec3& place : *places) s.marks.push_back({next++, kind, place});
             for (const StudyOutline& outline : a.outlines) add_outline(s, outline);
@@ -195,10 +194,10 @@ struct StudyHistory::Planning {
     }
     Changes operator()(const StudyActions::AddStroke& a) {
         if (a.stroke.world.empty()) refuse("a stroke needs a place");
-        if (a.stroke.world.size() > kMostCorners) refuse("a stroke has too many corners");
+        if (a.stroke.world.size() > kMaxCorners) refuse("a stroke has too many corners");
         for (const Vec3& corner : a.stroke.world) require_inside(corner);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (s.strokes.size() >= kMostStrokes) refuse("'" + s.name + "' has too many strokes");
+            if (s.strokes.size() >= kMaxStrokes) refuse("'" + s.name + "' has too many strokes");
             s.strokes.push_back(a.stroke);
             s.strokes.back().id = next++;
             detail::require_paintable(s, history.image_);
@@ -223,7 +222,7 @@ struct StudyHistory::Planning {
     Changes operator()(const StudyActions::AddLabels& a) {
         require_file(a.path, a.digest);
         if (a.labels.empty()) refuse("expected labels, got none");
-        if (a.labels.size() > kMostStructures - history.state_.size()) refuse("too many structures");
+        if (a.labels.size() > kMaxStructures - history.state_.size()) refuse("too many structures");
         Changes changes;
         std::set<std::string> names;
         for (const auto& one : a.labels) {
@@ -241,8 +240,8 @@ struct StudyHistory::Planning {
         return changes;
     }
     Changes operator()(const StudyActions::SetOptions& a) {
-        const auto is_number = [](const std::optional<double>& value, double least, double most) {
-            return !value || (*value >= least && *value <= most);
+        const auto is_number = [](const std::optional<double>& value, double minimum, double maximum) {
+            return !value || (*value >= minimum && *value <= maximum);
         };
         constexpr double kSmallest = std::numeric_limits<double>::min(), kLargest = std::numeric_limits<double>::max();
         if (!is_number(a.options.voxel_size, kSmallest, kLargest)) refuse("'voxel_size': expected a number > 0");

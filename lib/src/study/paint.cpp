@@ -14,8 +14,8 @@ namespace {
 
 using detail::refuse;
 
-constexpr double kMostVoxels = double(1 << 28);  // of the box around a structure's paint
-constexpr double kMostVisits = double(1 << 30);  // of voxels by a stroke: some seconds
+constexpr double kMaxVoxels = double(1 << 28);  // of the box around a structure's paint
+constexpr double kMaxVisits = double(1 << 30);  // of voxels by a stroke: some seconds
 constexpr int kMargin = 10;  // voxels around the paint: outlines are smoothed over 8, and there it has not ended
 
 /// A piece of a stroke's line.
@@ -163,10 +163,10 @@ void require_paintable(const StudyStructure& structure, const ImageGeometry& ima
     for (std::size_t n = 1; n < stroke.world.size(); ++n) length += distance(stroke.world[n - 1], stroke.world[n]);
     double visits = 0;
     // Before its pieces are made: of a very thin brush there would be very many.
-    if (length / stroke.radius > kMostVisits / 16) refuse("a stroke is too long for so thin a brush");
+    if (length / stroke.radius > kMaxVisits / 16) refuse("a stroke is too long for so thin a brush");
     each_piece(stroke, [&](const Piece& piece) { visits += 1 + voxels_in(box_around(piece, stroke, image)); });
-    if (visits > kMostVisits) refuse("a stroke covers too many voxels: take a smaller brush, or a shorter stroke");
-    if (const VoxelBox box = box_around(structure, image); box.max[0] >= box.min[0] && voxels_in(box) > kMostVoxels)
+    if (visits > kMaxVisits) refuse("a stroke covers too many voxels: take a smaller brush, or a shorter stroke");
+    if (const VoxelBox box = box_around(structure, image); box.max[0] >= box.min[0] && voxels_in(box) > kMaxVoxels)
         refuse("the paint of '" + structure.name +
                "' would span more than 268 million voxels: paint what lies far apart as two structures");
 }

@@ -28,7 +28,7 @@ using nlohmann::json;
 
 constexpr int kVersion = 1;
 constexpr const char* kJournal = "journal.jsonl";
-constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 32;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 32;
 
 [[noreturn]] void fail(Errc code, const fs::path& path, const std::string& why) {
     throw Error(code, "study: " + path.string() + ": " + why);
@@ -88,7 +88,7 @@ std::string read_text(const fs::path& path) {
     std::error_code none;
     const std::uintmax_t bytes = fs::file_size(path, none);
     if (none) fail(Errc::Io, path, "there is no study there");
-    if (bytes > kMostBytes) fail(Errc::InvalidInput, path, "it is larger than any journal");
+    if (bytes > kMaxBytes) fail(Errc::InvalidInput, path, "it is larger than any journal");
     std::ifstream file = open_regular_file(path.string());
     std::string text(std::size_t(bytes), '\0');
     file.read(text.data(), std::streamsize(bytes));

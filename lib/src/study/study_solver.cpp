@@ -125,7 +125,7 @@ struct StudySolver::State {
 
     State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,
           std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess)
-        : image(std::move(i)), site{image().geometry(), std::move(read_guess)}, told(std::move(t)), run(r) {
+        : image(std::move(i)), site{image().geometry(), std::move(read_guess)}, on_result(std::move(t)), run(r) {
         run.cancel = &cancel;
         set_options(std::move(o));
     }
@@ -162,18 +162,18 @@ struct StudySolver::State {
         StudyResult result;
         result.structure = job.structure->id;
         result.sequence = job.sequence;
-        const auto tell = [&](StudyResult::Stage stage) {
+        const auto publish = [&](StudyResult::Stage stage) {
             result.stage = stage;
-            told(result);
+            on_result(result);
         };
         result.message = missing(*job.structure);
         if (!result.message.empty()) {
             keep(result.structure, nullptr);
-            tell(StudyResult::Stage::Empty);
+            publish(StudyResult::Stage::Empty);
             return true;
         }
         const auto begin = std::chrono::steady_clock::now();
-        tell(StudyResult::Stage::Working);
+        publish(StudyResult::Stage::Working);
         Image pixels;
         const auto find = [&](const SegmentOptions& how, const Marks& marks, StudyResult::Stage stage) {
             RunContext own = run;
@@ -182,7 +182,7 @@ struct StudySolver::State {
                 if (now - last < std::chrono::milliseconds(200)) return;
                 last = now;
                 result.progress = fraction;
-                tell(StudyResult::Stage::Working);
+                publish(StudyResult::Stage::Working);
             };
             StructuresResult all = segment_structures(pixels, {marks}, {how, {}}, own);
             SegmentResult found = std::move(all.structures.front().result);
@@ -191,7 +191,7 @@ struct StudySolver::State {
             result.version = ++versions;
             result.seconds = seconds_since(begin);
             keep(result.structure, result.surface);
-            tell(stage);
+            publish(stage);
             result.surface.reset();
         };
         try {
@@ -220,10 +220,10 @@ struct StudySolver::State {
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) return false;
             result.message = error.what();
-            tell(StudyResult::Stage::Failed);
+            publish(StudyResult::Stage::Failed);
         } catch (const std::exception& error) {
             result.message = error.what();
-            tell(StudyResult::Stage::Failed);
+            publish(StudyResult::Stage::Failed);
         }
         return true;
     }
@@ -251,7 +251,7 @@ struct StudySolver::State {
     const StudySite site;
     SegmentOptions options;
     std::optional<double> automatic_voxel_size;
-    const std::function<void(const StudyResult&)> told;
+    const std::function<void(const StudyResult&)> on_result;
     RunContext run;
     std::atomic<bool> cancel{false};
     mutable std::mutex mutex;
@@ -265,10 +265,10 @@ struct StudySolver::State {
 };
 
 StudySolver::StudySolver(std::function<Image()> image, SegmentOptions options,
-                         std::function<void(const StudyResult&)> told, const RunContext& run,
+                         std::function<void(const StudyResult&)> on_result, const RunContext& run,
                          std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess)
-    : state_(
-          std::make_unique<State>(std::move(image), std::move(options), std::move(told), run, std::move(read_guess))) {
+    : state_(std::make_unique<State>(std::move(image), std::move(options), std::move(on_result), run,
+                                     std::move(read_guess))) {
     state_->worker = std::thread([state = state_.get()] { state->work(); });
 }
 

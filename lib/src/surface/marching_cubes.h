@@ -438,7 +438,7 @@ private:
     static int best_apex(const CubeLoop& loop, const std::array<std::uint32_t, 12>& ring, const Positions& positions) {
         int best = std::countr_zero(loop.apexes);
         if (loop.size == 3) return best;
-        float least = std::numeric_limits<float>::max();
+        float minimum = std::numeric_limits<float>::max();
         for (int apex = 0; apex < loop.size; ++apex) {
             if (!(loop.apexes >> apex & 1)) continue;
             float sum = 0;
@@ -447,8 +447,8 @@ private:
                     const float d = positions[ring[apex]][c] - positions[ring[(apex + step) % loop.size]][c];
                     sum += d * d;
                 }
-            if (sum < least) {
-                least = sum;
+            if (sum < minimum) {
+                minimum = sum;
                 best = apex;
             }
         }

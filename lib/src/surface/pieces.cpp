@@ -125,7 +125,7 @@ public:
 
     /// Of one sign, those that fewer than `least` points rest on, without the largest and what lies around everything,
     /// get the other sign. @return how many
-    std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t least) {
+    std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t minimum) {
         std::vector<Label> roots;
         for (Label n = 0; n < parents_.size(); ++n)
             if (parents_[n] == n && is_inside_[n] == inside && surface_[n] > 0) roots.push_back(n);
@@ -136,7 +136,7 @@ public:
         std::vector<char> goes(parents_.size(), 0);
         std::size_t count = 0;
         for (const Label n : roots) {
-            if (n == main || parents_[kAround] == n || resting[n] >= least) continue;
+            if (n == main || parents_[kAround] == n || resting[n] >= minimum) continue;
             goes[n] = 1;
             ++count;
         }
@@ -375,10 +375,10 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
     };
     for (const bool inside : {true, false}) {
         const ActivePieces pieces(level_set, inside);
-        std::int64_t most = 0;
-        for (const ActivePieces::Piece& piece : pieces.all()) most = std::max(most, piece.voxels);
+        std::int64_t maximum = 0;
+        for (const ActivePieces::Piece& piece : pieces.all()) maximum = std::max(maximum, piece.voxels);
         for (const ActivePieces::Piece& piece : pieces.all()) {
-            if (double(piece.voxels) > kPieces.small * double(most)) continue;
+            if (double(piece.voxels) > kPieces.small * double(maximum)) continue;
             CoordBBox box;
             pieces.for_voxels(piece,
                               [&](const Leaf& leaf, openvdb::Index at) { box.expand(leaf.offsetToGlobalCoord(at)); });
@@ -389,11 +389,12 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
     }
 }
 
-std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t least) {
+std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t minimum) {
     Regions regions(level_set);
-    const std::size_t pieces = regions.drop(true, points, least);
+    const std::size_t pieces = regions.drop(true, points, minimum);
     // A cavity in a piece that goes is one no more.
-    return pieces == 0 ? regions.drop(false, points, least) : pieces + Regions(level_set).drop(false, points, least);
+    return pieces == 0 ? regions.drop(false, points, minimum)
+                       : pieces + Regions(level_set).drop(false, points, minimum);
 }
 
 }  // namespace covol::detail

@@ -189,7 +189,7 @@ StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, doub
             [&](const StreamedMesh&, const detail::MeshPiece& piece) { writer->take(piece); });
         writer->finish();
     });
-    mesh_io::tell_of_origin(path, made.origin, options);
+    mesh_io::report_origin(path, made.origin, options);
     return made;
 }
 

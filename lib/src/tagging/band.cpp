@@ -35,8 +35,8 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
         report.leaks = closes_at(tag_distance + h);
     } else {
         // A thin body whose core a smaller D still finds is closed; without one there are only walls.
-        const auto has_core_at = [&](double share) {
-            return detail::tag(tube, float(share * tag_distance), seeds).has_core(h);
+        const auto has_core_at = [&](double fraction) {
+            return detail::tag(tube, float(fraction * tag_distance), seeds).has_core(h);
         };
         report.leaks = !has_core_at(0.85) && !has_core_at(0.7) && !has_core_at(0.55);
     }

@@ -13,11 +13,11 @@ struct TagDistanceHeuristics {
     /// [ratio] The same for a core that takes a large share of the cloud.
     double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
     /// [share of the cloud's area] Which is large.
-    double large_share = heuristic("tag_distance.large_share", 0.1);
+    double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
     /// [volumes of the most important core] A core that D has to hold.
-    double important_share = heuristic("tag_distance.important_share", 0.1);
+    double important_fraction = heuristic("tag_distance.important_fraction", 0.1);
     /// [share of the cloud's area] Less is pockets of a cloud without an inside.
-    double structure_share = heuristic("tag_distance.structure_share", 0.25);
+    double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
     /// [voxels] Of the tube on the first grid.
     std::int64_t coarse_voxels = heuristic("tag_distance.coarse_voxels", 200'000);
     /// [voxels] Of the tube on the last grid: time and memory.
@@ -30,7 +30,7 @@ COVOL_HEURISTICS TagDistanceHeuristics kTagDistance{};
 /// Tagged cores that are pockets: tagging.cpp.
 struct TaggingHeuristics {
     /// [enclosed volumes] A core that is less, grown by D, is a pocket.
-    double significant_share = heuristic("tagging.significant_share", 0.04);
+    double significant_fraction = heuristic("tagging.significant_fraction", 0.04);
     /// [D] A core that is thinner is a pocket.
     double significant_radius = heuristic("tagging.significant_radius", 0.25);
 };

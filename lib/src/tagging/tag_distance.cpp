@@ -48,7 +48,7 @@ Verdict judge(const Cores& analysis) {
         const double ratio = c.peak / std::max(c.saddle, 0.5);
         return c.peak >= 1.0 && (ratio >= kTagDistance.clear_ratio ||
                                  (ratio >= kTagDistance.significant_ratio &&
-                                  c.full_area() >= kTagDistance.large_share * cloud_area(c.saddle)));
+                                  c.full_area() >= kTagDistance.large_fraction * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)
@@ -56,13 +56,13 @@ Verdict judge(const Cores& analysis) {
     if (!primary) return verdict;
     double area = 0;
     for (const Core& c : analysis.cores) {
-        if (!is_significant(c) || c.full_volume() < kTagDistance.important_share * primary->full_volume()) continue;
+        if (!is_significant(c) || c.full_volume() < kTagDistance.important_fraction * primary->full_volume()) continue;
         verdict.saddle = std::max(verdict.saddle, c.saddle);
         area += c.full_area();
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    return area < kTagDistance.structure_share * cloud_area(verdict.saddle) ? Verdict{} : verdict;
+    return area < kTagDistance.structure_fraction * cloud_area(verdict.saddle) ? Verdict{} : verdict;
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ bool is_structure(double core, double enclosed, double distance) {
     constexpr double kBall = 4.0 / 3.0 * std::numbers::pi;
     const double radius = std::cbrt(core / kBall);
     return radius > kTagging.significant_radius * distance &&
-           kBall * std::pow(radius + distance, 3) > kTagging.significant_share * enclosed;
+           kBall * std::pow(radius + distance, 3) > kTagging.significant_fraction * enclosed;
 }
 
 std::int64_t voxels_of(const LeafColumns::Piece& run) { return std::int64_t(run.end - run.begin) * kLeafSize; }

@@ -64,11 +64,11 @@ std::vector<Sample> sample(const Triangles& triangles) {
     std::vector<double> area;
     for (const Triangle& t : triangles) area.push_back(std::sqrt(t.squared_area()));
     std::discrete_distribution<std::size_t> pick(area.begin(), area.end());
-    std::uniform_real_distribution<double> share(0, 1);
+    std::uniform_real_distribution<double> fraction(0, 1);
     std::vector<Sample> found;
     for (std::size_t n = 0; n < samples; ++n) {
         const Triangle& t = triangles[pick(random)];
-        const double root = std::sqrt(share(random)), v = share(random);
+        const double root = std::sqrt(fraction(random)), v = fraction(random);
         found.push_back({t[0] + root * (1 - v) * (t[1] - t[0]) + root * v * (t[2] - t[0]), unit_normal(t)});
     }
     return found;

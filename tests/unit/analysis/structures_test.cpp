@@ -135,10 +135,10 @@ TEST_CASE("Walls beside each other close no more than the gap between them") {
     const FloatGridPtr b = extract_surface(*start_from_box(space(), {{0.6 * kH, -6, -6}, {6, 6, 4}}));
     const auto [surfaces, report] = separate({{"a", a}, {"b", b}});
     // Each grows by half the slit, but for a strip along the rim, less than a voxel wide, that rounds off.
-    const double most = 0.3 * kH * 12 * 10, least = most - 0.3 * kH * 2 * (12 + 10) * kH;
+    const double maximum = 0.3 * kH * 12 * 10, minimum = maximum - 0.3 * kH * 2 * (12 + 10) * kH;
     for (const double growth : {volume(*surfaces[0]) - volume(*a), volume(*surfaces[1]) - volume(*b)}) {
-        CHECK(growth < most);
-        CHECK(growth > least);
+        CHECK(growth < maximum);
+        CHECK(growth > minimum);
     }
     for (const FloatGridPtr& grid : surfaces)
         for (const auto& v : extract_mesh(*grid).vertices) CHECK(v[2] < 4 + 0.15 * kH);
@@ -189,13 +189,13 @@ TEST_CASE("Three balls part along a triple line, in any order, with the same bit
 
 TEST_CASE("A solid inside another is carved out of it, whatever the order") {
     const Ball outer{{0, 0, 0}, 9}, inner{{2, 0, 0}, 4}, core{{2, 0, 0}, 1.6};
-    const double whole = volume(*ball(outer)), middle = volume(*ball(inner)), least = volume(*ball(core));
+    const double whole = volume(*ball(outer)), middle = volume(*ball(inner)), minimum = volume(*ball(core));
     const auto [surfaces, report] = separate({{"outer", ball(outer)}, {"inner", ball(inner)}, {"core", ball(core)}});
     CHECK(report.overlaps.size() == 3);
     for (const StructureOverlap& overlap : report.overlaps) CHECK(overlap.inner == overlap.b);
     CHECK(volume(*surfaces[0]) == Approx(whole - middle).epsilon(0.003));
-    CHECK(volume(*surfaces[1]) == Approx(middle - least).epsilon(0.003));
-    CHECK(volume(*surfaces[2]) == Approx(least).epsilon(0.003));
+    CHECK(volume(*surfaces[1]) == Approx(middle - minimum).epsilon(0.003));
+    CHECK(volume(*surfaces[2]) == Approx(minimum).epsilon(0.003));
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
     CHECK(common_voxels(*surfaces[1], *surfaces[2]) == 0);
     const SeparateResult turned = separate({{"core", ball(core)}, {"outer", ball(outer)}, {"inner", ball(inner)}});

@@ -114,12 +114,12 @@ TEST_CASE("file_set: without publish() all is as before") {
 TEST_CASE("file_set: people see the paths that they gave") {
     const Scratch folder;
     FileSet set;
-    std::string said;
+    std::string cleaned;
     set.write(folder.path("a"), [&](const std::string& to) {
-        said = set.shown(to + ": odd, " + to);
+        cleaned = set.shown(to + ": odd, " + to);
         std::ofstream(to) << "a";
     });
-    CHECK(said == folder.path("a") + ": odd, " + folder.path("a"));
+    CHECK(cleaned == folder.path("a") + ": odd, " + folder.path("a"));
     CHECK(set.shown("nothing of it") == "nothing of it");
 }
 
@@ -364,18 +364,18 @@ TEST_CASE("file_set: a lock of another program is waited for, and told; then it 
     folder.write("a", "old");
     const int held = ::open(root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     REQUIRE(::flock(held, LOCK_EX) == 0);
-    std::vector<std::string> said;
+    std::vector<std::string> cleaned;
     std::atomic<bool> cancel = false;
     RunContext run;
     run.cancel = &cancel;
     run.log = [&](LogLevel level, const std::string& line) {
         CHECK(level == LogLevel::Info);
-        said.push_back(line);
+        cleaned.push_back(line);
     };
     const std::string why = message_of([&] { detail::FolderLock(root, run, std::chrono::milliseconds(1200)); });
     CHECK(why.find("has had a lock (flock) on this folder for 1 s") != std::string::npos);
-    REQUIRE(said.size() == 1);
-    CHECK(said.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
+    REQUIRE(cleaned.size() == 1);
+    CHECK(cleaned.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
     run.log = [&](LogLevel, const std::string&) { cancel = true; };
     CHECK(code_of([&] { wait_for_folder(root, run); }) == Errc::Cancelled);
     cancel = false;

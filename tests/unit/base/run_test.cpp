@@ -35,14 +35,14 @@ TEST_CASE("with_threads bounds the loops inside it and nothing else") {
         run.threads = threads;
         with_threads(run, [&] {
             CHECK(width() == threads);
-            std::atomic<int> busy = 0, most = 0;
+            std::atomic<int> busy = 0, maximum = 0;
             tbb::parallel_for(0, 1000, [&](int) {
                 const int now = ++busy;
-                for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
+                for (int seen = maximum; seen < now && !maximum.compare_exchange_weak(seen, now);) {
                 }
                 --busy;
             });
-            CHECK(most <= threads);
+            CHECK(maximum <= threads);
         });
         CHECK(width() == outside);
     }

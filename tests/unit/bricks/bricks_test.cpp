@@ -39,7 +39,7 @@ Image ball_image() {
 int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridPtr>& states) {
     states.assign(plan.bricks.size(), nullptr);
     for (int sweep = 1;; ++sweep) {
-        REQUIRE(sweep <= plan.options.most_sweeps);
+        REQUIRE(sweep <= plan.options.max_sweeps);
         const std::vector<FloatGridPtr> before = states;
         const BrickStates known = [&](std::size_t n) { return before[n]; };
         bool moved = false;
@@ -54,7 +54,7 @@ int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridP
 
 /// Largest difference where both are near their surfaces, voxels; and how many voxels were compared.
 struct Apart {
-    double most = 0;
+    double maximum = 0;
     std::int64_t count = 0;
 };
 Apart apart(const FloatGrid& a, const FloatGrid& b) {
@@ -63,7 +63,7 @@ Apart apart(const FloatGrid& a, const FloatGrid& b) {
     const auto at = b.getConstAccessor();
     for (auto value = a.cbeginValueOn(); value; ++value) {
         if (std::abs(*value) > h) continue;
-        result.most = std::max(result.most, std::abs(*value - double(at.getValue(value.getCoord()))) / h);
+        result.maximum = std::max(result.maximum, std::abs(*value - double(at.getValue(value.getCoord()))) / h);
         ++result.count;
     }
     return result;
@@ -82,7 +82,7 @@ TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenl
     const Domain coarse = make_domain({{-60, -50, -40}, {70, 61, 53}}, 2.0);
     const FloatGridPtr ball = start_from_sphere(coarse, {3, 4, 5}, 30);
     BrickOptions options;
-    options.most_voxels = 40000;
+    options.max_voxels = 40000;
     const std::vector<Brick> bricks = bricks::split(fine, *ball, options);
     REQUIRE(bricks.size() > 8);
     std::int64_t voxels = 0, band = 0;
@@ -91,8 +91,8 @@ TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenl
         const Index3 size = brick.core.size();
         voxels += std::int64_t(size[0]) * size[1] * size[2];
         band += brick.active_voxels;
-        CHECK(brick.active_voxels <= options.most_voxels);
-        CHECK(brick.active_voxels > options.most_voxels / 8);
+        CHECK(brick.active_voxels <= options.max_voxels);
+        CHECK(brick.active_voxels > options.max_voxels / 8);
         for (int a = 0; a < 3; ++a) {
             CHECK((brick.core.min[a] == fine.min[a] || brick.core.min[a] % 8 == 0));
             CHECK((brick.core.max[a] == fine.max[a] || (brick.core.max[a] + 1) % 8 == 0));
@@ -117,7 +117,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     const SegmentResult whole = segment(image, points, from_coarse);
     BrickJob job(image, points, options, {});
     BrickOptions bricks;
-    bricks.most_voxels = 30000;
+    bricks.max_voxels = 30000;
     const BrickPlan plan = job.plan(bricks);
     REQUIRE(plan.bricks.size() >= 4);
     std::vector<FloatGridPtr> states;
@@ -130,7 +130,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     CHECK(joined.surface->transform() == whole.surface->transform());
     const Apart difference = apart(*joined.surface, *whole.surface);
     CHECK(difference.count > 20000);
-    CHECK(difference.most < 0.05);
+    CHECK(difference.maximum < 0.05);
     // Errors against the true ball, at the bricks' faces and away from them.
     double on = 0, off = 0;
     for (auto value = joined.surface->cbeginValueOn(); value; ++value) {
@@ -142,8 +142,8 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
         for (const Brick& brick : plan.bricks)
             for (int a = 0; a < 3; ++a)
                 near = near || (brick.core.min[a] != plan.domain.min[a] && std::abs(at[a] - brick.core.min[a]) <= 2);
-        double& most = near ? on : off;
-        most = std::max(most, error);
+        double& maximum = near ? on : off;
+        maximum = std::max(maximum, error);
     }
     CHECK(on < 1.1 * off);
 }
@@ -156,7 +156,7 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     options.without_fields = true;
     const BrickJob one(image, points, options, {});
     BrickOptions bricks;
-    bricks.most_voxels = 30000;
+    bricks.max_voxels = 30000;
     const BrickPlan plan = one.plan(bricks);
     std::vector<FloatGridPtr> states;
     solve_all(one, plan, states);
@@ -165,7 +165,7 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     const SegmentResult mesh = with.join(plan, known), lean = without.join(plan, known, true);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.u == nullptr);
-    CHECK(apart(*mesh.surface, *lean.surface).most < 1e-5);  // rounding, for each brick has its own corner
+    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);  // rounding, for each brick has its own corner
     CHECK(lean.report.surface.genus == 0);
     CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
     CHECK(lean.report.fit.mean == Approx(mesh.report.fit.mean).margin(0.01));
@@ -179,13 +179,13 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     options.model = Model::Paper;
     BrickJob job(image, points, options, {});
     BrickOptions bricks;
-    bricks.most_voxels = 30000;
+    bricks.max_voxels = 30000;
     const BrickPlan plan = job.plan(bricks);
     const BrickStates none = [](std::size_t) { return FloatGridPtr(); };
     const SolvedBrick once = job.solve(plan, 1, none), again = job.solve(plan, 1, none);
     CHECK(once.stop_reason == StopReason::Steady);
     CHECK(once.steps > 0);
-    CHECK(apart(*once.state, *again.state).most == 0);
+    CHECK(apart(*once.state, *again.state).maximum == 0);
     CHECK(measure_seams(plan, 1, none) > 1);  // nothing is known yet
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }
@@ -198,14 +198,14 @@ TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
     const SegmentResult whole = reconstruct(points, options);
     BrickJob job(points, options, {});
     BrickOptions bricks;
-    bricks.most_voxels = 30000;
+    bricks.max_voxels = 30000;
     const BrickPlan plan = job.plan(bricks);
     REQUIRE(plan.bricks.size() >= 4);
     CHECK_FALSE(plan.has_sweeps);
     std::vector<FloatGridPtr> states;
     CHECK(solve_all(job, plan, states) == 1);
     const SegmentResult joined = job.join(plan, [&](std::size_t n) { return states[n]; });
-    CHECK(apart(*joined.surface, *whole.surface).most == 0);
+    CHECK(apart(*joined.surface, *whole.surface).maximum == 0);
     CHECK(joined.mesh.triangles.size() == whole.mesh.triangles.size());
     CHECK(joined.report.surface.volume == whole.report.surface.volume);
 }
@@ -223,7 +223,7 @@ TEST_CASE("bricks tell of a mark that went astray, as a job in one piece does") 
     options.without_mesh = true;
     BrickJob job(image, points, options, {});
     BrickOptions bricks;
-    bricks.most_voxels = 60000;
+    bricks.max_voxels = 60000;
     const BrickPlan plan = job.plan(bricks);
     std::vector<FloatGridPtr> states;
     solve_all(job, plan, states);

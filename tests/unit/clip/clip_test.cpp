@@ -46,9 +46,9 @@ struct Cut {
     std::string name;
     Vec3 spacing;
     double h;
-    double share;  // of the body's extent along the cut axis that is left
-    bool two;      // faces of two axes
-    bool turned;   // the image's axes point the other way
+    double fraction;  // of the body's extent along the cut axis that is left
+    bool two;         // faces of two axes
+    bool turned;      // the image's axes point the other way
 };
 
 /// A body around the origin's neighbourhood in an image whose faces leave a share of it.
@@ -67,7 +67,7 @@ Scene scene_of(const Cut& cut, const Vec3& radii) {
     for (int a = 0; a < 3; ++a) {
         const bool is_cut = a == 2 || (cut.two && a == 0);
         // Two deep cuts would leave a sliver.
-        const double left = a == 2 ? cut.share : std::max(cut.share, 0.5);
+        const double left = a == 2 ? cut.fraction : std::max(cut.fraction, 0.5);
         const double low =
             is_cut ? -radii[a] + 2 * radii[a] * (1 - left) : -radii[a] - 5 * cut.spacing[a] + off[a] * cut.spacing[a];
         const int n = int(std::ceil((radii[a] + 5 * cut.spacing[a] - low) / cut.spacing[a]));
@@ -121,13 +121,13 @@ double area_at(const TriangleMesh& mesh, double z, double tolerance) {
 
 std::vector<Cut> cuts() {
     std::vector<Cut> all;
-    for (const double share : {0.2, 0.5, 0.8})
+    for (const double fraction : {0.2, 0.5, 0.8})
         for (const bool two : {false, true}) {
-            all.push_back({"isotropic", {1, 1, 1}, 1, share, two, false});
-            all.push_back({"turned axes", {1, 1, 1}, 1, share, two, true});
-            all.push_back({"thick slices", {0.8, 0.8, 1.75}, 0.8, share, two, false});
-            all.push_back({"slices 1:5", {1, 1, 5}, 1, share, two, false});
-            all.push_back({"coarse voxels", {1, 1, 3.5}, 3, share, two, false});
+            all.push_back({"isotropic", {1, 1, 1}, 1, fraction, two, false});
+            all.push_back({"turned axes", {1, 1, 1}, 1, fraction, two, true});
+            all.push_back({"thick slices", {0.8, 0.8, 1.75}, 0.8, fraction, two, false});
+            all.push_back({"slices 1:5", {1, 1, 5}, 1, fraction, two, false});
+            all.push_back({"coarse voxels", {1, 1, 3.5}, 3, fraction, two, false});
         }
     return all;
 }
@@ -139,7 +139,7 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
     for (const Vec3& radii : {Vec3{14, 14, 14}, Vec3{14, 11, 17}, Vec3{27, 19, 22}})
         for (const Cut& cut : cuts()) {
             const Scene scene = scene_of(cut, radii);
-            INFO(cut.name << ", " << 100 * cut.share << " % left" << (cut.two ? " along two axes" : "") << ", radii "
+            INFO(cut.name << ", " << 100 * cut.fraction << " % left" << (cut.two ? " along two axes" : "") << ", radii "
                           << radii[0] << " " << radii[1] << " " << radii[2]);
             const Clip clip = make_clip(scene.geometry);
             const WorldBox box = scene.geometry.world_box();
@@ -163,7 +163,7 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
             const Truth truth = measure_truth(scene);
             const double coarse = cut.h / std::min({radii[0], radii[1], radii[2]});
             // what chords lose of a ball, and more of its cap
-            const double chords = (cut.share < 0.5 ? 1.0 : 0.7) * coarse * coarse;
+            const double chords = (cut.fraction < 0.5 ? 1.0 : 0.7) * coarse * coarse;
             const double volume = m.volume / truth.volume - 1,
                          cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;
             CHECK(std::abs(volume) < 0.003 + chords);

@@ -59,7 +59,7 @@ TEST_CASE("the field between planes of two directions: each plane's sides, and n
         {SectionPlane{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}}, {circle(1, {-3, 0}), circle(1, {3, 0})}});
     const SectionField field(sections, 0.1, {0.02, 0, 0.01}, {});
     double low = 1, high = -1;
-    std::size_t wrong = 0, asked = 0;
+    std::size_t wrong = 0, compared = 0;
     for (double x = -4.2; x <= 4.2; x += 0.11)
         for (double y = -4.2; y <= 4.2; y += 0.11)
             for (const double z : {-0.8, -0.4, 0.0, 0.4, 0.8, 0.6, 1.1}) {
@@ -68,10 +68,10 @@ TEST_CASE("the field between planes of two directions: each plane's sides, and n
                 high = std::max(high, found);
                 const double off = std::hypot(std::hypot(x, y) - 3, z) - 1;
                 if (std::abs(off) < 0.25) continue;  // two and a half cells
-                ++asked;
+                ++compared;
                 wrong += (found < 0) != (off < 0);
             }
-    INFO("wrong " << wrong << " of " << asked);
+    INFO("wrong " << wrong << " of " << compared);
     CHECK(wrong == 0);
     // Moved by the level that held-out planes choose.
     CHECK(high - low <= 2 + 1e-3);

@@ -68,7 +68,7 @@ TEST_CASE("the six faces' news are those of a loop over the halo") {
     std::mt19937 random(4);
     std::uniform_real_distribution<float> place(-3.0F, 10.0F);
     std::uniform_int_distribution<int> voxel(-1, 8), kind(0, 9);
-    std::array<int, 6> told{}, silent{};
+    std::array<int, 6> found_in{}, silent{};
     for (int round = 0; round < 4000; ++round) {
         const auto block = no_points();
         // One or two points in it; known beyond some of the faces.
@@ -81,12 +81,12 @@ TEST_CASE("the six faces' news are those of a loop over the halo") {
             const bool expected = has_news(*block, face, reach);
             INFO("round " << round << ", face " << face);
             REQUIRE((news >> face & 1U) == unsigned(expected));
-            ++(expected ? told : silent)[face];
+            ++(expected ? found_in : silent)[face];
         }
         REQUIRE(news < 64);
     }
     for (int face = 0; face < 6; ++face) {
-        CHECK(told[face] > 100);
+        CHECK(found_in[face] > 100);
         CHECK(silent[face] > 100);
     }
 }
@@ -157,7 +157,7 @@ TEST_CASE("points are taken over as a loop would, and those that changed within 
         const auto before = nearest;
         std::array<std::uint64_t, 8> changed{};
         covol::detail::take_points(*block, kReach, all, nearest.data(), changed.data());
-        int told = 0;
+        int found_in = 0;
         for (int i = 0; i < 8; ++i)
             for (int j = 0; j < 8; ++j)
                 for (int k = 0; k < 8; ++k) {
@@ -167,9 +167,9 @@ TEST_CASE("points are taken over as a loop would, and those that changed within 
                     const bool is_news =
                         (all || now != before[at]) && squared(*block, {i, j, k}, {i, j, k}) <= double(kReach);
                     REQUIRE((changed[std::size_t(i)] >> (8 * j + k) & 1) == std::uint64_t(is_news));
-                    told += is_news;
+                    found_in += is_news;
                 }
-        CHECK(told > 50);
-        CHECK(told < 450);
+        CHECK(found_in > 50);
+        CHECK(found_in < 450);
     }
 }

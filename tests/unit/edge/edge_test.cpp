@@ -242,7 +242,7 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     const FloatGridPtr where = topology_where(
         domain, [](const Vec3& x) { return std::abs(x[0]) < 4 && std::abs(x[1]) < 2 && std::abs(x[2]) < 2; });
     EdgeOptions o = options(0.5, 4);
-    const auto least = [&](const Image& image, EdgeFeature feature) {
+    const auto minimum = [&](const Image& image, EdgeFeature feature) {
         o.feature = feature;
         const EdgeResult r = detect_edges(image, *where, o);
         double at = 0, value = 2;
@@ -250,10 +250,10 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
             if (*v < value) value = *v, at = r.grid->indexToWorld(v.getCoord())[0];
         return at;
     };
-    CHECK(std::abs(least(bright, EdgeFeature::BrightLine) - kSheetAt) <= kH / 2);
-    CHECK(std::abs(least(dark, EdgeFeature::DarkLine) - kSheetAt) <= kH / 2);
-    CHECK(std::abs(least(bright, EdgeFeature::Slope) - kSheetAt) > kH / 2);
-    CHECK(least(bright, EdgeFeature::Automatic) == least(bright, EdgeFeature::Slope));
+    CHECK(std::abs(minimum(bright, EdgeFeature::BrightLine) - kSheetAt) <= kH / 2);
+    CHECK(std::abs(minimum(dark, EdgeFeature::DarkLine) - kSheetAt) <= kH / 2);
+    CHECK(std::abs(minimum(bright, EdgeFeature::Slope) - kSheetAt) > kH / 2);
+    CHECK(minimum(bright, EdgeFeature::Automatic) == minimum(bright, EdgeFeature::Slope));
     // s is the brightness itself.
     o.feature = EdgeFeature::BrightLine;
     o.sigma = 0;
@@ -314,9 +314,9 @@ TEST_CASE("a value of a rank is that of a sort") {
         for (float& v : values) v = random() % 4 == 0 ? std::round(normal(random)) : normal(random);
         std::vector<float> sorted = values;
         std::sort(sorted.begin(), sorted.end());
-        for (const double share : {0.0, 0.01, 0.3, 0.5, 0.999, 1.0}) {
-            const auto n = std::size_t(share * double(count - 1));
-            CAPTURE(count, share);
+        for (const double fraction : {0.0, 0.01, 0.3, 0.5, 0.999, 1.0}) {
+            const auto n = std::size_t(fraction * double(count - 1));
+            CAPTURE(count, fraction);
             CHECK(detail::nth_value(values, n) == sorted[n]);
         }
     }

@@ -117,10 +117,10 @@ TEST_CASE("a free surface stays where it is, and its band holds the distance") {
     const Difference moved = difference(*u, *made());
     CHECK(moved.signs == 0);
     CHECK(moved.crossing < (is_distance ? 0.002 : 0.05));
-    double most = 0;
+    double maximum = 0;
     for (auto value = u->cbeginValueOn(); value; ++value)
-        most = std::max(most, std::abs(double(*value) - level(world_of(kDomain, value.getCoord()))) / kH);
-    CHECK(most < 1.0 / kRadius);
+        maximum = std::max(maximum, std::abs(double(*value) - level(world_of(kDomain, value.getCoord()))) / kH);
+    CHECK(maximum < 1.0 / kRadius);
     // Beyond the band, where its stencil still reaches, too.
     const auto values = u->getConstAccessor();
     const Vec3 beyond = kDomain.world_to_index({-0.1, 0.2, (kRadius + detail::kFreeWidth + 0.6) * kH});

@@ -207,7 +207,7 @@ TEST_CASE("options of a correction", "[guess]") {
     CorrectionOptions options;
     CHECK(why_invalid(options).empty());
     options.precision = -1;
-    options.least_radius = -2;
+    options.min_radius = -2;
     CHECK(why_invalid(options) == "precision: expected > 0, got -1\nguess_radius: expected > 0, got -2");
     CHECK(code_of([&] { (void)correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {}, options); }) ==
           Errc::InvalidOptions);

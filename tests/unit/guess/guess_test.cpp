@@ -51,10 +51,10 @@ Shape ellipsoid(const char* name, const Vec3& r) {
 Shape torus(double R, double r) {
     return {"torus",
             [R, r](std::mt19937& random) {
-                std::uniform_real_distribution<double> angle(0, 2 * kPi), share(0, R + r);
+                std::uniform_real_distribution<double> angle(0, 2 * kPi), fraction(0, R + r);
                 for (;;) {
                     const double u = angle(random), v = angle(random), ring = R + r * std::cos(v);
-                    if (share(random) < ring) return Vec3{ring * std::cos(u), ring * std::sin(u), r * std::sin(v)};
+                    if (fraction(random) < ring) return Vec3{ring * std::cos(u), ring * std::sin(u), r * std::sin(v)};
                 }
             },
             [R, r](const Vec3& x) { return std::hypot(std::hypot(x[0], x[1]) - R, x[2]) - r; },
@@ -70,9 +70,9 @@ std::vector<Vec3> draw(const Shape& shape, int count, unsigned seed) {
     return points;
 }
 
-GuessOptions precision(const Vec3& spacing, double share = 0.3) {
+GuessOptions precision(const Vec3& spacing, double fraction = 0.3) {
     GuessOptions options;
-    for (int a = 0; a < 3; ++a) options.deviation[a][a] = share * spacing[a];
+    for (int a = 0; a < 3; ++a) options.deviation[a][a] = fraction * spacing[a];
     return options;
 }
 

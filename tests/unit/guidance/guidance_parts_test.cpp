@@ -42,15 +42,15 @@ TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guid
     std::vector<Vec3> vertices;
     for (const auto& v : mesh.vertices) vertices.push_back({v[0], v[1], v[2]});
     const guidance::WideDistance wide(*start, vertices, domain, kWidth, {});
-    double most = 0;
+    double maximum = 0;
     std::int64_t count = 0;
     for (auto value = wide.grid()->cbeginValueOn(); value; ++value) {
         const openvdb::Vec3d x = wide.grid()->indexToWorld(value.getCoord());
-        most = std::max(most, std::abs(double(*value) - (x.length() - kRadius * h)) / h);
+        maximum = std::max(maximum, std::abs(double(*value) - (x.length() - kRadius * h)) / h);
         ++count;
     }
     // No foot is farther than sqrt(3) / 2 from a vertex, and no distance below 2.5 is one to a vertex.
-    CHECK(most < std::hypot(2.5, 0.5 * std::sqrt(3.0)) - 2.5 + 0.03);
+    CHECK(maximum < std::hypot(2.5, 0.5 * std::sqrt(3.0)) - 2.5 + 0.03);
     // All voxels within the width, on both sides.
     const double shell = 4.0 / 3 * M_PI * (std::pow(kRadius + kWidth, 3) - std::pow(kRadius - kWidth, 3));
     CHECK(double(count) == Approx(shell).epsilon(0.02));

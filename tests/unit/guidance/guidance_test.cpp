@@ -107,9 +107,9 @@ FloatGridPtr wavy_sphere(const Domain& d, const std::vector<Vec3>& marks, double
     return level_set(d, [&](const Vec3& x) {
         const double r = std::max(length(x), 1e-6);
         const Vec3 foot{x[0] * kRadius / r, x[1] * kRadius / r, x[2] * kRadius / r};
-        const double share = std::min(to_mark(foot) / farthest, 1.0);
+        const double fraction = std::min(to_mark(foot) / farthest, 1.0);
         const double sign = foot[0] > 0 ? 1 : -1;
-        return r - kRadius - sign * depth * share * share;
+        return r - kRadius - sign * depth * fraction * fraction;
     });
 }
 

@@ -51,7 +51,7 @@ TriangleMesh sphere_mesh(int subdivisions) {
 }
 
 double narrowest_angle(const TriangleMesh& mesh) {
-    double least = kPi;
+    double minimum = kPi;
     for (const auto& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) {
             std::array<double, 3> u{}, v{};
@@ -63,9 +63,9 @@ double narrowest_angle(const TriangleMesh& mesh) {
                 vv += v[c] * v[c];
                 uv += u[c] * v[c];
             }
-            least = std::min(least, std::acos(std::clamp(uv / std::sqrt(uu * vv), -1.0, 1.0)));
+            minimum = std::min(minimum, std::acos(std::clamp(uv / std::sqrt(uu * vv), -1.0, 1.0)));
         }
-    return least * 180 / kPi;
+    return minimum * 180 / kPi;
 }
 
 /// On the unit sphere, where `keep` says.
@@ -79,9 +79,9 @@ std::vector<Vec3> sphere_points(int count, unsigned seed, Keep keep) {
 
 template <typename Function>
 TreatedHoles treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points,
-                   double slack_share = 1.0 / 6) {
+                   double slack_fraction = 1.0 / 6) {
     const double distance = choose_hole_distance(points, 0.01);
-    return function(mesh, measure_distances(mesh, points), distance, slack_share * distance, RunContext{});
+    return function(mesh, measure_distances(mesh, points), distance, slack_fraction * distance, RunContext{});
 }
 
 }  // namespace
@@ -190,7 +190,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             CHECK_FALSE(m.closed);
             CHECK(m.components == 1);
             CHECK(m.area == Approx(2 * kPi * (1 + level)).margin(rim * spacing));
-            CHECK(open.report.share == Approx((1 - level) / 2).margin(rim * spacing / (4 * kPi)));
+            CHECK(open.report.fraction == Approx((1 - level) / 2).margin(rim * spacing / (4 * kPi)));
             CHECK(narrowest_angle(open.mesh) > 5);
             // Outward: away from the middle.
             std::size_t inward = 0;
@@ -227,9 +227,9 @@ TEST_CASE("two holes, no hole, and nothing but holes") {
     const std::vector<Vec3> all = sphere_points(8000, 4, [](const Vec3&) { return true; });
     const TreatedHoles whole = treat(trim_holes, sphere, all);
     CHECK(whole.report.loops.empty());
-    CHECK(whole.report.share == 0);
+    CHECK(whole.report.fraction == 0);
     CHECK(whole.mesh.triangles == sphere.triangles);
-    CHECK(measure_share_beyond(sphere, measure_distances(sphere, all), whole.report.distance) == 0);
+    CHECK(measure_fraction_beyond(sphere, measure_distances(sphere, all), whole.report.distance) == 0);
 
     const std::vector<Vec3> far{{5, 0, 0}};
     CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, far), 0.1, 0.01), Error);
@@ -258,7 +258,7 @@ TEST_CASE("distances to points are those of brute force; the share is that of a 
     }
     // Within a chord d of the pole: a cap of height d^2 / 2.
     const std::vector<float> from_pole = measure_distances(sphere, {{0, 0, 1}});
-    CHECK(measure_share_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
+    CHECK(measure_fraction_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
 }
 
 TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set says the same but for open") {
@@ -268,7 +268,7 @@ TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set
     const SegmentResult closed = reconstruct(points, options);
     CHECK(closed.report.holes.policy == Holes::Close);
     CHECK(closed.report.holes.loops.empty());
-    CHECK(closed.report.share_without_points > 0.2);
+    CHECK(closed.report.fraction_without_points > 0.2);
     CHECK(closed.distance_to_points.size() == closed.mesh.vertices.size());
 
     options.holes.policy = Holes::Open;

@@ -45,7 +45,7 @@ TEST_CASE("Marks on a border have the steepest slope where they are") {
         const StrongestBorder found = border_at(image, 20.5 + off);
         CHECK(found.lines == 60);
         CHECK(std::abs(found.at) <= 1);
-        CHECK(found.share == 1);
+        CHECK(found.fraction == 1);
     }
 }
 
@@ -56,7 +56,7 @@ TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward a
         CHECK(std::abs(behind.at + 6) <= 1);
         CHECK(std::abs(before.at - 6) <= 1);
         for (const StrongestBorder& found : {behind, before}) {
-            CHECK(found.share < 0.2);
+            CHECK(found.fraction < 0.2);
             CHECK(found.errors > 10);
         }
     }
@@ -66,18 +66,18 @@ TEST_CASE("The steeper of two borders is found, and how much less steep the own 
     const Image image = slab([](double x) { return (x > 20.5 ? 1.0 : 0.0) + (x > 27.5 ? 4.0 : 0.0); });
     const StrongestBorder found = border_at(image, 20.5);
     CHECK(std::abs(found.at - 7) <= 1);
-    CHECK(found.share == Approx(0.25).margin(0.03));
-    CHECK(border_at(image, 27.5).share == 1);
+    CHECK(found.fraction == Approx(0.25).margin(0.03));
+    CHECK(border_at(image, 27.5).fraction == 1);
 }
 
 TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 18); });
-        CHECK(border_at(image, 22).share < 0.7);  // as a slope
-        CHECK(border_at(image, 22, 1, BorderKind::Line).share == 1);
+        CHECK(border_at(image, 22).fraction < 0.7);  // as a slope
+        CHECK(border_at(image, 22, 1, BorderKind::Line).fraction == 1);
         const StrongestBorder beside = border_at(image, 28, 1, BorderKind::Line);
         CHECK(std::abs(beside.at + 6) <= 1);
-        CHECK(beside.share < 0.5);
+        CHECK(beside.fraction < 0.5);
         CHECK(beside.errors > 4);  // as a warning asks for
     }
 }
@@ -89,9 +89,9 @@ TEST_CASE("In noise nothing is steeper by more than chance") {
 
 TEST_CASE("Lines that leave the image do not count, and no line is no answer") {
     const Image image = slab([](double x) { return x > 3.5 ? 1 : 0; });
-    CHECK(border_at(image, 3.5).share == 1);
+    CHECK(border_at(image, 3.5).fraction == 1);
     const StrongestBorder none = border_at(image, 500);
     CHECK(none.lines == 0);
-    CHECK(none.share == 1);
+    CHECK(none.fraction == 1);
     CHECK(find_strongest_border(image, {}, {}, 0.5, BorderKind::Slope, {}).lines == 0);
 }

@@ -138,14 +138,14 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
         else
             CHECK(volume == Approx(4.0 / 3 * M_PI * radius * radius * radius).epsilon(0.05));
         // No body with another radius is better.
-        const double least = energy(l, weight, cost, u);
+        const double minimum = energy(l, weight, cost, u);
         for (double r = 0; r < 14; r += 1) {
             Field ball(l.count());
             for (std::size_t n = 0; n < ball.size(); ++n) {
                 const Vec3 p = l.place_of(n);
                 ball[n] = std::hypot(p[0] - 16, p[1] - 16, p[2] - 16) < r ? 1.0F : 0.0F;
             }
-            CHECK(least <= energy(l, weight, cost, ball) + 1);
+            CHECK(minimum <= energy(l, weight, cost, ball) + 1);
         }
     }
 }

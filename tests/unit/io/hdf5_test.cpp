@@ -102,7 +102,7 @@ void check_ramp(const std::string& path, int first, const ReadImageOptions& opti
     CHECK(same);
 }
 
-void says(const std::string& path, const std::string& part) {
+void is_refused(const std::string& path, const std::string& part) {
     CHECK_THAT(message_of([&] { (void)read_image(path); }), Catch::Contains(part));
 }
 
@@ -171,7 +171,7 @@ TEST_CASE("Imaris: levels, channels, extent and names", "[hdf5]") {
     CHECK(info.geometry.unit == "um");
     CHECK(info.channel_names == std::vector<std::string>{"red", "green"});
     CHECK(info.levels.size() == 2);
-    says(path, "0 (red), 1 (green)");
+    is_refused(path, "0 (red), 1 (green)");
     ReadImageOptions options;
     options.channel = 1;
     check_ramp(path, 1000, options);
@@ -179,7 +179,7 @@ TEST_CASE("Imaris: levels, channels, extent and names", "[hdf5]") {
     CHECK(read_image_geometry(coarse, options).spacing == Vec3{2, 2, 2});
     check_ramp(coarse, 1100, options);
     check_ramp(coarse + "/TimePoint 0/Channel 0/Data", 100);
-    says(path + ":/DataSet/ResolutionLevel 9", "no such dataset");
+    is_refused(path + ":/DataSet/ResolutionLevel 9", "no such dataset");
 }
 
 TEST_CASE("BigDataViewer: setups, levels and the sizes of the XML beside it", "[hdf5]") {
@@ -200,7 +200,7 @@ TEST_CASE("BigDataViewer: setups, levels and the sizes of the XML beside it", "[
     const ImageGeometry coarse = read_image_geometry(path + ":/t00000/s01/1/cells");
     CHECK(coarse.spacing == Vec3{1, 1, 4});
     CHECK(coarse.origin == Vec3{0.25, 0.25, 1});  // means of two voxels
-    says(path + ":/t00000/s00/2", "no such dataset");
+    is_refused(path + ":/t00000/s00/2", "no such dataset");
     scratch.write("b.xml", "<SpimData><ViewSetup><id>0</id><voxelSize><size>1 1</size></voxelSize></ViewSetup>");
     CHECK(read_image_info(path).spacing_known == std::array<bool, 3>{false, false, false});
 }
@@ -258,7 +258,7 @@ TEST_CASE("chunks that a damaged index hides are not taken for missing ones", "[
     REQUIRE(node != std::string::npos);
     bytes[node] = 'F';
     scratch.write("b.h5", bytes);
-    says(scratch.path("b.h5"), "the index of its chunks cannot be read");
+    is_refused(scratch.path("b.h5"), "the index of its chunks cannot be read");
 }
 
 TEST_CASE("filters that the library knows by number alone are undone here", "[hdf5]") {
@@ -293,9 +293,9 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
         }
     }
     for (const char* name : {"lz4", "lzf", "zstd"}) check_ramp(path + ":/" + name, 0);
-    says(path + ":/short", "no LZ4 data");
-    says(path + ":/wild", "no LZF data");
-    says(path + ":/bitshuffle", "filter 32008");
+    is_refused(path + ":/short", "no LZ4 data");
+    is_refused(path + ":/wild", "no LZF data");
+    is_refused(path + ":/bitshuffle", "filter 32008");
 }
 
 TEST_CASE("axes and spacing come from the attributes of several programs", "[hdf5]") {
@@ -330,9 +330,9 @@ TEST_CASE("axes and spacing come from the attributes of several programs", "[hdf
     check_ramp(path + ":/series", 4 * 5 * 6, options);
     CHECK(read_image_geometry(path + ":/series", options).spacing == Vec3{0.25, 0.25, 0.25});
     check_ramp(path + ":/ones", 0);
-    says(path + ":/unknown", "got a dataset of 2 x 4 x 5 x 6 without it");
-    says(path + ":/twice", "expected axes z, y and x");
-    says(path + ":/few", "for each of its 3 dimensions");
+    is_refused(path + ":/unknown", "got a dataset of 2 x 4 x 5 x 6 without it");
+    is_refused(path + ":/twice", "expected axes z, y and x");
+    is_refused(path + ":/few", "for each of its 3 dimensions");
     CHECK(read_image_geometry(path + ":/element").spacing == Vec3{1, 2, 3});
     CHECK(read_image_geometry(path + ":/element").unit == "um");
     CHECK(read_image_geometry(path + ":/plain").unit == "mm");
@@ -350,8 +350,8 @@ TEST_CASE("one dataset is found, several are listed, what is no image is refused
     }
     check_ramp(path, 0);
     check_ramp(path + ":volume", 0);
-    says(path + ":/none", "no such dataset");
-    says(path + ":/table", "got a dataset of 3 x 4");
+    is_refused(path + ":/none", "no such dataset");
+    is_refused(path + ":/table", "got a dataset of 3 x 4");
     {
         const Writer file(path);
         file.image("one");
@@ -364,12 +364,12 @@ TEST_CASE("one dataset is found, several are listed, what is no image is refused
         H5Lcreate_external("b.h5", "/data", file.id(), "external", H5P_DEFAULT, H5P_DEFAULT);
         file.dataset<std::uint16_t>("empty", {0, 5, 6}, H5T_STD_U16LE, {});
     }
-    says(path, "/one (4 x 5 x 6), /two (4 x 5 x 6)");
-    says(path + ":/complex", "records of several values");
-    says(path + ":/external", "is a link into another file");
-    says(path + ":/empty", "expected a 3D image");
+    is_refused(path, "/one (4 x 5 x 6), /two (4 x 5 x 6)");
+    is_refused(path + ":/complex", "records of several values");
+    is_refused(path + ":/external", "is a link into another file");
+    is_refused(path + ":/empty", "expected a 3D image");
     { const Writer file(path); }
-    says(path, "got none");
+    is_refused(path, "got none");
     scratch.write("no.h5", "this is text");
-    says(scratch.path("no.h5"), "no.h5");
+    is_refused(scratch.path("no.h5"), "no.h5");
 }

@@ -106,7 +106,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
             const double u = (x - 119.5) * 0.01 / radius, v = (119.5 - y) * 0.01 / radius, r = std::hypot(u, v);
             const std::size_t n = std::size_t(y) * 240 + x;
             const double covered = std::clamp((1 - r) * radius / 0.01 + 0.5, 0.0, 1.0);
-            off_disc = std::max(off_disc, std::abs(layer.share[n] - covered));
+            off_disc = std::max(off_disc, std::abs(layer.fraction[n] - covered));
             if (r > 0.97) continue;
             const Vec3 normal{u, v, std::sqrt(1 - r * r)};
             const double light =

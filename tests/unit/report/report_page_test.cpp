@@ -104,12 +104,12 @@ TEST_CASE("a coded mesh is the mesh, within half a step of its lattice") {
     REQUIRE(back.vertices.size() == mesh.vertices.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
         for (int c = 0; c < 3; ++c) REQUIRE(coded.from[back.triangles[t][c]] == mesh.triangles[t][c]);
-    double most = 0;
+    double maximum = 0;
     for (std::size_t v = 0; v < back.vertices.size(); ++v)
         for (int a = 0; a < 3; ++a)
-            most = std::max(most, std::abs(double(back.vertices[v][a]) - mesh.vertices[coded.from[v]][a]));
-    CHECK(most <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // and the rounding of floats near 100
-    CHECK(most > 0);
+            maximum = std::max(maximum, std::abs(double(back.vertices[v][a]) - mesh.vertices[coded.from[v]][a]));
+    CHECK(maximum <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // and the rounding of floats near 100
+    CHECK(maximum > 0);
     // Neighbouring triangles share vertices: three corners take little more than three bytes.
     CHECK(coded.corners.size() < 6 * mesh.triangles.size());
 }
@@ -142,10 +142,10 @@ TEST_CASE("a clustered sphere has few triangles, vertices of the sphere, and nea
     const TriangleMesh mesh = sphere();
     std::vector<float> heights;
     for (const auto& v : mesh.vertices) heights.push_back(v[2]);
-    const std::int64_t most = std::int64_t(mesh.triangles.size()) / 8;
-    const detail::PageMesh small = detail::cluster({mesh, {{"height", heights}}}, most);
-    CHECK(std::int64_t(small.mesh.triangles.size()) <= most);
-    CHECK(std::int64_t(small.mesh.triangles.size()) > most / 3);
+    const std::int64_t maximum = std::int64_t(mesh.triangles.size()) / 8;
+    const detail::PageMesh small = detail::cluster({mesh, {{"height", heights}}}, maximum);
+    CHECK(std::int64_t(small.mesh.triangles.size()) <= maximum);
+    CHECK(std::int64_t(small.mesh.triangles.size()) > maximum / 3);
     const std::set<std::array<float, 3>> known(mesh.vertices.begin(), mesh.vertices.end());
     for (const auto& v : small.mesh.vertices) REQUIRE(known.contains(v));
     CHECK(measure(small.mesh).volume == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.03));
@@ -217,8 +217,8 @@ TEST_CASE("a page holds slices, marks and what it was asked for, and the same bi
     page.image = &image;
     page.structures.push_back({"one", {1, 2, 3}, &mesh, std::vector<Vec3>(50, kCenter), nullptr});
     ReportPageOptions options;
-    options.most_marks = 20;
-    options.most_triangles = 1000;
+    options.max_marks = 20;
+    options.max_triangles = 1000;
     const Scratch scratch;
     const ReportPageSummary made = write_report_page(scratch.path("a.html"), page, options);
     CHECK(made.triangles <= 1000);

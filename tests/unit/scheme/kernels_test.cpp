@@ -86,9 +86,9 @@ Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const Scheme
 
 /// A leaf's rows from the kernel, and as fractions.
 struct LeafRows {
-    std::vector<Share> shares = std::vector<Share>(6 * 512);
-    [[nodiscard]] double operator()(int f, int n) const { return double(shares[share_at(f, n)]) / kShareUnit; }
-    [[nodiscard]] Share* data() { return shares.data(); }
+    std::vector<Fraction> fractions = std::vector<Fraction>(6 * 512);
+    [[nodiscard]] double operator()(int f, int n) const { return double(fractions[fraction_at(f, n)]) / kFractionUnit; }
+    [[nodiscard]] Fraction* data() { return fractions.data(); }
 };
 
 constexpr std::array<unsigned long long, 8> kAllActive = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
@@ -109,7 +109,7 @@ TEST_CASE("coefficients are those of the scheme, on every instruction set") {
             largest_plain = std::max(largest_plain, row.sum);
             for (int f = 0; f < 6; ++f) worst = std::max(worst, std::abs(row.c[f] - c(f, n)));
         }
-        CHECK(worst < 0.5 / kShareUnit + 2e-6);
+        CHECK(worst < 0.5 / kFractionUnit + 2e-6);
         CHECK(largest == Approx(largest_plain).epsilon(1e-5));
     }
 }
@@ -269,7 +269,7 @@ TEST_CASE("assembly tells the residual at the values before") {
     active[3] = 0x00ff12ff00ff34ffULL;
     for (const SchemeKernels* set : available_kernels()) {
         LeafRows c;
-        const double told =
+        const double reported =
             set->assemble(u.data(), nullptr, nullptr, nullptr, active.data(), kConstants, c.data()).residual;
         double squares = 0.0;
         for (int n = 0; n < 512; ++n) {
@@ -281,7 +281,7 @@ TEST_CASE("assembly tells the residual at the values before") {
                         (double(u[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - u[padded(i, j, k)]);
             squares += pull * pull;
         }
-        CHECK(told == Approx(squares).epsilon(1e-3));
+        CHECK(reported == Approx(squares).epsilon(1e-3));
     }
 }
 

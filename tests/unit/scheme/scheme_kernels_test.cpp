@@ -69,15 +69,15 @@ Rows assemble_leaf(const detail::SchemeKernels& kernels, const DenseField& u, co
                                             float(o.edge_epsilon * o.edge_epsilon)};
     std::array<unsigned long long, 8> bits;
     std::copy(mask.begin(), mask.end(), bits.begin());
-    alignas(64) std::array<detail::Share, 6 * kLeafSize> shares{};
+    alignas(64) std::array<detail::Fraction, 6 * kLeafSize> fractions{};
     Rows rows;
     const detail::RowFacts facts =
         kernels.assemble(pu.values.data(), d != nullptr ? pd.values.data() : nullptr,
-                         g != nullptr ? pg.values.data() : nullptr, nullptr, bits.data(), constants, shares.data());
+                         g != nullptr ? pg.values.data() : nullptr, nullptr, bits.data(), constants, fractions.data());
     rows.largest = facts.largest;
     for (int f = 0; f < 6; ++f)
         for (int n = 0; n < kLeafSize; ++n)
-            rows.c[f * kLeafSize + n] = float(shares[detail::share_at(f, n)]) / detail::kShareUnit;
+            rows.c[f * kLeafSize + n] = float(fractions[detail::fraction_at(f, n)]) / detail::kFractionUnit;
     return rows;
 }
 
@@ -159,8 +159,8 @@ TEST_CASE("a leaf's rows are the reference's") {
                 worst_sum = std::max(worst_sum, std::abs(off));
             }
             INFO(kernels->name);
-            CHECK(worst < 0.5 / detail::kShareUnit + 5e-6);
-            CHECK(worst_sum < 3.0 / detail::kShareUnit + 5e-6);
+            CHECK(worst < 0.5 / detail::kFractionUnit + 5e-6);
+            CHECK(worst_sum < 3.0 / detail::kFractionUnit + 5e-6);
             CHECK(rows.largest == Approx(largest).epsilon(1e-5));
         }
     };
@@ -192,6 +192,6 @@ TEST_CASE("a leaf's rows are the reference's") {
         const double s = o.tau * o.delta;  // M W = ε / ε
         for (const detail::SchemeKernels* kernels : detail::available_kernels())
             for (const float c : assemble_leaf(*kernels, flat, nullptr, nullptr, o, every_voxel()).c)
-                CHECK(std::abs(c - s / (1 + 6 * s)) < 0.5 / detail::kShareUnit + 1e-6);
+                CHECK(std::abs(c - s / (1 + 6 * s)) < 0.5 / detail::kFractionUnit + 1e-6);
     }
 }

@@ -14,9 +14,9 @@ using namespace covol;
 
 namespace {
 
-constexpr double kMostDice = 0.002;  // of change
+constexpr double kMaxDice = 0.002;  // of change
 // Forward differences of the least surface, the cells of patches and the hull's directions have no mirror symmetry.
-constexpr double kMostDiceOfTurned = 0.01;
+constexpr double kMaxDiceOfTurned = 0.01;
 
 /// Three quarters of a ring whose thickness falls to its ends: thin, curved, with ends. Negative inside.
 double horn(const Vec3& p) {
@@ -107,28 +107,28 @@ double plain() {
 TEST_CASE("the thin body is found") { CHECK(plain() > 0.9); }
 
 TEST_CASE("order of the marks, and marks given twice") {
-    CHECK(dice_of({.shuffled = true}) == Approx(plain()).margin(kMostDice));
-    CHECK(dice_of({.repeated = true}) == Approx(plain()).margin(kMostDice));
+    CHECK(dice_of({.shuffled = true}) == Approx(plain()).margin(kMaxDice));
+    CHECK(dice_of({.repeated = true}) == Approx(plain()).margin(kMaxDice));
 }
 
 TEST_CASE("units and origin") {
     const double unit = GENERATE(1e-3, 1e3);
-    CHECK(dice_of({.unit = unit}) == Approx(plain()).margin(kMostDice));
+    CHECK(dice_of({.unit = unit}) == Approx(plain()).margin(kMaxDice));
     CHECK(dice_of({.unit = unit, .origin = {500 * unit, -700 * unit, 1100 * unit}}) ==
-          Approx(plain()).margin(kMostDice));
+          Approx(plain()).margin(kMaxDice));
 }
 
-TEST_CASE("an origin far away") { CHECK(dice_of({.origin = {1e6, -1e6, 1e6}}) == Approx(plain()).margin(kMostDice)); }
+TEST_CASE("an origin far away") { CHECK(dice_of({.origin = {1e6, -1e6, 1e6}}) == Approx(plain()).margin(kMaxDice)); }
 
 TEST_CASE("flips and order of the axes") {
-    CHECK(dice_of({.signs = {-1, 1, 1}}) == Approx(plain()).margin(kMostDiceOfTurned));
-    CHECK(dice_of({.signs = {1, -1, -1}}) == Approx(plain()).margin(kMostDiceOfTurned));
-    CHECK(dice_of({.axes = {1, 0, 2}}) == Approx(plain()).margin(kMostDiceOfTurned));
-    CHECK(dice_of({.axes = {2, 0, 1}}) == Approx(plain()).margin(kMostDiceOfTurned));
+    CHECK(dice_of({.signs = {-1, 1, 1}}) == Approx(plain()).margin(kMaxDiceOfTurned));
+    CHECK(dice_of({.signs = {1, -1, -1}}) == Approx(plain()).margin(kMaxDiceOfTurned));
+    CHECK(dice_of({.axes = {1, 0, 2}}) == Approx(plain()).margin(kMaxDiceOfTurned));
+    CHECK(dice_of({.axes = {2, 0, 1}}) == Approx(plain()).margin(kMaxDiceOfTurned));
 }
 
 TEST_CASE("gain, offset and inversion of the image") {
-    CHECK(dice_of({.gain = 0.01}) == Approx(plain()).margin(kMostDice));
-    CHECK(dice_of({.gain = 3, .base = -5000}) == Approx(plain()).margin(kMostDice));
-    CHECK(dice_of({.gain = -1, .base = 300}) == Approx(plain()).margin(kMostDice));
+    CHECK(dice_of({.gain = 0.01}) == Approx(plain()).margin(kMaxDice));
+    CHECK(dice_of({.gain = 3, .base = -5000}) == Approx(plain()).margin(kMaxDice));
+    CHECK(dice_of({.gain = -1, .base = 300}) == Approx(plain()).margin(kMaxDice));
 }

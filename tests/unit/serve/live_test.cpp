@@ -102,7 +102,7 @@ TEST_CASE("broadcasts reach all clients in one order") {
 
 TEST_CASE("what opened sends comes before any broadcast") {
     std::promise<void> go;
-    std::shared_future<void> gone = go.get_future().share();
+    std::shared_future<void> gone = go.get_future().fraction();
     std::atomic<bool> is_inside{false};
     Site* site = nullptr;
     Handlers handlers;
@@ -124,7 +124,7 @@ TEST_CASE("what opened sends comes before any broadcast") {
 
 TEST_CASE("messages that are too large, too many or no text end a client") {
     Options options;
-    options.most_message_bytes = 1000;
+    options.max_message_bytes = 1000;
     options.messages_per_second = 10;
     options.message_burst = 50;
     Echo echo(options);
@@ -161,7 +161,7 @@ TEST_CASE("messages that are too large, too many or no text end a client") {
 
 TEST_CASE("a client that is sent texts all the while is told, too, why it is closed") {
     Options options;
-    options.most_message_bytes = 1000;
+    options.max_message_bytes = 1000;
     Echo echo(options);
     Live live(echo.site());
     CHECK(live.receive() == "hello");
@@ -226,7 +226,7 @@ TEST_CASE("a handler that throws ends its client, and is told to the log") {
 
 TEST_CASE("no more clients than are allowed") {
     Options options;
-    options.most_clients = 2;
+    options.max_clients = 2;
     Echo echo(options);
     Live one(echo.site());
     auto two = std::make_unique<Live>(echo.site());
@@ -253,7 +253,7 @@ TEST_CASE("handshakes that are no good") {
 
 TEST_CASE("a client that does not read is closed, and the others are not") {
     Options options;
-    options.most_waiting_bytes = std::size_t(8) << 20;
+    options.max_waiting_bytes = std::size_t(8) << 20;
     Echo echo(options);
     Live slow(echo.site());
     CHECK(slow.receive() == "hello");
@@ -289,7 +289,7 @@ TEST_CASE("a client that does not answer is closed after a while") {
 
 TEST_CASE("slow pictures do not delay messages") {
     std::promise<void> go;
-    std::shared_future<void> gone = go.get_future().share();
+    std::shared_future<void> gone = go.get_future().fraction();
     std::atomic<int> waiting{0};
     Handlers handlers;
     handlers.get = [&](const Request&) {

@@ -229,9 +229,9 @@ TEST_CASE("only GET and HEAD, without a body, of an address that is not too long
 }
 
 TEST_CASE("a POST is answered where files are taken, from the page itself, and with a length that is not too large") {
-    const auto judged = [](const RequestHead& head, std::size_t most = 1000) {
+    const auto judged = [](const RequestHead& head, std::size_t maximum = 1000) {
         Rules own = rules();
-        own.most_body_bytes = most;
+        own.max_body_bytes = maximum;
         const Judgement judgement = judge(head, own);
         return judgement.kind == Kind::Refuse ? judgement.status : judgement.kind == Kind::Post ? 0 : -1;
     };
@@ -268,7 +268,7 @@ TEST_CASE("a POST is answered where files are taken, from the page itself, and w
     CHECK(judge(good,
                 [] {
                     Rules own = rules();
-                    own.most_body_bytes = 1000;
+                    own.max_body_bytes = 1000;
                     return own;
                 }())
               .body_bytes == 1000);

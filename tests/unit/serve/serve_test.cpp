@@ -239,7 +239,7 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
         return response;
     };
     Options options;
-    options.most_body_bytes = 3'000'000;
+    options.max_body_bytes = 3'000'000;
     Site site(handlers, options);
     const auto head = [&](std::size_t bytes) {
         return site.head("/import?as=points",
@@ -315,7 +315,7 @@ TEST_CASE("connections that wait make room, those at work do not") {
         return page(request);
     };
     Options options;
-    options.most_connections = 4;
+    options.max_connections = 4;
     const Site site(handlers, options);
     std::vector<std::unique_ptr<Wire>> wires;
     for (int n = 0; n < 4; ++n) {

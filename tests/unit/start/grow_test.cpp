@@ -25,8 +25,8 @@ Image image_of(int n, const std::function<double(const Vec3&)>& shape, double in
     for (int k = 0; k < n; ++k)
         for (int j = 0; j < n; ++j)
             for (int i = 0; i < n; ++i) {
-                const double share = std::clamp(0.5 - shape({double(i), double(j), double(k)}), 0.0, 1.0);
-                values.push_back(float(100 + (inside - 100) * share + (noise > 0 ? normal(random) : 0.0)));
+                const double fraction = std::clamp(0.5 - shape({double(i), double(j), double(k)}), 0.0, 1.0);
+                values.push_back(float(100 + (inside - 100) * fraction + (noise > 0 ? normal(random) : 0.0)));
             }
     return Image::from_values(geometry, values.data());
 }

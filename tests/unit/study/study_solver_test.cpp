@@ -51,7 +51,7 @@ std::shared_ptr<const StudyStructure> ball(StudyId id, int count) {
 struct Listener {
     std::mutex mutex;
     std::vector<StudyResult> results;
-    std::function<void(const StudyResult&)> told() {
+    std::function<void(const StudyResult&)> on_result() {
         return [this](const StudyResult& result) {
             const std::lock_guard lock(mutex);
             results.push_back(result);
@@ -70,7 +70,7 @@ struct Listener {
 
 TEST_CASE("A structure gets a first surface, and then the one that segment gives") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(3, 25), 11);
     solver.wait();
     const auto first = listener.of(3, Stage::First), refined = listener.of(3, Stage::Refined);
@@ -87,7 +87,7 @@ TEST_CASE("A structure gets a first surface, and then the one that segment gives
 
 TEST_CASE("What is known is made again when nothing else is left to do, and without a first surface") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     solver.confirm(ball(1, 25), 5);
     solver.confirm(ball(2, 24), 5);
     solver.confirm(ball(3, 23), 5);
@@ -105,7 +105,7 @@ TEST_CASE("What is known is made again when nothing else is left to do, and with
 
 TEST_CASE("Too few marks are told, and no surface is left") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 20), 1);
     solver.wait();
     CHECK(solver.surface(1) != nullptr);
@@ -119,7 +119,7 @@ TEST_CASE("Too few marks are told, and no surface is left") {
 
 TEST_CASE("The first surface after a change is the last one moved to the marks") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 25), 1);
     solver.wait();
     auto moved = std::make_shared<StudyStructure>(*ball(1, 25));
@@ -133,7 +133,7 @@ TEST_CASE("The first surface after a change is the last one moved to the marks")
 
 TEST_CASE("Every structure is solved in the end, the newest marks last, whatever was cancelled on the way") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     for (std::uint64_t n = 1; n <= 12; ++n)
         for (const StudyId id : {1, 2, 3}) solver.solve(ball(id, 15 + int(n)), n);
     solver.forget(2);
@@ -161,7 +161,7 @@ TEST_CASE("A guess gives a surface without marks, and marks correct it as in seg
         CHECK(guess.path == "mask.nrrd");
         return make_guess(mask, 0, geometry);
     };
-    StudySolver solver(scene, {}, listener.told(), {}, reader);
+    StudySolver solver(scene, {}, listener.on_result(), {}, reader);
     auto structure = std::make_shared<StudyStructure>();
     structure->id = 1;
     structure->name = "mask";
@@ -183,7 +183,7 @@ TEST_CASE("A guess gives a surface without marks, and marks correct it as in seg
 
 TEST_CASE("Paint on one slice is asked for a second one") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     auto structure = std::make_shared<StudyStructure>();
     structure->id = 1;
     structure->name = "painted";
@@ -205,7 +205,7 @@ TEST_CASE("Paint on one slice is asked for a second one") {
 
 TEST_CASE("Other options give another surface") {
     Listener listener;
-    StudySolver solver(scene, {}, listener.told());
+    StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 25), 1);
     solver.wait();
     SegmentOptions options;
@@ -222,7 +222,7 @@ TEST_CASE("Other options give another surface") {
 TEST_CASE("A solver that is gone stops at once") {
     Listener listener;
     {
-        StudySolver solver(scene, {}, listener.told());
+        StudySolver solver(scene, {}, listener.on_result());
         for (const StudyId id : {1, 2, 3, 4, 5}) solver.solve(ball(id, 30), 1);
     }
     CHECK(listener.of(1, Stage::Refined).empty());

@@ -59,9 +59,9 @@ TEST_CASE("pieces and cavities with fewer points than asked for go") {
     for (const Vec3& second : {kBeside, kFar}) {
         INFO("second ball at " << second[0]);
         const std::vector<Vec3> in_cavity = on_small(kCavity), on_second = on_small(second);
-        const auto dropped = [&](const std::vector<Vec3>& points, std::size_t least, int left) {
+        const auto dropped = [&](const std::vector<Vec3>& points, std::size_t minimum, int left) {
             const FloatGridPtr grid = solid(second);
-            const std::size_t count = detail::drop_bare_pieces(*grid, points, least);
+            const std::size_t count = detail::drop_bare_pieces(*grid, points, minimum);
             CHECK(components(*grid) == left);
             return count;
         };

@@ -138,9 +138,9 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
         const float length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
         for (float& a : axis) a /= length;
         // Two directions across the axis.
-        const std::size_t least = std::abs(axis[0]) < 0.6F ? 0 : 1;
+        const std::size_t minimum = std::abs(axis[0]) < 0.6F ? 0 : 1;
         std::array<float, 3> e{}, f{};
-        for (std::size_t a = 0; a < 3; ++a) e[a] = (a == least ? 1.0F : 0.0F) - axis[least] * axis[a];
+        for (std::size_t a = 0; a < 3; ++a) e[a] = (a == minimum ? 1.0F : 0.0F) - axis[minimum] * axis[a];
         const float scale = 1 / std::sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
         for (float& a : e) a *= scale;
         for (std::size_t a = 0; a < 3; ++a)

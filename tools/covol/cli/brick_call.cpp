@@ -119,9 +119,9 @@ BrickCall join_call(Words& words, const CLI::App& program) {
 std::string plan_file(const std::string& folder) { return folder + "/plan.json"; }
 
 Json read_plan_file(const std::string& folder) {
-    constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 26U;
+    constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 26U;
     try {
-        Json plan = read_json(plan_file(folder), kMostBytes);
+        Json plan = read_json(plan_file(folder), kMaxBytes);
         if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": got no object");
         return plan;
     } catch (const Error& error) {

@@ -28,9 +28,9 @@ namespace {
     char nothing = 0;
     while (::read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
     }
-    constexpr int kMostTries = 500, kPause = 10000;  // of microseconds: a run within may still be ending
+    constexpr int kMaxTries = 500, kPause = 10000;  // of microseconds: a run within may still be ending
     std::error_code status;
-    for (int n = 0; n < kMostTries; ++n) {
+    for (int n = 0; n < kMaxTries; ++n) {
         fs::remove_all(folder, status);
         if (!fs::exists(fs::symlink_status(folder, status))) break;
         ::usleep(kPause);
@@ -80,8 +80,8 @@ int run_this_program(const std::vector<std::string>& words, const RunContext& ru
     if (child < 0) throw Error(Errc::Io, self + ": cannot start: " + std::strerror(errno));
     int status = 0;
     pid_t ended = 0;
-    for (bool told = false; (ended = ::waitpid(child, &status, WNOHANG)) == 0;) {
-        if (run.cancelled() && !told) told = ::kill(child, SIGTERM) == 0;
+    for (bool signalled = false; (ended = ::waitpid(child, &status, WNOHANG)) == 0;) {
+        if (run.cancelled() && !signalled) signalled = ::kill(child, SIGTERM) == 0;
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     run.check();

@@ -14,7 +14,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMostBytes = 1 << 20;
+constexpr std::size_t kMaxBytes = 1 << 20;
 
 struct Entry {
     std::string section, name;
@@ -211,10 +211,10 @@ private:
 };
 
 std::string all_of(std::istream& input) {
-    std::string text(kMostBytes + 1, '\0');
+    std::string text(kMaxBytes + 1, '\0');
     input.read(text.data(), std::streamsize(text.size()));
     text.resize(std::size_t(input.gcount()));
-    if (text.size() > kMostBytes) throw UsageError("--config: expected a file of options, got one of more than 1 MiB");
+    if (text.size() > kMaxBytes) throw UsageError("--config: expected a file of options, got one of more than 1 MiB");
     return text;
 }
 

@@ -134,28 +134,28 @@ std::optional<std::uint64_t> limit_of(const fs::path& folder, bool is_v2) {
     return limits[0];
 }
 
-void add(std::optional<FreeMemory>& least, std::uint64_t limit, std::uint64_t used, const std::string& where) {
+void add(std::optional<FreeMemory>& minimum, std::uint64_t limit, std::uint64_t used, const std::string& where) {
     const std::uint64_t bytes = limit - std::min(limit, used);
-    if (!least || bytes < least->bytes) least = FreeMemory{bytes, where};
+    if (!minimum || bytes < minimum->bytes) minimum = FreeMemory{bytes, where};
 }
 
-void add_machine(std::optional<FreeMemory>& least, const std::string& root) {
+void add_machine(std::optional<FreeMemory>& minimum, const std::string& root) {
     if (const auto kilobytes = named_number(root + "/proc/meminfo", "MemAvailable:"))
-        add(least, *kilobytes * 1024, 0, "this machine");
+        add(minimum, *kilobytes * 1024, 0, "this machine");
 }
 
-void add_groups(std::optional<FreeMemory>& least, const std::string& root) {
+void add_groups(std::optional<FreeMemory>& minimum, const std::string& root) {
     for (const Hierarchy& hierarchy : hierarchies(root)) {
         const std::string group = own_group(root, hierarchy.is_v2);
         if (group.empty()) continue;
         for (const fs::path& folder : group_folders(hierarchy, group))
             if (const auto limit = limit_of(folder, hierarchy.is_v2))
-                add(least, *limit, used_by(folder, hierarchy.is_v2),
+                add(minimum, *limit, used_by(folder, hierarchy.is_v2),
                     "the control group " + folder.string().substr(root.size()));
     }
 }
 
-void add_limits(std::optional<FreeMemory>& least, const std::string& root) {
+void add_limits(std::optional<FreeMemory>& minimum, const std::string& root) {
     std::array<std::uint64_t, 6> pages{};  // all, resident, shared, text, libraries, data
     std::ifstream statm(root + "/proc/self/statm");
     for (std::uint64_t& count : pages) statm >> count;
@@ -163,7 +163,7 @@ void add_limits(std::optional<FreeMemory>& least, const std::string& root) {
     const auto add_limit = [&](auto resource, std::uint64_t used, const char* where) {
         rlimit limit{};
         if (::getrlimit(resource, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
-            add(least, limit.rlim_cur, used * page, where);
+            add(minimum, limit.rlim_cur, used * page, where);
     };
     add_limit(RLIMIT_AS, pages[0], "the limit of address space (ulimit -v)");
     add_limit(RLIMIT_DATA, pages[5], "the limit of data (ulimit -d)");
@@ -172,11 +172,11 @@ void add_limits(std::optional<FreeMemory>& least, const std::string& root) {
 }  // namespace
 
 std::optional<FreeMemory> find_free_memory(const std::string& root) {
-    std::optional<FreeMemory> least;
-    add_machine(least, root);
-    add_groups(least, root);
-    add_limits(least, root);
-    return least;
+    std::optional<FreeMemory> minimum;
+    add_machine(minimum, root);
+    add_groups(minimum, root);
+    add_limits(minimum, root);
+    return minimum;
 }
 
 }  // namespace covol::tool

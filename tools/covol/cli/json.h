@@ -12,6 +12,6 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json parse_json(const std::string& text, const std::string& what);
 
 /// The same of a whole file. @throws Error InvalidInput, Io (no regular file; more than so many bytes).
-[[nodiscard]] Json read_json(const std::string& path, std::uintmax_t most_bytes);
+[[nodiscard]] Json read_json(const std::string& path, std::uintmax_t max_bytes);
 
 }  // namespace covol::tool

@@ -52,11 +52,11 @@ std::string with_hint(const std::string& message, const std::string& close, cons
 std::string nearest(const std::string& word, const std::vector<std::string>& known) {
     const std::size_t bound = std::max<std::size_t>(1, std::min<std::size_t>(3, word.size() / 3));
     std::string best;
-    std::size_t least = bound + 1;
+    std::size_t minimum = bound + 1;
     for (const std::string& name : known) {
         const std::size_t d = distance(word, name);
-        if (d < least) {
-            least = d;
+        if (d < minimum) {
+            minimum = d;
             best = name;
         }
     }

@@ -91,9 +91,9 @@ int open_special(const std::string& path, const RunContext& run) {
     // A stream of this process goes on where it is, also where it is a file.
     if (place.is_stream && place.path.parent_path() == fs::canonical("/proc/self/fd", status))
         return ::dup(std::stoi(place.path.filename().string()));
-    constexpr std::chrono::milliseconds kPause{20}, kUntilSaid{1000};
+    constexpr std::chrono::milliseconds kPause{20}, kUntilReported{1000};
     const auto begin = std::chrono::steady_clock::now();
-    bool said = false;
+    bool reported = false;
     for (;;) {
         const int file = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
         if (file >= 0 || (errno != ENXIO && errno != EINTR)) return file;
@@ -103,9 +103,9 @@ int open_special(const std::string& path, const RunContext& run) {
             return -1;
         }
         run.check();
-        if (!said && std::chrono::steady_clock::now() - begin > kUntilSaid) {
+        if (!reported && std::chrono::steady_clock::now() - begin > kUntilReported) {
             run.info(path + ": waiting for a program that reads this pipe");
-            said = true;
+            reported = true;
         }
         std::this_thread::sleep_for(kPause);
     }

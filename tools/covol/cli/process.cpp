@@ -18,16 +18,16 @@ void keep_standard_streams() {
 }
 
 std::string too_few_files() {
-    constexpr rlim_t kLeast = 16, kEnough = 4096;
+    constexpr rlim_t kMin = 16, kEnough = 4096;
     rlimit limit{};
     if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};
     if (limit.rlim_cur < std::min(limit.rlim_max, kEnough)) {
         limit.rlim_cur = std::min(limit.rlim_max, kEnough);
         static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
     }
-    if (limit.rlim_cur >= kLeast) return {};
+    if (limit.rlim_cur >= kMin) return {};
     return "this process may open " + std::to_string(limit.rlim_cur) + " files at once (ulimit -n), expected " +
-           std::to_string(kLeast) + " or more: Too many open files";
+           std::to_string(kMin) + " or more: Too many open files";
 }
 
 void catch_signals(void (*handler)(int)) {

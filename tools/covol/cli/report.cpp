@@ -124,8 +124,9 @@ Json to_json(const SegmentReport& r) {
     if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
     if (r.image_support) json["fit"]["image_support"] = *r.image_support;
     if (r.image_border)
-        json["fit"]["image_border"] = {
-            {"voxels", r.image_border->voxels}, {"share", r.image_border->share}, {"errors", r.image_border->errors}};
+        json["fit"]["image_border"] = {{"voxels", r.image_border->voxels},
+                                       {"share", r.image_border->fraction},
+                                       {"errors", r.image_border->errors}};
     if (r.marks_off.beyond > 0)
         json["fit"]["marks_off"] = {{"count", r.marks_off.count},
                                     {"beyond", r.marks_off.beyond},
@@ -160,7 +161,7 @@ Json to_json(const SegmentReport& r) {
                             {"gain", r.guidance.gain},
                             {"image_error", r.guidance.image_error},
                             {"guess_error", r.guidance.guess_error},
-                            {"confident_share", r.guidance.confident_share},
+                            {"confident_share", r.guidance.confident_fraction},
                             {"mean_offset", r.guidance.mean_offset},
                             {"max_offset", r.guidance.max_offset}};
     if (r.guess.marks > 0)
@@ -193,8 +194,8 @@ Json to_json(const SegmentReport& r) {
     if (r.holes.distance > 0) {
         json["holes"] = {{"policy", to_string(r.holes.policy)},
                          {"distance", r.holes.distance},
-                         {"surface_without_points", r.share_without_points},
-                         {"share", r.holes.share},
+                         {"surface_without_points", r.fraction_without_points},
+                         {"share", r.holes.fraction},
                          {"dropped_pieces", r.holes.dropped_pieces},
                          {"loops", Json::array()}};
         for (const BoundaryLoop& loop : r.holes.loops)
@@ -202,7 +203,7 @@ Json to_json(const SegmentReport& r) {
     }
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.surface_beyond_marks) json["fit"]["surface_beyond_marks"] = *r.surface_beyond_marks;
-    if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
+    if (r.fraction_without_points > 0) json["fit"]["surface_without_points"] = r.fraction_without_points;
     return json;
 }
 

@@ -142,8 +142,8 @@ std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI
     return words;
 }
 
-constexpr int kReportSchema = 1;    // grows when a field of the report goes or means something else
-constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
+constexpr int kReportSchema = 1;   // grows when a field of the report goes or means something else
+constexpr int kMaxThreads = 1024;  // TBB runs out of stacks long after
 
 }  // namespace
 
@@ -268,8 +268,8 @@ int Session::execute() {
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
-        if (threads_ < 0 || threads_ > kMostThreads)
-            throw Error(Errc::InvalidOptions, "--threads: expected 0 to " + std::to_string(kMostThreads) + ", got " +
+        if (threads_ < 0 || threads_ > kMaxThreads)
+            throw Error(Errc::InvalidOptions, "--threads: expected 0 to " + std::to_string(kMaxThreads) + ", got " +
                                                   std::to_string(threads_));
         run_.threads = threads_;
         run_.cancel = &cancel_requested;
@@ -281,7 +281,7 @@ int Session::execute() {
         run_.memory_budget = memory_bound_.bytes;
         guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_requested, [this] {
             if (has_last_word_.test_and_set()) return;  // the process ends by itself
-            const int code = tell_failure(kBadInput, memory_text());
+            const int code = report_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
         });
@@ -385,10 +385,10 @@ std::string Session::interrupted_text() const {
 
 int Session::fail(int code, const std::string& message) {
     while (has_last_word_.test_and_set()) ::pause();  // the memory guard ends the process
-    return tell_failure(code, message);
+    return report_failure(code, message);
 }
 
-int Session::tell_failure(int code, const std::string& message) {
+int Session::report_failure(int code, const std::string& message) {
     if (progress_) progress_->clear();
     std::cerr << "covol: error: " << one_line(with_flags(message)) << std::endl;
     return code;
@@ -398,7 +398,7 @@ void Session::note(const std::string& line) {
     if (!quiet_) progress_->line("covol: " + one_line(outputs_.shown(with_flags(line))));
 }
 
-void Session::say(const std::string& line) {
+void Session::print(const std::string& line) {
     if (json_path_ == "-") return progress_->line(safe_lines(line));  // standard output is the report's
     progress_->clear();
     std::cout << safe_lines(line) << std::endl;
@@ -408,8 +408,8 @@ void Session::say(const std::string& line) {
 void Session::warn(const std::string& message) {
     const std::string line = outputs_.shown(with_flags(message));
     // A file that is opened twice says the same twice.
-    for (const Json& said : report_["warnings"])
-        if (said == line) return;
+    for (const Json& warning : report_["warnings"])
+        if (warning == line) return;
     progress_->line("covol: warning: " + one_line(line));
     report_["warnings"].push_back(line);
 }

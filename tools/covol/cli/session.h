@@ -92,7 +92,7 @@ public:
     void note(const std::string& line);
     /// The result that was asked for (info, compare, check), on standard output; on standard error where --json - has
     /// that. Never silent.
-    void say(const std::string& line);
+    void print(const std::string& line);
     void warn(const std::string& message);
     /// What lengths and places mean in what is written: the image's unit and LPS; of points alone their own.
     void set_world(const ImageGeometry& geometry);
@@ -138,7 +138,7 @@ private:
     void write_report();
     /// Says why the run fails, unless the memory guard does so now.
     int fail(int code, const std::string& message);
-    int tell_failure(int code, const std::string& message);
+    int report_failure(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
     [[nodiscard]] const Json& described_inputs() const;
     /// Command and options as provenance has them.

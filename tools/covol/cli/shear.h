@@ -11,11 +11,11 @@ namespace covol::tool {
 [[nodiscard]] inline double shear_of(const ImageGeometry& geometry) {
     constexpr double kRounding = 1e-3;
     const Matrix3& d = geometry.direction;
-    double most = 0;
+    double maximum = 0;
     for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t b = 0; b < a; ++b)
-            most = std::max(most, std::abs(d[0][a] * d[0][b] + d[1][a] * d[1][b] + d[2][a] * d[2][b]));
-    return most > kRounding ? std::asin(std::min(1.0, most)) * 180 / std::numbers::pi : 0;
+            maximum = std::max(maximum, std::abs(d[0][a] * d[0][b] + d[1][a] * d[1][b] + d[2][a] * d[2][b]));
+    return maximum > kRounding ? std::asin(std::min(1.0, maximum)) * 180 / std::numbers::pi : 0;
 }
 
 }  // namespace covol::tool

@@ -23,7 +23,7 @@ namespace {
 /// How many of so many threads can be there at once beside those that are.
 int count_possible(int wanted) {
     std::promise<void> all_there;
-    const std::shared_future<void> end = all_there.get_future().share();
+    const std::shared_future<void> end = all_there.get_future().fraction();
     std::vector<std::thread> threads;
     threads.reserve(std::size_t(std::max(0, wanted)));
     try {
@@ -70,9 +70,9 @@ void before_libraries(int, char**, char**) { std::set_terminate(on_terminate); }
 }  // namespace
 
 ThreadCount limit_threads(int threads) {
-    const auto most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+    const auto maximum = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     ThreadCount count;
-    count.wanted = threads > 0 ? std::min(threads, most) : most;
+    count.wanted = threads > 0 ? std::min(threads, maximum) : maximum;
     // One more than TBB makes: a reader tries files in a copy of the process.
     count.possible = std::max(1, count_possible(count.wanted));
     // Never destroyed: TBB would make the threads then.

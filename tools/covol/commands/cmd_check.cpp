@@ -45,7 +45,7 @@ public:
 
 private:
     void add(const char* severity, const std::string& text, const std::string& mend = {}) {
-        session_.say(std::string(severity) + ": " + safe_text(text) + (mend.empty() ? "" : "; " + mend));
+        session_.print(std::string(severity) + ": " + safe_text(text) + (mend.empty() ? "" : "; " + mend));
         Json finding{{"severity", severity}, {"text", text}};
         if (!mend.empty()) finding["mend"] = mend;
         session_.report()["findings"].push_back(finding);
@@ -135,9 +135,9 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
 }
 
 /// Whether an image is labels that ImageJ would show black.
-bool has_display_range(const std::string& path, const FileFacts& facts, double most) {
+bool has_display_range(const std::string& path, const FileFacts& facts, double maximum) {
     constexpr double kLabels = 32;  // grey values of an image reach further
-    return facts.format != "ImageJ TIFF" || most > kLabels || header_holds(path, "\nmax=");
+    return facts.format != "ImageJ TIFF" || maximum > kLabels || header_holds(path, "\nmax=");
 }
 
 void check_image(const std::string& path, const ImageFlags& flags, const RunContext& run, Findings& findings) {
@@ -162,9 +162,9 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     if (range[0] == range[1] && !is_sample)
         findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
     if (g.unit.empty()) findings.remark("the file names no unit of length: lengths are in its own units");
-    const auto [least, most] = std::minmax_element(g.spacing.begin(), g.spacing.end());
-    if (*most > kFlatVoxels * *least)
-        findings.remark("voxels are " + std::to_string(*most / *least) +
+    const auto [minimum, maximum] = std::minmax_element(g.spacing.begin(), g.spacing.end());
+    if (*maximum > kFlatVoxels * *minimum)
+        findings.remark("voxels are " + std::to_string(*maximum / *minimum) +
                         " times longer along one axis: between the slices the surface is interpolated");
     if (!g.spacing_known)
         findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
@@ -242,8 +242,8 @@ void check(const std::string& path, Program program, const std::string& image_pa
     }
     for (const Advice& advice : advice_for(program, findings.facts)) findings.advise(advice);
     session.report()["problems"] = findings.problems();
-    session.say(path + ": " +
-                (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
+    session.print(path + ": " +
+                  (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
     if (findings.problems() > 0) session.set_exit_code(kBadInput);
 }
 

@@ -53,7 +53,7 @@ struct CompareJob {
         text << std::setprecision(6) << "Dice " << r.dice << ", Jaccard " << r.jaccard << ", volumes " << r.volume_a
              << " and " << r.volume_b << "\ndistance between the surfaces: mean " << r.assd << ", 95 % " << r.hd95
              << ", max " << r.hausdorff;
-        session.say(text.str());
+        session.print(text.str());
     }
 
     /// Of a level set the mesh that the other commands write.
@@ -79,7 +79,7 @@ struct CompareJob {
         std::ostringstream text;
         text << std::setprecision(6) << "points to surface: mean " << fit.mean << ", 95 % " << fit.p95 << ", max "
              << fit.max;
-        session.say(text.str());
+        session.print(text.str());
     }
 };
 

@@ -28,11 +28,11 @@ struct DistanceJob {
     }
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {
-        const Length asked = domain.length("voxel_size");
-        if (geometry == nullptr || (asked.given && !asked.in_voxels))
-            return resolve_voxel_size(asked, nullptr, cloud, true, session);
+        const Length requested = domain.length("voxel_size");
+        if (geometry == nullptr || (requested.given && !requested.in_voxels))
+            return resolve_voxel_size(requested, nullptr, cloud, true, session);
         const double finest = geometry->smallest_spacing();
-        return asked.resolve(finest, finest);
+        return requested.resolve(finest, finest);
     }
 
     void run(Session& session) const {

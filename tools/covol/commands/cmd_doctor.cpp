@@ -60,19 +60,19 @@ bool is_main(const std::string& name) {
 struct DoctorJob {
     void run(Session& session) const {
         Json& report = session.report()["doctor"];
-        session.say(std::string("covol ") + version() + ", " + build_text());
+        session.print(std::string("covol ") + version() + ", " + build_text());
         if (std::string(version()) != COVOL_VERSION_STRING)
             session.warn(
                 std::string("the program is of version " COVOL_VERSION_STRING ", the library that it found of ") +
                 version() + "; install covol again, and see LD_LIBRARY_PATH");
         const std::string program = fs::read_symlink("/proc/self/exe").string();
-        session.say("program: " + program);
+        session.print("program: " + program);
         report = {{"build", build_text()}, {"program", program}};
         report["readers"] = readers(session);  // before libraries(): their own are then loaded
         report["libraries"] = libraries(session);
         const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
-        session.say(std::string("processor: ") + std::to_string(cores) + " cores, instruction set " +
-                    instruction_set());
+        session.print(std::string("processor: ") + std::to_string(cores) + " cores, instruction set " +
+                      instruction_set());
         report["cores"] = cores;
         report["memory"] = memory(session);
         report["scratch"] = scratch(session);
@@ -84,13 +84,13 @@ private:
         Json list = Json::array();
         for (const ReaderPart& part : check_reader_parts()) {
             if (part.problem.empty())
-                session.say("reader " + part.name + ": there (" + part.formats + ")");
+                session.print("reader " + part.name + ": there (" + part.formats + ")");
             else
                 session.warn("reader " + part.name + " (" + part.formats + "): " + part.problem);
             list.push_back(
                 {{"name", part.name}, {"formats", part.formats}, {"path", part.path}, {"problem", part.problem}});
         }
-        session.say("other formats need no part of their own: TIFF, NIfTI, OME-Zarr, MRC, OpenVDB, meshes, tables");
+        session.print("other formats need no part of their own: TIFF, NIfTI, OME-Zarr, MRC, OpenVDB, meshes, tables");
         return list;
     }
 
@@ -108,17 +108,17 @@ private:
         for (const char* const name : {"LD_LIBRARY_PATH", "LD_PRELOAD"})
             if (const std::string value = variable(name); !value.empty())
                 text += std::string("\n  ") + name + " is " + value;
-        session.say(text);
+        session.print(text);
         return list;
     }
 
     static Json memory(Session& session) {
         const std::optional<FreeMemory> free = find_free_memory();
         if (!free) {
-            session.say("memory: nobody says what is free");
+            session.print("memory: nobody says what is free");
             return {{"free_bytes", nullptr}, {"where", ""}};
         }
-        session.say("memory: " + bytes_text(double(free->bytes)) + " free, says " + free->where);
+        session.print("memory: " + bytes_text(double(free->bytes)) + " free, says " + free->where);
         return {{"free_bytes", free->bytes}, {"where", free->where}};
     }
 
@@ -131,7 +131,7 @@ private:
                          "; set TMPDIR to a folder that can be written");
             return {{"folder", folder.string()}, {"free_bytes", 0}};
         }
-        session.say("temporary files: " + folder.string() + ", " + bytes_text(double(space.available)) + " free");
+        session.print("temporary files: " + folder.string() + ", " + bytes_text(double(space.available)) + " free");
         return {{"folder", folder.string()}, {"free_bytes", space.available}};
     }
 
@@ -140,11 +140,12 @@ private:
         const std::string display =
             variable("WAYLAND_DISPLAY").empty() ? variable("DISPLAY") : variable("WAYLAND_DISPLAY");
         if (opener.empty() || display.empty())
-            session.say(std::string("browser: ") + (opener.empty() ? "no xdg-open, " : "no display, ") +
-                        "so covol mark prints its address; from another machine: covol mark IMAGE --no-browser --port "
-                        "9000 behind ssh -L 9000:127.0.0.1:9000");
+            session.print(
+                std::string("browser: ") + (opener.empty() ? "no xdg-open, " : "no display, ") +
+                "so covol mark prints its address; from another machine: covol mark IMAGE --no-browser --port "
+                "9000 behind ssh -L 9000:127.0.0.1:9000");
         else
-            session.say("browser: opened by " + opener);
+            session.print("browser: opened by " + opener);
         return {{"opener", opener}, {"display", display}};
     }
 };

@@ -32,9 +32,9 @@ const char* name_of(PointSpace space) {
 void describe_vdb(const std::string& path, Session& session) {
     Json& grids = session.report()["grids"] = Json::array();
     for (const VdbGridInfo& g : list_vdb(path)) {
-        session.say(safe_text(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class)) +
-                    ", " + std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
-                    (g.uniform ? "" : " (not uniform)") + ", " + triple(g.min) + " to " + triple(g.max));
+        session.print(safe_text(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class)) +
+                      ", " + std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
+                      (g.uniform ? "" : " (not uniform)") + ", " + triple(g.min) + " to " + triple(g.max));
         grids.push_back({{"name", g.name},
                          {"type", g.type},
                          {"class", g.grid_class},
@@ -79,13 +79,13 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
     if (of_chunks) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     if (of_slices) text << ", of slices spread over the file";
     if (of_chunks || of_slices) text << ": an estimate";
-    session.say(text.str());
+    session.print(text.str());
     session.report()["image"]["range_is_estimate"] = of_chunks || of_slices;
     return {range[0], range[1]};
 }
 
 void describe_image(const std::string& path, const ImageFlags& flags, Session& session) {
-    constexpr int kMostChannels = 16;  // for which the pixels are read
+    constexpr int kMaxChannels = 16;  // for which the pixels are read
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
@@ -102,7 +102,7 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     if (in_chunks) text << "\nchunks of " << triple(info.chunk_size) << " voxels";
     for (const std::string& level : info.levels) text << "\nlevel " << safe_text(level);
     for (const auto& [field, value] : info.fields) text << "\n  " << safe_text(field) << ": " << safe_text(value);
-    session.say(text.str());
+    session.print(text.str());
 
     Json& report = session.report()["image"] = to_json(g);
     report["format"] = info.format;
@@ -116,7 +116,7 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     report["spacing_known"] = {info.spacing_known[0], info.spacing_known[1], info.spacing_known[2]};
     for (const auto& [field, value] : info.fields) report["fields"][field] = value;
     const int first = flags.options.channel.value_or(0);
-    const int last = flags.options.channel ? first : std::min(info.channels, kMostChannels) - 1;
+    const int last = flags.options.channel ? first : std::min(info.channels, kMaxChannels) - 1;
     for (int channel = first; channel <= last; ++channel) {
         const Json range = range_of(path, flags.options, channel, info, session);
         if (channel == first) report["range"] = range;
@@ -127,8 +127,8 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
 void describe_mesh(const std::string& path, Session& session) {
     const TriangleMesh mesh = read_mesh(path);
     const MeshMeasures measures = measure(mesh);
-    session.say(std::to_string(mesh.vertices.size()) + " vertices, " + std::to_string(mesh.triangles.size()) +
-                " triangles\n" + one_line(measures));
+    session.print(std::to_string(mesh.vertices.size()) + " vertices, " + std::to_string(mesh.triangles.size()) +
+                  " triangles\n" + one_line(measures));
     session.report()["mesh"] = to_json(measures);
     session.report()["mesh"]["vertices"] = mesh.vertices.size();
     session.report()["mesh"]["triangles"] = mesh.triangles.size();
@@ -157,7 +157,7 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
              << s.p95 << ", max " << s.max;
         report["spacing"] = {{"median", s.median}, {"mean", s.mean}, {"p95", s.p95}, {"max", s.max}};
     }
-    session.say(text.str());
+    session.print(text.str());
 }
 
 void describe(const std::string& path, const ImageFlags& flags, const PointFlags& points, Session& session) {

@@ -39,10 +39,10 @@ std::string policy_of(const std::string& page) {
 
 /// Decoded chunks that are kept for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in chunks of 128 takes
 /// 128 MiB where two voxels make a pixel.
-constexpr std::uint64_t kMostSliceBytes = std::uint64_t(512) << 20;
+constexpr std::uint64_t kMaxSliceBytes = std::uint64_t(512) << 20;
 
 /// Decoded chunks that surfaces were made from, before they are given up.
-constexpr std::uint64_t kMostJobBytes = std::uint64_t(768) << 20;
+constexpr std::uint64_t kMaxJobBytes = std::uint64_t(768) << 20;
 
 /// "scan.nii.gz" of a path that may end in a slash.
 std::filesystem::path without_slash(const std::string& path) {
@@ -63,12 +63,12 @@ std::uint16_t usual_port(const std::string& study) {
 
 std::unique_ptr<serve::WebServer> start_server(serve::Options options, const serve::Handlers& handlers,
                                                const std::string& study) {
-    const bool is_asked = options.port != 0;
-    if (!is_asked) options.port = usual_port(study);
+    const bool is_given = options.port != 0;
+    if (!is_given) options.port = usual_port(study);
     try {
         return std::make_unique<serve::WebServer>(options, handlers);
     } catch (const Error& error) {
-        if (is_asked || error.code() != Errc::Io) throw;
+        if (is_given || error.code() != Errc::Io) throw;
         options.port = 0;
         return std::make_unique<serve::WebServer>(options, handlers);
     }
@@ -103,15 +103,15 @@ struct MarkJob {
         options.frame_origins = frame_origins;
         options.page_policy = policy_of(view.page);
         // A page that comes back sends what was done meanwhile as fast as it is kept, a millisecond or less each.
-        options.most_body_bytes = kMostFileBytes;
+        options.max_body_bytes = kMaxFileBytes;
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
-        const ImageLevels levels = open_image_levels(pixels, image.options, kMostSliceBytes, session.run());
+        const ImageLevels levels = open_image_levels(pixels, image.options, kMaxSliceBytes, session.run());
         // A packed stream, which takes long to open, is opened once.
         const bool is_bounded = levels.is_in_chunks();
         BoundedImage for_jobs(is_bounded ? open() : pixels, open,
-                              is_bounded ? kMostJobBytes : std::numeric_limits<std::uint64_t>::max());
+                              is_bounded ? kMaxJobBytes : std::numeric_limits<std::uint64_t>::max());
         auto seen =
             std::make_unique<PageImage>(levels, view.title, is_anatomical(image_path, image.options, session.run()),
                                         channels(info, session), quiet(session.run()));
@@ -162,7 +162,7 @@ private:
             other.options.channel = channel;
             session.require_memory(bytes, "another channel");
             const Image pixels = other.read(how.image_path, quiet(session.run()));
-            return open_image_levels(pixels, other.options, kMostSliceBytes / 4, quiet(session.run()));
+            return open_image_levels(pixels, other.options, kMaxSliceBytes / 4, quiet(session.run()));
         };
         return all;
     }

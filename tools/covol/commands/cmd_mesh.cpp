@@ -25,7 +25,7 @@ struct MeshJob {
         session.report()["cleanup"] = {{"self_intersections", done.self_intersections},
                                        {"holes_filled", done.holes_filled},
                                        {"intersection_free", done.intersection_free}};
-        const auto tell = [&](const char* step, const std::optional<CleanupStep>& made) {
+        const auto record = [&](const char* step, const std::optional<CleanupStep>& made) {
             if (!made) return;
             const MeshDeviation change{made->change.max / h, made->change.mean / h};
             session.report()["cleanup"][step] = {{"triangles", made->triangles},
@@ -35,8 +35,8 @@ struct MeshJob {
             session.note(std::string(step) + ": " + mesh_line(made->triangles, made->smallest_angle, made->deviation) +
                          "; off the mesh before: " + one_line(change));
         };
-        tell("decimation", done.decimation);
-        tell("smoothing", done.smoothing);
+        record("decimation", done.decimation);
+        record("smoothing", done.smoothing);
     }
 
     /// Marching cubes as they are, from the tree to the file.

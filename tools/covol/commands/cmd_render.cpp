@@ -13,7 +13,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr int kMostFrames = 9999;
+constexpr int kMaxFrames = 9999;
 
 struct RenderJob {
     std::string input, output, image_path, view = "iso";
@@ -25,8 +25,8 @@ struct RenderJob {
     Given<RenderOptions> given;
 
     void run(Session& session) const {
-        if (turntable < 0 || turntable > kMostFrames)
-            throw Error(Errc::InvalidOptions, "--turntable: expected 0 to " + std::to_string(kMostFrames) + ", got " +
+        if (turntable < 0 || turntable > kMaxFrames)
+            throw Error(Errc::InvalidOptions, "--turntable: expected 0 to " + std::to_string(kMaxFrames) + ", got " +
                                                   std::to_string(turntable));
         for (int n = 0; n < std::max(1, turntable); ++n)
             session.outputs().check("-o", frame_path(n), OutputKind::Picture);
@@ -99,7 +99,7 @@ private:
     void add_opacities(RenderScene& scene) const {
         for (const std::string& text : opacities) {
             const Named given = split_name(text);
-            const double value = parse_share(given.value);
+            const double value = parse_fraction(given.value);
             if (given.name.empty())
                 for (RenderStructure& structure : scene.structures) structure.opacity = value;
             else
@@ -107,7 +107,7 @@ private:
         }
     }
 
-    static double parse_share(const std::string& text) {
+    static double parse_fraction(const std::string& text) {
         const double value = parse_number("--opacity", text);
         if (!(value >= 0 && value <= 1)) throw UsageError("--opacity: expected [NAME=]SHARE, 0 to 1, got " + text);
         return value;

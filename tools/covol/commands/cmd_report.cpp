@@ -80,8 +80,8 @@ private:
         const std::vector<VdbGridInfo> grids = list_vdb(input);
         if (grids.empty()) return facts;
         for (const auto& [key, value] : grids.front().metadata) {
-            const Json said = Json::parse(value, nullptr, false);
-            if (key == "covol_resolved" && said.is_object()) facts["resolved"] = said;
+            const Json parsed = Json::parse(value, nullptr, false);
+            if (key == "covol_resolved" && parsed.is_object()) facts["resolved"] = parsed;
         }
         return facts;
     }
@@ -90,24 +90,24 @@ private:
     [[nodiscard]] Json with_run(Json facts) const {
         std::ifstream file = open_regular_file(run_report);
         if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");
-        const Json told = Json::parse(file, nullptr, false);
-        if (!told.is_object() || !told.contains("covol"))
+        const Json loaded = Json::parse(file, nullptr, false);
+        if (!loaded.is_object() || !loaded.contains("covol"))
             throw Error(Errc::InvalidInput,
                         "--run-report: " + run_report + ": expected a report that covol wrote with --json");
         for (const char* name :
              {"input", "resolved", "automatic", "grid", "solve", "surface", "fit", "seconds", "expected_dice"})
-            if (told.contains(name) && told[name].is_object()) facts[name] = told[name];
-        if (told.contains("warnings") && told["warnings"].is_array()) facts["warnings"] = told["warnings"];
-        if (told.contains("structures") && told["structures"].is_array())
-            for (const Json& structure : told["structures"])
+            if (loaded.contains(name) && loaded[name].is_object()) facts[name] = loaded[name];
+        if (loaded.contains("warnings") && loaded["warnings"].is_array()) facts["warnings"] = loaded["warnings"];
+        if (loaded.contains("structures") && loaded["structures"].is_array())
+            for (const Json& structure : loaded["structures"])
                 if (structure.is_object()) facts["structures"].push_back(structure);
         return facts;
     }
 
     /// Whether a run's report on a structure is about this level set.
-    [[nodiscard]] static bool is_about(const Json& told, const std::string& grid) {
+    [[nodiscard]] static bool is_about(const Json& loaded, const std::string& grid) {
         for (const char* name : {"vdb_grid", "name"})
-            if (told.contains(name) && told[name] == grid) return true;
+            if (loaded.contains(name) && loaded[name] == grid) return true;
         return false;
     }
 
@@ -162,14 +162,14 @@ private:
         }
         Json list = Json::array();
         for (const Shown& shown : all) {
-            Json told{{"name", shown.grid}};
+            Json loaded{{"name", shown.grid}};
             for (const Json& known : facts.value("structures", Json::array()))
-                if (is_about(known, shown.grid)) told.update(known, true);
-            told["name"] = shown.grid;
+                if (is_about(known, shown.grid)) loaded.update(known, true);
+            loaded["name"] = shown.grid;
             if (facts.contains("resolved") && facts["resolved"].contains(shown.grid))
-                told["resolved"] = facts["resolved"][shown.grid];
-            told.update(shown.facts, true);
-            list.push_back(told);
+                loaded["resolved"] = facts["resolved"][shown.grid];
+            loaded.update(shown.facts, true);
+            list.push_back(loaded);
         }
         facts.erase("resolved");
         facts["structures"] = list;

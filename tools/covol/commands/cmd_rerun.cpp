@@ -322,13 +322,13 @@ private:
             voxels += one->activeVoxelCount();
             if (found.same_layout && found.voxels == 0) continue;
             same = false;
-            session.say(safe_text(info.name) + ": " +
-                        (found.same_layout ? std::to_string(found.voxels) + " voxels differ, by up to " +
-                                                 std::to_string(found.largest)
-                                           : "other voxels are active than before"));
+            session.print(safe_text(info.name) + ": " +
+                          (found.same_layout ? std::to_string(found.voxels) + " voxels differ, by up to " +
+                                                   std::to_string(found.largest)
+                                             : "other voxels are active than before"));
         }
         facts["same"] = same;
-        if (same) return session.say("the same bits: " + std::to_string(voxels) + " active voxels");
+        if (same) return session.print("the same bits: " + std::to_string(voxels) + " active voxels");
         session.set_exit_code(kBadInput);
     }
 };

@@ -151,13 +151,13 @@ std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional
 
 // ---- model ---------------------------------------------------------------------------------------------------------
 
-double resolve_voxel_size(const Length& asked, const Image* image, const std::vector<Vec3>& points, bool tagged,
+double resolve_voxel_size(const Length& requested, const Image* image, const std::vector<Vec3>& points, bool tagged,
                           Session& session) {
-    if (asked.given && !asked.in_voxels) return asked.value;
+    if (requested.given && !requested.in_voxels) return requested.value;
     const VoxelSizeChoice choice = image != nullptr ? choose_voxel_size(*image) : choose_voxel_size(points, tagged);
-    const double h = asked.resolve(choice.voxel_size, choice.voxel_size);
+    const double h = requested.resolve(choice.voxel_size, choice.voxel_size);
     const std::string line =
-        to_text(h) + " (" + (asked.given ? to_text(asked.value) + " times " : "") + choice.reason + ")";
+        to_text(h) + " (" + (requested.given ? to_text(requested.value) + " times " : "") + choice.reason + ")";
     session.note("voxel_size: " + line);
     session.report()["automatic"]["voxel_size"] = line;
     return h;

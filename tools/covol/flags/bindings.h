@@ -137,7 +137,7 @@ struct PointFlags : Given<ReadPointsOptions> {
 
 /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
 /// @param tagged  of choose_voxel_size()
-[[nodiscard]] double resolve_voxel_size(const Length& asked, const Image* image, const std::vector<Vec3>& points,
+[[nodiscard]] double resolve_voxel_size(const Length& requested, const Image* image, const std::vector<Vec3>& points,
                                         bool tagged, Session& session);
 
 struct MeshFlags : Given<WriteMeshOptions> {

@@ -12,7 +12,7 @@ constexpr double kJoinBytes = 30;     ///< likewise, when bricks of it are joine
 constexpr double kMeshBytes = 80;     ///< likewise with the whole mesh
 constexpr double kBaseBytes = 1.5e8;  ///< the program itself
 constexpr double kLayers = 1.3;       ///< with its neighbours' layers a brick has so much more of the band
-constexpr double kLeastVoxels = 2e5;
+constexpr double kMinVoxels = 2e5;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ double memory_of_joined_mesh(double active_voxels) { return kBaseBytes + kMeshBy
 void BrickFlags::bind(CLI::App& command) {
     in_group(command, Group::Numerics);
     command
-        .add_option("--brick-voxels", most_voxels,
+        .add_option("--brick-voxels", max_voxels,
                     "band voxels of a brick, of covol brick or beyond --memory-limit [8000000, or what --memory-limit "
                     "allows]")
         ->check(CLI::Range(std::int64_t(1000), std::int64_t(1) << 40).description(""))
@@ -35,9 +35,9 @@ void BrickFlags::bind(CLI::App& command) {
 BrickOptions BrickFlags::resolve(std::optional<std::uint64_t> memory) const {
     BrickOptions resolved = options;
     if (memory)
-        resolved.most_voxels =
-            std::llround(std::max(kLeastVoxels, (double(*memory) - kBaseBytes) / (kBandBytes * kLayers)));
-    if (most_voxels) resolved.most_voxels = *most_voxels;
+        resolved.max_voxels =
+            std::llround(std::max(kMinVoxels, (double(*memory) - kBaseBytes) / (kBandBytes * kLayers)));
+    if (max_voxels) resolved.max_voxels = *max_voxels;
     return resolved;
 }
 

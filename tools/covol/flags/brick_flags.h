@@ -9,7 +9,7 @@ namespace covol::tool {
 
 /// How a job is split, by `covol brick` and where --memory-limit asks for it.
 struct BrickFlags : Given<BrickOptions> {
-    std::optional<std::int64_t> most_voxels;
+    std::optional<std::int64_t> max_voxels;
 
     void bind(CLI::App& command);
     /// @param memory  bytes that a brick may take; none: the default's size

@@ -6,13 +6,13 @@
 
 namespace covol::tool {
 
-void CloudFlags::bind(CLI::App& command, bool with_most) {
+void CloudFlags::bind(CLI::App& command, bool with_inputs) {
     in_group(command, Group::Clouds);
     for_each_option(options, [&](const OptionInfo& option, auto&) {
         if (option.name == std::string_view("remove_outliers"))
             command.add_flag(flag_of(option.name) + "{3}", outlier_factor, option.text)->option_text("[=FACTOR]");
     });
-    if (with_most) bind_options(command, inputs, Offered::PointsAlone);
+    if (with_inputs) bind_options(command, inputs, Offered::PointsAlone);
     bind_options(command, *this, Offered::Always, {"remove_outliers"});
 }
 

@@ -15,8 +15,8 @@ struct CloudFlags : Given<CloudCleanupOptions> {
     std::string outlier_factor;  ///< a number; empty: outliers stay
     Given<InputOptions> inputs;
 
-    /// @param with_most  --most-points, too
-    void bind(CLI::App& command, bool with_most);
+    /// @param with_inputs  --most-points, too
+    void bind(CLI::App& command, bool with_inputs);
     /// @throws Error InvalidOptions for what is wrong whatever h is.
     void check() const;
     /// @throws UsageError where an option is given, and there is no cloud.

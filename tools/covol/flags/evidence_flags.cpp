@@ -78,7 +78,7 @@ std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& ev
     return attributes;
 }
 
-void tell(Session& session, const Evidence& e, const std::string& who) {
+void print_evidence(Session& session, const Evidence& e, const std::string& who) {
     std::ostringstream text;
     text << who << std::setprecision(3) << 100 * e.unsupported_area / e.area
          << " % of the surface rests on neither marks nor edges (farther than " << e.reach
@@ -88,7 +88,7 @@ void tell(Session& session, const Evidence& e, const std::string& who) {
         text.str("");
         text << who << "marks would help in slice " << s.slice << ", at voxel " << text_of(s.index, 1) << " (world "
              << text_of(s.world, 3) << "): they would support an area of " << s.area;
-        session.say(text.str());
+        session.print(text.str());
     }
 }
 

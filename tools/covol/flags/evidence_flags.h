@@ -40,7 +40,7 @@ struct EvidenceFlags {
 [[nodiscard]] std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& evidence);
 
 /// Prints what share is unsupported, and the suggestions; `who` begins the lines.
-void tell(Session& session, const Evidence& evidence, const std::string& who = {});
+void print_evidence(Session& session, const Evidence& evidence, const std::string& who = {});
 
 /// One surface in the table of slices.
 struct EvidenceOf {

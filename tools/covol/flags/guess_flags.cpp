@@ -18,7 +18,7 @@ Json to_json(const CorrectionReport& r) {
             {"seeds", r.seeds},
             {"marks_to_guess", {{"mean", r.before_mean}, {"max", r.before_max}}},
             {"marks_to_corrected", {{"mean", r.after_mean}, {"max", r.after_max}}},
-            {"radius", {{"least", r.least_radius}, {"largest", r.largest_radius}}},
+            {"radius", {{"least", r.min_radius}, {"largest", r.largest_radius}}},
             {"depth", r.depth}};
 }
 

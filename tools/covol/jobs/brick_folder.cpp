@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMostFactsBytes = 1 << 20;  // of what a sweep says of a brick
-constexpr std::int64_t kMostVoxels = std::int64_t(1) << 40;
+constexpr std::uintmax_t kMaxFactsBytes = 1 << 20;  // of what a sweep says of a brick
+constexpr std::int64_t kMaxVoxels = std::int64_t(1) << 40;
 
 /// A whole number of JSON, in a range. @throws std::out_of_range, as Json does for what is missing
 template <typename Number = int>
@@ -93,7 +93,7 @@ Json as_json(const Brick& brick) {
 
 Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
     Brick brick{
-        {index_of(json, "min"), index_of(json, "max")}, whole<std::int64_t>(json, "active_voxels", 0, kMostVoxels), {}};
+        {index_of(json, "min"), index_of(json, "max")}, whole<std::int64_t>(json, "active_voxels", 0, kMaxVoxels), {}};
     for (int a = 0; a < 3; ++a)
         if (brick.core.min[a] > brick.core.max[a] || brick.core.min[a] < domain.min[a] ||
             brick.core.max[a] > domain.max[a])
@@ -141,7 +141,7 @@ struct BrickFacts {
 };
 
 BrickFacts read_facts(const std::string& path) {
-    const Json json = read_json(path, kMostFactsBytes);
+    const Json json = read_json(path, kMaxFactsBytes);
     try {
         BrickFacts facts;
         facts.same = json.at("same").get<bool>();
@@ -192,8 +192,8 @@ void BrickFolder::write_plan(const BrickPlan& plan, const JobOptions& job, const
               {"inputs", Json::array()},
               {"overlap", plan.options.overlap},
               {"tolerance", plan.options.tolerance},
-              {"most_sweeps", plan.options.most_sweeps},
-              {"most_voxels", plan.options.most_voxels},
+              {"most_sweeps", plan.options.max_sweeps},
+              {"most_voxels", plan.options.max_voxels},
               {"has_sweeps", plan.has_sweeps},
               {"voxel_size", plan.domain.voxel_size},
               {"origin", plan.domain.origin},
@@ -209,14 +209,14 @@ void BrickFolder::write_plan(const BrickPlan& plan, const JobOptions& job, const
 BrickPlan BrickFolder::read_plan() const {
     const std::string file = plan_file(path_);
     const Json json = read_plan_file(path_);
-    constexpr int kMostInt = std::numeric_limits<int>::max();
+    constexpr int kMaxInt = std::numeric_limits<int>::max();
     BrickPlan plan;
     try {
         check_inputs(json, file);
-        plan.options.overlap = whole(json, "overlap", 0, kMostInt);
+        plan.options.overlap = whole(json, "overlap", 0, kMaxInt);
         plan.options.tolerance = real(json, "tolerance");
-        plan.options.most_sweeps = whole(json, "most_sweeps", 0, kMostInt);
-        plan.options.most_voxels = whole<std::int64_t>(json, "most_voxels", 0, kMostVoxels);
+        plan.options.max_sweeps = whole(json, "most_sweeps", 0, kMaxInt);
+        plan.options.max_voxels = whole<std::int64_t>(json, "most_voxels", 0, kMaxVoxels);
         plan.has_sweeps = json.at("has_sweeps").get<bool>();
         plan.domain = domain_of_plan(json);
         plan.edge = edge_of(json.at("edge"));

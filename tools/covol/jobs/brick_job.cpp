@@ -49,15 +49,15 @@ public:
     void run_all() const {
         std::vector<std::size_t> all(plan_.bricks.size());
         std::iota(all.begin(), all.end(), std::size_t(0));
-        const int most = plan_.has_sweeps ? plan_.options.most_sweeps : 1;
-        for (int sweep = 1; sweep <= most; ++sweep) {
+        const int maximum = plan_.has_sweeps ? plan_.options.max_sweeps : 1;
+        for (int sweep = 1; sweep <= maximum; ++sweep) {
             const std::size_t moved = run_sweep(sweep, all);
             run_.info("sweep " + std::to_string(sweep) + ": " + std::to_string(moved) + " of " +
                       std::to_string(all.size()) + " bricks solved");
             if (moved == 0) return;
         }
         if (plan_.has_sweeps)
-            run_.info("neighbours do not agree within --seam-tolerance after " + std::to_string(most) + " sweeps");
+            run_.info("neighbours do not agree within --seam-tolerance after " + std::to_string(maximum) + " sweeps");
     }
 
 private:
@@ -115,7 +115,7 @@ RunContext quiet(const RunContext& run) {
 /// Seams of less than that are averaged out.
 constexpr double kWarnOfGap = 0.5;  // voxels
 
-void tell_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
+void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
     double gap = 0;
     for (std::size_t n = 0; n < plan.bricks.size(); ++n)
         gap = std::max(gap, measure_seams(plan, n, folder.states(sweep)));
@@ -162,7 +162,7 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
     if (sweep == 0)
         throw Error(Errc::InvalidInput,
                     folder.path() + ": expected a state of each brick: run covol brick run " + folder.path());
-    if (plan.has_sweeps) tell_of_seams(plan, folder, sweep, session);
+    if (plan.has_sweeps) report_seams(plan, folder, sweep, session);
     SegmentResult result = job.join(plan, folder.states(sweep), without_mesh);
     const BrickFolder::Spent spent = folder.spent(sweep, plan.bricks.size());
     result.report.solve.steps = spent.steps;
@@ -175,7 +175,7 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
     return result;
 }
 
-void tell_plan(const BrickPlan& plan, Session& session) {
+void print_plan(const BrickPlan& plan, Session& session) {
     std::int64_t largest = 0;
     for (const Brick& brick : plan.bricks) largest = std::max(largest, brick.active_voxels);
     const double memory = memory_of_band(1.3 * double(largest));
@@ -184,8 +184,8 @@ void tell_plan(const BrickPlan& plan, Session& session) {
             {"active_voxels", plan.active_voxels()},
             {"largest_brick", largest},
             {"memory_bytes", std::llround(memory)}};
-    session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: " + about_voxels(plan.active_voxels()) +
-                ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
+    session.print("bricks: " + std::to_string(plan.bricks.size()) + ", band: " + about_voxels(plan.active_voxels()) +
+                  ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
 }
 
 /// Outputs that were named where the job is planned, which is not where they are made.
@@ -224,7 +224,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
         if (const std::string outputs = outputs_of_join(session); !outputs.empty())
             session.note("the plan keeps settings and inputs alone; name what is to be written behind brick join: " +
                          outputs);
-        return tell_plan(plan, session);
+        return print_plan(plan, session);
     }
     const RunContext inner = quiet(session.run());
     const BrickPlan plan = folder.read_plan();

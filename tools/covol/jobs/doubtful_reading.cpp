@@ -29,8 +29,8 @@ std::optional<double> edge_at(const Image& image, const Vec3& index) {
 }  // namespace
 
 std::optional<double> edges_if_voxels(const std::vector<Vec3>& marks, const Image& image) {
-    constexpr std::size_t kFewest = 8, kMost = 100;
-    constexpr double kClearly = 2, kMostOfThem = 0.7;
+    constexpr std::size_t kFewest = 8, kMax = 100;
+    constexpr double kClearly = 2, kClearFraction = 0.7;
     const ImageGeometry& geometry = image.geometry();
     if (marks.size() < kFewest || !geometry.spacing_known) return std::nullopt;
     double apart = 0;
@@ -44,7 +44,7 @@ std::optional<double> edges_if_voxels(const std::vector<Vec3>& marks, const Imag
     if (apart < 1) return std::nullopt;
     double now = 0, otherwise = 0;
     std::size_t seen = 0, stronger = 0;
-    const std::size_t step = (marks.size() + kMost - 1) / kMost;
+    const std::size_t step = (marks.size() + kMax - 1) / kMax;
     for (std::size_t n = 0; n < marks.size(); n += step) {
         const auto here = edge_at(image, geometry.world_to_index(marks[n])), there = edge_at(image, marks[n]);
         if (!here || !there) continue;
@@ -53,7 +53,7 @@ std::optional<double> edges_if_voxels(const std::vector<Vec3>& marks, const Imag
         ++seen;
         stronger += *there > *here ? 1 : 0;
     }
-    if (seen < kFewest || double(stronger) < kMostOfThem * double(seen) || !(otherwise > kClearly * now))
+    if (seen < kFewest || double(stronger) < kClearFraction * double(seen) || !(otherwise > kClearly * now))
         return std::nullopt;
     return now > 0 ? otherwise / now : otherwise;
 }

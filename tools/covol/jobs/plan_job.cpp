@@ -24,8 +24,8 @@ constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the 
 constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
 constexpr double kBaseBytes = 6.5e7;     ///< the program itself
 constexpr double kGuessBandBytes = 335;  ///< in place of kBandBytes while a guess learns from the image
-constexpr double kCloudPointBytes = 4000, kMostCloudBytes = 1e8;  ///< for each point of a cloud, and of all
-constexpr double kFlowTime = 1.3;                                 ///< a flow with an image over one without
+constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and of all
+constexpr double kFlowTime = 1.3;                                ///< a flow with an image over one without
 constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
 constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
@@ -168,7 +168,7 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     std::optional<ImageGeometry> geometry;
     if (image != nullptr) geometry = image->geometry;
     read_marks(marks, geometry, job.reading(quiet), quiet);
-    if (!geometry) thin_points(marks, job.cloud.inputs.options.most_points, quiet);
+    if (!geometry) thin_points(marks, job.cloud.inputs.options.max_points, quiet);
     const std::vector<Vec3> given = positions_of(marks, geometry);
     if (given.empty())
         throw Error(Errc::InvalidInput,
@@ -190,7 +190,7 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     plan.seconds = fixed + growing / (c * c) * finer * finer;
     if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
     plan.bytes_while_solved = kTubeBytes * plan.tube_voxels - kBandBytes * plan.active_voxels;
-    if (pilot.is_cloud) plan.bytes_while_solved = std::min(kCloudPointBytes * double(given.size()), kMostCloudBytes);
+    if (pilot.is_cloud) plan.bytes_while_solved = std::min(kCloudPointBytes * double(given.size()), kMaxCloudBytes);
     if (image == nullptr) return plan;
     if (pilot.is_guess) {
         plan_smoothing(*pilot.surface, *image, kGuessVoxels * h, plan);
@@ -230,8 +230,8 @@ void run_plan(const SegmentJob& job, Session& session) {
                          {"size", n},
                          {"type", to_string(image->type)},
                          {"unpacked_bytes", std::llround(image_bytes)}};
-        session.say("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
-                    bytes_text(image_bytes) + " unpacked");
+        session.print("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
+                      bytes_text(image_bytes) + " unpacked");
     }
     double voxels = 0, while_solved = 0, seconds = 0;
     std::set<std::uint64_t> blocks;
@@ -256,9 +256,9 @@ void run_plan(const SegmentJob& job, Session& session) {
                                        {"read", std::llround(read)},
                                        {"of", std::llround(total)},
                                        {"unpacked_bytes", std::llround(read * each)}};
-            session.say("chunks of " + size_text(image->chunk_size) + ": about " + std::to_string(std::llround(read)) +
-                        " of " + std::to_string(std::llround(total)) + " are read, " + bytes_text(read * each) +
-                        " unpacked");
+            session.print("chunks of " + size_text(image->chunk_size) + ": about " +
+                          std::to_string(std::llround(read)) + " of " + std::to_string(std::llround(total)) +
+                          " are read, " + bytes_text(read * each) + " unpacked");
         }
     }
     const double memory = kBaseBytes + held + mapped + kBandBytes * voxels + while_solved;
@@ -266,13 +266,13 @@ void run_plan(const SegmentJob& job, Session& session) {
     plan["active_voxels"] = std::llround(voxels);
     plan["memory_bytes"] = std::llround(memory);
     plan["seconds"] = seconds;
-    session.say("band: about " + std::to_string(std::llround(voxels / 1000) * 1000) + " voxels");
-    session.say("memory: about " + bytes_text(memory) +
-                (held > 0 ? ", of which the image takes " + bytes_text(held) : "") +
-                (mapped > 0 ? ", of which " + bytes_text(mapped) + " are pages of the image's file" : ""));
+    session.print("band: about " + std::to_string(std::llround(voxels / 1000) * 1000) + " voxels");
+    session.print("memory: about " + bytes_text(memory) +
+                  (held > 0 ? ", of which the image takes " + bytes_text(held) : "") +
+                  (mapped > 0 ? ", of which " + bytes_text(mapped) + " are pages of the image's file" : ""));
     std::ostringstream time;
     time << "time: about " << std::setprecision(2) << seconds << " s on this machine, without reading a packed image";
-    session.say(time.str());
+    session.print(time.str());
     session.report()["plan"] = plan;
 }
 

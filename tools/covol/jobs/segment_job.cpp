@@ -245,7 +245,7 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
     return pixels;
 }
 
-void SegmentJob::tell_chunks(const Image& image, Session& session) {
+void SegmentJob::report_chunks(const Image& image, Session& session) {
     const std::optional<ChunkCount> chunks = image.chunks();
     if (!chunks) return;
     session.report()["input"]["image"]["chunks"] = to_json(*chunks);

@@ -85,7 +85,7 @@ struct SegmentJob {
     /// The image; the report tells of it.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
     /// How much of the image was read, once it has been segmented.
-    static void tell_chunks(const Image& image, Session& session);
+    static void report_chunks(const Image& image, Session& session);
 };
 
 }  // namespace covol::tool

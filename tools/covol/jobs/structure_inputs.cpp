@@ -34,8 +34,8 @@ std::string column_of(const SegmentJob& job, const std::string& text) {
 using TakePoints = std::function<void(Marks& owner, const std::string& file, const KindedPoints& points)>;
 
 /// Files whose marks name their structures: hands the marks of each over.
-void share_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
-                 const TakePoints& take) {
+void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
+                  const TakePoints& take) {
     for (const std::string& text : texts) {
         const std::string column = column_of(job, text);
         if (column.empty()) continue;
@@ -51,7 +51,7 @@ void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std
                std::vector<std::string> MarkFiles::*kind) {
     for (const std::string& text : texts) {
         if (!column_of(job, text).empty()) {
-            share_files(job, {text}, structures, [](Marks&, const std::string&, const KindedPoints&) {});
+            assign_files(job, {text}, structures, [](Marks&, const std::string&, const KindedPoints&) {});
             continue;
         }
         const Named file = split_name(text);
@@ -64,22 +64,22 @@ std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::v
                                                    const std::optional<ImageGeometry>& geometry,
                                                    const RunContext& run) {
     std::map<std::string, MarkFiles> files;
-    share_files(job, job.points.paths, structures,
-                [&](Marks& owner, const std::string& file, const KindedPoints& points) {
-                    add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
-                    files[owner.name].points.push_back(file);
-                });
-    share_files(job, job.contours.paths, structures,
-                [&](Marks& owner, const std::string& file, const KindedPoints& points) {
-                    add_contours(owner, points.cloud, geometry, speaking_for(owner.name, structures.size(), run));
-                    files[owner.name].contours.push_back(file);
-                });
+    assign_files(job, job.points.paths, structures,
+                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                     add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
+                     files[owner.name].points.push_back(file);
+                 });
+    assign_files(job, job.contours.paths, structures,
+                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                     add_contours(owner, points.cloud, geometry, speaking_for(owner.name, structures.size(), run));
+                     files[owner.name].contours.push_back(file);
+                 });
     return files;
 }
 
 /// Gives each seed to its structure; one without a name to all.
-void share_seeds(std::vector<Marks>& structures, const std::string& flag, const std::vector<std::string>& texts,
-                 std::vector<std::string> MarkFiles::*files, std::vector<PointCloud> Marks::*clouds) {
+void assign_seeds(std::vector<Marks>& structures, const std::string& flag, const std::vector<std::string>& texts,
+                  std::vector<std::string> MarkFiles::*files, std::vector<PointCloud> Marks::*clouds) {
     for (const std::string& text : texts) {
         const Named seed = split_name(text);
         if (!seed.name.empty()) (void)owner_of(structures, flag, seed.name);
@@ -142,8 +142,8 @@ std::vector<Marks> structures_of(const SegmentJob& job,
                  : !files.contours.empty() ? files.contours.front()
                                            : files.guess));
         }
-    share_seeds(structures, "--inside", job.seeds.inside, &MarkFiles::inside, &Marks::inside);
-    share_seeds(structures, "--outside", job.seeds.outside, &MarkFiles::outside, &Marks::outside);
+    assign_seeds(structures, "--inside", job.seeds.inside, &MarkFiles::inside, &Marks::inside);
+    assign_seeds(structures, "--outside", job.seeds.outside, &MarkFiles::outside, &Marks::outside);
     for (const auto& [name, seed] : job.named_seeds)
         owner_of(structures, "--exterior-seed", name).exterior_seeds.push_back(seed);
     return structures;
@@ -198,7 +198,7 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
             append(marks.files.contours, own_files->second.contours);
         }
         warn_of_voxels(marks, image, reading.points, own);
-        if (!image) thin_points(marks, job.cloud.inputs.options.most_points, own);
+        if (!image) thin_points(marks, job.cloud.inputs.options.max_points, own);
         session.add_seconds("read", watch.seconds());
         if (!image && marks.points.empty() && marks.contours.empty())
             throw UsageError("expected an image, points or contours, got none");

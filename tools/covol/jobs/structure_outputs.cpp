@@ -380,9 +380,9 @@ std::vector<std::string> result_columns(const std::string& unit) {
             "seconds"};
 }
 
-std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface, double most_read,
+std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface, double max_read,
                                                     const RunContext& run) {
-    if (image.chunks() && count_voxels_around(image, surface) > most_read) return {};
+    if (image.chunks() && count_voxels_around(image, surface) > max_read) return {};
     return measure_intensity(image, surface, run);
 }
 

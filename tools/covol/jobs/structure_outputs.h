@@ -61,8 +61,8 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
 void add_result(Table& table, const std::string& name, int label, const SegmentResult& result,
                 const std::optional<IntensityStatistics>& intensity, const RunContext& run);
 
-/// Of an image in chunks none where more voxels than `most_read` would have to be read for it.
+/// Of an image in chunks none where more voxels than `max_read` would have to be read for it.
 [[nodiscard]] std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface,
-                                                                  double most_read, const RunContext& run);
+                                                                  double max_read, const RunContext& run);
 
 }  // namespace covol::tool

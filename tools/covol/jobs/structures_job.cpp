@@ -16,7 +16,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMostInLines = 4;  // structures; of more there is a table
+constexpr std::size_t kMaxInLines = 4;  // structures; of more there is a table
 
 /// Up to rounding in files.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
@@ -76,19 +76,19 @@ void summarise_in_table(const StructuresOutput& output, const SegmentJob& job, S
              r.surface.closed ? std::to_string(r.surface.genus) : "open", std::to_string(r.point_count),
              fit(r.fit.mean), fit(r.fit.p95), fit(r.fit.max), std::to_string(r.solve.steps), number(r.seconds.total)});
         if (const std::string line = job.unused(r); !line.empty()) unused = line;
-        if (s.evidence) tell(session, *s.evidence, s.shown_name() + ": ");
+        if (s.evidence) print_evidence(session, *s.evidence, s.shown_name() + ": ");
     }
     for (const std::string& line : aligned(rows)) session.note(line);
     if (!unused.empty()) session.warn(unused);
 }
 
 void summarise(const StructuresOutput& output, const SegmentJob& job, Session& session) {
-    if (output.structures.size() > kMostInLines) return summarise_in_table(output, job, session);
+    if (output.structures.size() > kMaxInLines) return summarise_in_table(output, job, session);
     for (const StructureOutput& s : output.structures) {
         const std::string who = s.name.empty() ? "" : s.name + ": ";
         for (const std::string& line : summary(s.result.report)) session.note(who + line);
         if (const std::string line = job.unused(s.result.report); !line.empty()) session.warn(who + line);
-        if (s.evidence) tell(session, *s.evidence, who);
+        if (s.evidence) print_evidence(session, *s.evidence, who);
     }
 }
 
@@ -156,7 +156,7 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     found->frame = reading.frame;
     const std::shared_ptr<const StructuresOutput> output = found;
     session.report().update(to_json(*output), true);
-    if (image) SegmentJob::tell_chunks(*image, session);
+    if (image) SegmentJob::report_chunks(*image, session);
     hand_over(job, output, {}, session,
               [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
     UsdScene scene;

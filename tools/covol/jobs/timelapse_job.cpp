@@ -175,7 +175,7 @@ private:
         const StructuresOptions options = read_structures(job_, marks, image, session_, run);
         StructuresOutput output =
             finish(job_, lapse_.segment(image, std::move(marks), options, run), image, session_, run);
-        SegmentJob::tell_chunks(image, session_);
+        SegmentJob::report_chunks(image, session_);
         unit_ = image.geometry().unit;
         output.frame = frame.options.frame;
         return output;

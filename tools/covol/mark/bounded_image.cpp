@@ -4,8 +4,8 @@
 
 namespace covol::tool {
 
-BoundedImage::BoundedImage(Image image, std::function<Image()> open, std::uint64_t most_bytes)
-    : open_(std::move(open)), most_bytes_(most_bytes), image_(std::move(image)) {}
+BoundedImage::BoundedImage(Image image, std::function<Image()> open, std::uint64_t max_bytes)
+    : open_(std::move(open)), max_bytes_(max_bytes), image_(std::move(image)) {}
 
 std::uint64_t BoundedImage::decoded_bytes() const {
     if (image_.view()) return 0;  // it is held as a whole, or mapped
@@ -17,7 +17,7 @@ std::uint64_t BoundedImage::decoded_bytes() const {
 
 Image BoundedImage::get() {
     const std::lock_guard lock(mutex_);
-    if (decoded_bytes() > most_bytes_) image_ = open_();
+    if (decoded_bytes() > max_bytes_) image_ = open_();
     return image_;
 }
 

@@ -12,7 +12,7 @@ namespace covol::tool {
 class BoundedImage {
 public:
     /// @param open  opens it once more
-    BoundedImage(Image image, std::function<Image()> open, std::uint64_t most_bytes);
+    BoundedImage(Image image, std::function<Image()> open, std::uint64_t max_bytes);
 
     /// For one job.
     [[nodiscard]] Image get();
@@ -21,7 +21,7 @@ private:
     [[nodiscard]] std::uint64_t decoded_bytes() const;
 
     const std::function<Image()> open_;
-    const std::uint64_t most_bytes_;
+    const std::uint64_t max_bytes_;
     std::mutex mutex_;
     Image image_;
 };

@@ -24,8 +24,8 @@ constexpr std::array kMarksEndings{".csv", ".tsv", ".txt",  ".xyz",  ".pts",  ".
 constexpr std::array kGuessEndings{".nii",  ".nii.gz", ".nrrd", ".seg.nrrd", ".mha", ".tif",
                                    ".tiff", ".vdb",    ".stl",  ".ply",      ".obj", ".off"};
 constexpr const char* kFolder = "files";  // of the study
-constexpr std::uintmax_t kMostFolderBytes = std::uintmax_t(4) << 30;
-constexpr std::size_t kMostImported = 100'000;
+constexpr std::uintmax_t kMaxFolderBytes = std::uintmax_t(4) << 30;
+constexpr std::size_t kMaxImported = 100'000;
 
 template <std::size_t N>
 void require_ending(const std::string& ending, const std::array<const char*, N>& known) {
@@ -85,15 +85,15 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
         require_ending(ending, kMarksEndings);
     else
         require_ending(ending, kGuessEndings);
-    const std::size_t most = is_marks ? kMostMarksBytes : kMostFileBytes;
-    if (bytes.size() > most)
-        throw Error(Errc::InvalidInput, "import: expected at most " + std::to_string(most >> 20) +
+    const std::size_t maximum = is_marks ? kMaxMarksBytes : kMaxFileBytes;
+    if (bytes.size() > maximum)
+        throw Error(Errc::InvalidInput, "import: expected at most " + std::to_string(maximum >> 20) +
                                             " MiB; larger files are named on the command line");
     const std::filesystem::path into = std::filesystem::path(folder) / kFolder;
     std::error_code failed;
     std::filesystem::create_directories(into, failed);
     if (failed) throw Error(Errc::Io, "import: " + into.string() + ": cannot be made (" + failed.message() + ")");
-    if (bytes_in(into) + bytes.size() > kMostFolderBytes)
+    if (bytes_in(into) + bytes.size() > kMaxFolderBytes)
         throw Error(Errc::InvalidInput, "import: " + into.string() + ": holds 4 GiB; remove what no structure needs");
     const std::string digest = digest_of_bytes(bytes);
     const std::filesystem::path path = into / (digest.substr(digest.find(':') + 1) + ending);
@@ -118,9 +118,9 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
                           const RunContext& run) {
     const KindedPoints given = read_kinded_points(file);
     const PointCloud& cloud = given.cloud;
-    if (cloud.points.size() > kMostImported)
+    if (cloud.points.size() > kMaxImported)
         throw Error(Errc::InvalidInput, "import: " + file + ": holds " + std::to_string(cloud.points.size()) +
-                                            " marks, a study takes " + std::to_string(kMostImported) +
+                                            " marks, a study takes " + std::to_string(kMaxImported) +
                                             " of a file; covol segment --points takes all");
     check_inside(cloud, image, run);
     const std::vector<Vec3> world = to_world(cloud, image);

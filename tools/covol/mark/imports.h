@@ -9,7 +9,7 @@
 namespace covol::tool {
 
 /// What a page may send at once: a mask is larger than marks are.
-inline constexpr std::size_t kMostFileBytes = std::size_t(256) << 20, kMostMarksBytes = std::size_t(4) << 20;
+inline constexpr std::size_t kMaxFileBytes = std::size_t(256) << 20, kMaxMarksBytes = std::size_t(4) << 20;
 
 /// A file that a page has sent. It is gone with this object, unless it was kept.
 class GivenFile {

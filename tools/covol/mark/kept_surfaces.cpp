@@ -20,8 +20,8 @@ namespace {
 
 constexpr int kVersion = 1;
 constexpr const char* kSurfaces = "surfaces";  // of the study
-constexpr std::size_t kMostHeadBytes = std::size_t(1) << 20;
-constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 30;
+constexpr std::size_t kMaxHeadBytes = std::size_t(1) << 20;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 30;
 static_assert(std::endian::native == std::endian::little);
 
 /// What a surface depends on of a structure and of the options; names, colours and locks are none of it.
@@ -112,12 +112,12 @@ std::optional<KeptSurfaces::Kept> KeptSurfaces::find(const StudyStructure& struc
     const std::string path = path_of(structure.id);
     std::error_code none;
     const std::uintmax_t bytes = std::filesystem::file_size(path, none);
-    if (none || bytes > kMostBytes) return std::nullopt;
+    if (none || bytes > kMaxBytes) return std::nullopt;
     std::ifstream file = open_regular_file(path);
     std::string text(std::size_t(bytes), '\0');
     if (!file.read(text.data(), std::streamsize(bytes))) return std::nullopt;
     try {
-        const std::size_t end = std::string_view(text).substr(0, kMostHeadBytes).find('\n');
+        const std::size_t end = std::string_view(text).substr(0, kMaxHeadBytes).find('\n');
         if (end == std::string::npos) return std::nullopt;
         const Json head = Json::parse(text.begin(), text.begin() + std::ptrdiff_t(end));
         if (head.at("covol_surface") != kVersion || head.at("of") != made_from(structure, options, of_))

@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kSuggestions = 5;
 constexpr std::uint64_t kKeptVersion = 1;  // of surfaces from when the study was open before; later ones come after it
-constexpr double kMostRead = double(1 << 27);  // voxels of an image in chunks, for a mean intensity
+constexpr double kMaxRead = double(1 << 27);  // voxels of an image in chunks, for a mean intensity
 
 serve::Response refused(int status, const std::string& why) {
     serve::Response response;
@@ -75,7 +75,7 @@ void MarkSession::start(Send send, Broadcast broadcast) {
     send_ = std::move(send);
     broadcast_ = std::move(broadcast);
     solver_ = std::make_unique<StudySolver>(
-        image_, options(), [this](const StudyResult& r) { hear(r); }, run_, view_.site.read_guess);
+        image_, options(), [this](const StudyResult& r) { receive(r); }, run_, view_.site.read_guess);
     const std::lock_guard lock(mutex_);
     std::vector<StudyId> unknown;
     for (const auto& structure : study_.state())
@@ -88,18 +88,18 @@ bool MarkSession::take_kept(const std::shared_ptr<const StudyStructure>& structu
     if (!kept) return false;
     Solved& solved = solved_[structure->id];
     solved.from = structure;
-    solved.asked = study_.sequence();
+    solved.requested = study_.sequence();
     solved.version = kKeptVersion;
     solved.kept = std::move(kept->mesh);
-    solved.told = std::move(kept->figures);
+    solved.reported = std::move(kept->figures);
     // It is a first one: the image may have changed where its digest does not look.
-    solved.told.update({{"structure", structure->id},
-                        {"version", solved.version},
-                        {"seq", solved.asked},
-                        {"stage", word_of(StudyResult::Stage::First)},
-                        {"progress", 0},
-                        {"message", ""}});
-    solver_->confirm(structure, solved.asked);
+    solved.reported.update({{"structure", structure->id},
+                            {"version", solved.version},
+                            {"seq", solved.requested},
+                            {"stage", word_of(StudyResult::Stage::First)},
+                            {"progress", 0},
+                            {"message", ""}});
+    solver_->confirm(structure, solved.requested);
     return true;
 }
 
@@ -115,21 +115,21 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
         Solved& solved = solved_[id];
         if (solved.from ? solved.from->has_same_evidence(*structure) : !structure->has_evidence()) continue;
         solved.from = structure;
-        solved.asked = study_.sequence();
+        solved.requested = study_.sequence();
         solved.is_refined = false;
-        solver_->solve(structure, solved.asked);
+        solver_->solve(structure, solved.requested);
     }
 }
 
 /// On the solver's thread.
-void MarkSession::hear(const StudyResult& result) {
+void MarkSession::receive(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
-    Json told;
+    Json reported;
     std::shared_ptr<const StudyStructure> from;  // what is to be kept
     StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
-        intensity = intensity_within(image_(), *result.surface->surface, kMostRead, run_);
+        intensity = intensity_within(image_(), *result.surface->surface, kMaxRead, run_);
     {
         const std::lock_guard lock(mutex_);
         const auto found = solved_.find(result.structure);
@@ -149,18 +149,18 @@ void MarkSession::hear(const StudyResult& result) {
             }
             solved.surface = result.surface;
             solved.is_refined = result.stage == StudyResult::Stage::Refined;
-            if (solved.is_refined && !is_same && solved.from && result.sequence == solved.asked) {
+            if (solved.is_refined && !is_same && solved.from && result.sequence == solved.requested) {
                 from = solved.from;
                 options = study_.history().options();
             }
         }
         solved.intensity = intensity;
-        told = result_json(result, solved.version, intensity);
-        text = text_of({{"result", told}});
-        if (result.stage != StudyResult::Stage::Working) solved.told = told;
+        reported = result_json(result, solved.version, intensity);
+        text = text_of({{"result", reported}});
+        if (result.stage != StudyResult::Stage::Working) solved.reported = reported;
     }
     broadcast_(std::move(text));
-    if (from) kept_.keep(*from, options, told, result.surface->mesh);
+    if (from) kept_.keep(*from, options, reported, result.surface->mesh);
 }
 
 std::shared_ptr<const TriangleMesh> MarkSession::mesh_of(const Solved& solved) {
@@ -170,7 +170,7 @@ std::shared_ptr<const TriangleMesh> MarkSession::mesh_of(const Solved& solved) {
 
 Json MarkSession::to_json(const StudyStructure& structure) const {
     const auto solved = solved_.find(structure.id);
-    return structure_json(structure, solved != solved_.end() ? solved->second.told : Json());
+    return structure_json(structure, solved != solved_.end() ? solved->second.reported : Json());
 }
 
 Json MarkSession::standing() const {
@@ -206,10 +206,10 @@ void MarkSession::message(serve::Client client, std::string_view text) {
 
 void MarkSession::act(serve::Client client, std::string_view text) {
     if (text.find("\"ask\"") != std::string_view::npos) {
-        const Json asked = parse_json(std::string(text), "message");
-        if (asked.is_object() && asked.value("ask", Json()) == "suggest" && asked.contains("structure") &&
-            asked["structure"].is_number_unsigned())
-            return suggest(client, asked["structure"].get<StudyId>());
+        const Json requested = parse_json(std::string(text), "message");
+        if (requested.is_object() && requested.value("ask", Json()) == "suggest" && requested.contains("structure") &&
+            requested["structure"].is_number_unsigned())
+            return suggest(client, requested["structure"].get<StudyId>());
     }
     const KeyedAction action = parse_study_action(text);
     if (names_file(action.action)) throw Error(Errc::InvalidInput, "study: a page names no files");
@@ -222,11 +222,11 @@ void MarkSession::act(serve::Client client, std::string_view text) {
 
 Study::Applied MarkSession::apply(const KeyedAction& action) {
     Study::Applied applied = study_.apply(action);
-    tell(applied.changed);
+    publish(applied.changed);
     return applied;
 }
 
-void MarkSession::tell(const StudyHistory::Changed& changed) {
+void MarkSession::publish(const StudyHistory::Changed& changed) {
     std::vector<StudyId> structures = changed.structures;
     if (changed.options) {
         solver_->set_options(options());
@@ -389,7 +389,7 @@ serve::Response MarkSession::download(const serve::Request& request) {
     }
     Export made = make_export(
         format->second, state, [&] { return results(); },
-        [&](const StructureResult& s) { return intensity_within(image_(), *s.result.surface, kMostRead, run_); },
+        [&](const StructureResult& s) { return intensity_within(image_(), *s.result.surface, kMaxRead, run_); },
         seen_->image(), study_.folder(), run_);
     serve::Response response;
     response.type = "application/octet-stream";

@@ -58,8 +58,8 @@ public:
 private:
     struct Solved {
         std::shared_ptr<const StudyStructure> from;  ///< with these marks
-        std::uint64_t asked = 0;                     ///< of the study, when that was to be solved
-        Json told;                                   ///< the last result, as the page has it; null: none
+        std::uint64_t requested = 0;                 ///< of the study, when that was to be solved
+        Json reported;                               ///< the last result, as the page has it; null: none
         std::uint64_t version = 0;
         std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none, or it is kept
         std::shared_ptr<const TriangleMesh> kept;      ///< of that version, from when the study was open before
@@ -67,13 +67,13 @@ private:
         std::optional<IntensityStatistics> intensity;  ///< of the surface that was refined last
     };
 
-    void hear(const StudyResult& result);
+    void receive(const StudyResult& result);
     void act(serve::Client client, std::string_view text);
     void suggest(serve::Client client, StudyId structure);
     void follow(const std::vector<StudyId>& structures);
     /// Applies an action, and tells all pages. @pre locked
     Study::Applied apply(const KeyedAction& action);
-    void tell(const StudyHistory::Changed& changed);
+    void publish(const StudyHistory::Changed& changed);
     [[nodiscard]] SegmentOptions options() const { return study_.history().options().applied_to(view_.options); }
     /// The surface that is shown. @pre locked
     [[nodiscard]] static std::shared_ptr<const TriangleMesh> mesh_of(const Solved& solved);

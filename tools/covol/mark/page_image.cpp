@@ -98,8 +98,8 @@ serve::Response PageImage::facts() const {
 
 serve::Response PageImage::slice(const serve::Request& request) const {
     const Channel& channel = channel_of(request);
-    constexpr std::int64_t kMost = std::int64_t(1) << 30;
-    const auto small = [&](const char* name) { return int(std::min(number_of(request, name), kMost)); };
+    constexpr std::int64_t kMax = std::int64_t(1) << 30;
+    const auto small = [&](const char* name) { return int(std::min(number_of(request, name), kMax)); };
     SliceRequest wanted{small("axis"), small("at"), small("step"), {}};
     if (request.query.contains("width"))
         wanted.part = SliceRequest::Part{small("x"), small("y"), small("width"), small("height")};

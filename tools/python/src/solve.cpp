@@ -38,11 +38,11 @@ public:
                             "painted");
         }
         if (structures.empty()) throw Error(Errc::InvalidInput, "marks: expected a structure, got none", "marks");
-        SegmentOptions asked = defaults.segment;
-        if (const auto start = start_of(problem_.init, run_)) asked.start = *start;
-        const Settings settings = given_.resolve(voxel_size(structures.front(), asked), geometry_.has_value());
+        SegmentOptions requested = defaults.segment;
+        if (const auto start = start_of(problem_.init, run_)) requested.start = *start;
+        const Settings settings = given_.resolve(voxel_size(structures.front(), requested), geometry_.has_value());
         StructuresOptions options{settings.segment, {settings.contours, settings.cloud, false}};
-        options.segment.start = asked.start;
+        options.segment.start = requested.start;
         require_valid(settings, geometry_ ? "segment" : "reconstruct");
         return lapse != nullptr ? lapse->segment(*problem_.image, std::move(structures), options, run_)
                                 : segment_structures(problem_.image, std::move(structures), options, run_);
@@ -53,7 +53,7 @@ private:
         Marks marks;
         marks.name = safe_text(given.name);
         for (const PointCloud& cloud : given.points) add_points(marks, cloud, geometry_, run_);
-        if (!geometry_) thin_points(marks, settings.inputs.most_points, run_);
+        if (!geometry_) thin_points(marks, settings.inputs.max_points, run_);
         for (const PointCloud& lines : given.contours) add_contours(marks, lines, geometry_, run_);
         marks.inside = given.inside;
         marks.outside = given.outside;
@@ -76,10 +76,10 @@ private:
         return marks;
     }
 
-    [[nodiscard]] double voxel_size(const Marks& marks, const SegmentOptions& asked) const {
+    [[nodiscard]] double voxel_size(const Marks& marks, const SegmentOptions& requested) const {
         const Length wanted = given_.voxel_size();
         if (wanted.given && !wanted.in_voxels) return wanted.value;
-        const VoxelSizeChoice choice = choose_voxel_size(problem_.image, marks, asked);
+        const VoxelSizeChoice choice = choose_voxel_size(problem_.image, marks, requested);
         run_.info("voxel_size: " + choice.reason);
         return wanted.resolve(choice.voxel_size, choice.voxel_size);
     }

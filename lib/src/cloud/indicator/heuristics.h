@@ -11,7 +11,7 @@ struct IndicatorHeuristics {
     /// [longest sides] Of the lattice around the points.
     double beyond = heuristic("indicator.beyond", 0.2);
     /// [cells] Fewest along the longest side.
-    int least_cells = heuristic("indicator.least_cells", 48);
+    int min_cells = heuristic("indicator.min_cells", 48);
     /// [spacings around a point] Largest cell there, above which its cells are those of a coarser grid.
     double local_cells = heuristic("indicator.local_cells", 0.5);
     /// [V-cycles] Of multigrid where nothing is known yet.

@@ -64,7 +64,7 @@ double indicator_side(const std::vector<Vec3>& points) {
 }
 
 double indicator_cell(const std::vector<Vec3>& points, double cell) {
-    return std::min(cell, indicator_side(points) / kIndicator.least_cells);
+    return std::min(cell, indicator_side(points) / kIndicator.min_cells);
 }
 
 std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points, const std::vector<double>& areas,
@@ -98,7 +98,7 @@ double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
     return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
 }
 
-double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+double bare_fraction(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     const PointCells cells(points, reach);
     double all = 0, bare = 0;
     indicator.crossed([&](const WorldBox& box) {

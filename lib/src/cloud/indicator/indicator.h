@@ -29,7 +29,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 [[nodiscard]] double mean_at(const WindingField& field, const std::vector<Vec3>& points);
 
 /// The share of the cells which the indicator's surface passes that have no point within `reach` of their middle.
-[[nodiscard]] double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
+[[nodiscard]] double bare_fraction(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
 
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(StackField field);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);

@@ -68,13 +68,13 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
         before = lying.size();
         std::vector<std::pair<std::uint32_t, Vec3>> mended;
         for (const std::uint32_t n : lying) {
-            int told = 0, untold = 0;
+            int known = 0, unknown = 0;
             double side = 0;
             sheets.for_beside(n, [&](std::uint32_t other) {
-                ++(is_lying[other] ? untold : told);
+                ++(is_lying[other] ? unknown : known);
                 if (!is_lying[other]) side += dot(normals[other], sheets.axis(n));
             });
-            if (told > 0 && told >= untold) mended.emplace_back(n, times(side < 0 ? -1.0 : 1.0, sheets.axis(n)));
+            if (known > 0 && known >= unknown) mended.emplace_back(n, times(side < 0 ? -1.0 : 1.0, sheets.axis(n)));
         }
         for (const auto& [n, normal] : mended) {
             normals[n] = normal;

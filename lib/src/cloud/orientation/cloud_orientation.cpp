@@ -19,17 +19,17 @@ namespace {
 
 using cloud::doubt;
 using cloud::first_cell;
+using cloud::fraction_passed;
 using cloud::is_settled;
-using cloud::share_passed;
 
 /// Share of the surface that lies far from every point.
-double share_bare(const CloudOrientation& cloud) {
+double bare_fraction(const CloudOrientation& cloud) {
     const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach);
+    return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
 }
 
 bool does_enclose(const CloudOrientation& cloud) {
-    return doubt(cloud.orientation) < kOrientation.settled || share_bare(cloud) < kOrientation.bare;
+    return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
 }
 /// The indicator that was found may be too coarse for what its normals tell.
 void refine(CloudOrientation& cloud, const RunContext& run) {
@@ -42,7 +42,7 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
     if (o.indicator->cell() > kOrientation.coarse * cell)
         o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
-        share_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
+        fraction_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
         o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
@@ -59,8 +59,8 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     if (!sheets.report.used || sheets.torn > kOrientation.few_torn) return false;
     cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
-    if (share_passed(*sheets.orientation.screened, cloud.points, reach) >
-        share_passed(*cloud.orientation.indicator, cloud.points, reach))
+    if (fraction_passed(*sheets.orientation.screened, cloud.points, reach) >
+        fraction_passed(*cloud.orientation.indicator, cloud.points, reach))
         return false;
     cloud.orientation = std::move(sheets.orientation);
     return cloud.encloses = true;
@@ -69,12 +69,12 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 /// Of points that enclose nothing as they are oriented.
 /// @param reach  distance at which a surface passes a point by
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
-    const double passed = share_passed(*cloud.orientation.indicator, cloud.points, reach);
-    const bool mostly_bare = share_bare(cloud) > kOrientation.mostly_bare;
+    const double passed = fraction_passed(*cloud.orientation.indicator, cloud.points, reach);
+    const bool mostly_bare = bare_fraction(cloud) > kOrientation.mostly_bare;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals waver in the folds of a closed surface, too; but there views pass by most points.
     cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
-                     passed < kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
+                     passed < kOrientation.fewer_passed * fraction_passed(*seen.indicator, cloud.points, reach);
     if (cloud.encloses) return;
     cloud.orientation = std::move(seen);
     cloud.has_quadrics = false;
@@ -119,8 +119,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
                 kOrientation.contradicted &&
             // In narrow folds it is these that are wrong.
-            share_passed(*cloud.orientation.indicator, cloud.points, reach) <=
-                share_passed(*given.orientation.indicator, cloud.points, reach)) {
+            fraction_passed(*cloud.orientation.indicator, cloud.points, reach) <=
+                fraction_passed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }

@@ -70,7 +70,7 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
             const Eigen::Vector3d v = from_to(at, cells.sorted()[p]);
             if (v.squaredNorm() <= radius * radius) near.emplace_back(v / radius);
         }
-    if (near.size() < kCloudScale.least) return {};
+    if (near.size() < kCloudScale.minimum) return {};
     return {radius, double(near.size()), radius * off_sheet(near)};
 }
 

@@ -18,7 +18,7 @@
 namespace covol::cloud {
 namespace {
 
-constexpr int kMostRadii = 64;
+constexpr int kMaxRadii = 64;
 
 struct Neighbourhood {
     double count = 0;
@@ -52,14 +52,13 @@ double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / st
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * kFilled.least_neighbours || !(spacing > 0))
-        return false;  // an eighth is twelve times the first ones
+    if (all < 96 * kFilled.min_neighbours || !(spacing > 0)) return false;  // an eighth is twelve times the first ones
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
     // Not every so many: points in rows would be asked at the same place of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
-    for (int n = 0; n < kMostRadii; ++n, radius *= kCloudScale.growth) {
+    for (int n = 0; n < kMaxRadii; ++n, radius *= kCloudScale.growth) {
         run.check();
         tbb::parallel_for(std::size_t(0), around.size(),
                           [&](std::size_t m) { around[m] = spread_around(cells, at(m), radius); });
@@ -69,10 +68,10 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
             return median(std::move(values));
         };
         const double count = median_of([](const Neighbourhood& a) { return a.count; });
-        if (count < kFilled.least_neighbours) continue;
+        if (count < kFilled.min_neighbours) continue;
         if (count > all / 8) return true;
         const double thickness = median_of([](const Neighbourhood& a) { return a.thickness; });
-        if (thickness < std::min(kFilled.least_thickness, kFilled.thick * expected_thickness(count))) return false;
+        if (thickness < std::min(kFilled.min_thickness, kFilled.thick * expected_thickness(count))) return false;
     }
     return false;
 }

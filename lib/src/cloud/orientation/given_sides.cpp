@@ -22,7 +22,7 @@ namespace covol {
 namespace cloud {
 namespace {
 
-std::size_t count_told(const std::vector<Vec3>& directions) {
+std::size_t count_known(const std::vector<Vec3>& directions) {
     return std::size_t(std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
         return d != Vec3{0, 0, 0};
     }));
@@ -38,15 +38,16 @@ std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::ve
 }
 
 /// Normals and what their indicator function says of them.
-class Jury {
+class HeldOutHints {
 public:
-    Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale, const RunContext& run)
+    HeldOutHints(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale,
+                 const RunContext& run)
         : points_(points),
           run_(run),
           areas_(areas_of(points, scale.spacing)),
           field_(indicator_grid(points, areas_, kGivenSides.vote_spacings * std::max(scale.spacing, scale.noise))) {
-        voice_.normals = std::move(normals);
-        voice_.areas = areas_;
+        oriented_.normals = std::move(normals);
+        oriented_.areas = areas_;
     }
 
     /// Share of those told that each half foresees of the other; all are turned over where most point inwards.
@@ -56,7 +57,7 @@ public:
         listen(all);
         report.inward = !is_outward && mean_at(field_, points_) < 0;
         if (report.inward)
-            for (Vec3& n : voice_.normals) n = times(-1, n);
+            for (Vec3& n : oriented_.normals) n = times(-1, n);
         std::size_t agree = 0;
         for (const bool half : {false, true}) {
             std::vector<char> speaks(points_.size());
@@ -64,7 +65,7 @@ public:
             listen(speaks);
             for (std::size_t n = 0; n < speaks.size(); ++n) agree += !speaks[n] && falls_along(n) > 0;
         }
-        return double(agree) / double(std::max<std::size_t>(count_told(voice_.normals), 1));
+        return double(agree) / double(std::max<std::size_t>(count_known(oriented_.normals), 1));
     }
 
     /// Turns single normals that all around speak against; those without one take the direction in which the indicator
@@ -75,31 +76,31 @@ public:
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
                 if (falls_along(p) * field_.indicator().stack().cell() > -kGivenSides.speaks_against) continue;
-                voice_.normals[p] = times(-1, voice_.normals[p]);
+                oriented_.normals[p] = times(-1, oriented_.normals[p]);
                 ++turned;
             }
             if (turned == 0) break;
         }
         for (std::size_t p = 0; p < points_.size(); ++p)
-            if (voice_.normals[p] == Vec3{0, 0, 0})
-                voice_.normals[p] = unit(times(-1, field_.indicator().at(points_[p]).gradient));
+            if (oriented_.normals[p] == Vec3{0, 0, 0})
+                oriented_.normals[p] = unit(times(-1, field_.indicator().at(points_[p]).gradient));
     }
 
-    [[nodiscard]] Orientation& voice() { return voice_; }
+    [[nodiscard]] Orientation& oriented() { return oriented_; }
 
 private:
     /// Not every second one: files have pairs.
     static bool is_second(std::size_t n) { return (n * 2654435761U >> 16 & 1) != 0; }
 
     [[nodiscard]] double falls_along(std::size_t n) const {
-        return -dot(voice_.normals[n], field_.indicator().at(points_[n]).gradient);
+        return -dot(oriented_.normals[n], field_.indicator().at(points_[n]).gradient);
     }
 
     /// The indicator of those who speak.
     void listen(const std::vector<char>& speaks) {
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
-            vectors[n] = speaks[n] ? times(voice_.areas[n], voice_.normals[n]) : Vec3{0, 0, 0};
+            vectors[n] = speaks[n] ? times(oriented_.areas[n], oriented_.normals[n]) : Vec3{0, 0, 0};
         field_.solve(points_, vectors, kIndicator.cycles_from_nothing, run_);
         scale_to_half(field_, points_);
     }
@@ -108,7 +109,7 @@ private:
     const RunContext& run_;
     std::vector<double> areas_;
     WindingField field_;
-    Orientation voice_;
+    Orientation oriented_;
 };
 
 /// Share of the points that have a neighbour beside, not above them, whose normal points to the other side: where a
@@ -140,15 +141,15 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
 bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool is_outward, const CloudScale& scale,
          double cell, GivenSides& result, const RunContext& run) {
     result.given = given;
-    Jury jury(points, given, scale, run);
-    result.report.foreseen = jury.foreseen(result.report, is_outward);
+    HeldOutHints held_out(points, given, scale, run);
+    result.report.foreseen = held_out.foreseen(result.report, is_outward);
     result.report.why_not.clear();
-    if (result.report.foreseen < kGivenSides.least_foreseen) {
+    if (result.report.foreseen < kGivenSides.min_predicted) {
         result.report.why_not = "half of them do not foresee the sides of the other half";
         return false;
     }
-    jury.settle();
-    Orientation& own = result.orientation = std::move(jury.voice());
+    held_out.settle();
+    Orientation& own = result.orientation = std::move(held_out.oriented());
     WindingField field(indicator_grid(points, own.areas, cell));
     find_indicator(field, points, own, run);
     result.torn = torn(points, own.normals, scale.spacing);
@@ -192,22 +193,22 @@ double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given,
         agrees[n] = (dot(given[n], orientation.indicator->at(points[n]).gradient) < 0) != turned_over &&
                     given[n] != Vec3{0, 0, 0};
     });
-    return double(std::count(agrees.begin(), agrees.end(), 1)) / double(std::max<std::size_t>(count_told(given), 1));
+    return double(std::count(agrees.begin(), agrees.end(), 1)) / double(std::max<std::size_t>(count_known(given), 1));
 }
 
 GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale, double cell,
                        const RunContext& run) {
     GivenSides result;
     if (points.size() < 4 || !(scale.spacing > 0)) return result;
-    result.report.normals = count_told(hints.normals);
-    result.report.sensors = count_told(hints.to_sensor);
-    const auto least = kGivenSides.least_told * double(points.size());
-    if (double(result.report.normals) >= least && result.report.normals > 0 &&
+    result.report.normals = count_known(hints.normals);
+    result.report.sensors = count_known(hints.to_sensor);
+    const auto minimum = kGivenSides.min_known * double(points.size());
+    if (double(result.report.normals) >= minimum && result.report.normals > 0 &&
         use(points, hints.normals, hints.is_outward, scale, cell, result, run))
         return result;
     run.check();
-    if (double(result.report.sensors) < least || result.report.sensors == 0) return result;
-    if (share_free(points, hints.to_sensor, scale) < kGivenSides.least_free_views) {
+    if (double(result.report.sensors) < minimum || result.report.sensors == 0) return result;
+    if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_free_views) {
         if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
         return result;
     }

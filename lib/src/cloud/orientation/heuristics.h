@@ -11,7 +11,7 @@ struct CloudScaleHeuristics {
     /// [points] Places whose neighbourhoods are looked at; the medians are theirs.
     std::size_t samples = heuristic("cloud_scale.samples", 2000);
     /// [points] Fewest in a neighbourhood that a quadric (6 unknowns) is fitted to.
-    std::size_t least = heuristic("cloud_scale.least", 12);
+    std::size_t minimum = heuristic("cloud_scale.minimum", 12);
     /// [count] Most radii that are tried.
     int radii = heuristic("cloud_scale.radii", 14);
     /// [ratio] Of a radius to the one before: each neighbourhood has twice the points.
@@ -48,10 +48,10 @@ struct FilledHeuristics {
     /// [points] Whose neighbourhoods are looked at.
     std::size_t samples = heuristic("filled.samples", 400);
     /// [points] Fewest in a neighbourhood.
-    double least_neighbours = heuristic("filled.least_neighbours", 8);
+    double min_neighbours = heuristic("filled.min_neighbours", 8);
     /// [radii] Least standard deviation along any direction, at all radii, of points that fill a solid: measured 0.29
     /// to 0.42 of balls, boxes, tori and lattices, 0.24 and less of surfaces with noise and thin parts.
-    double least_thickness = heuristic("filled.least_thickness", 0.27);
+    double min_thickness = heuristic("filled.min_thickness", 0.27);
     /// [of the expected one] The same of few points, which measure less.
     double thick = heuristic("filled.thick", 0.8);
     /// [distances of the points] Cell of the grid of their density: its splines hold about 70 points.
@@ -74,7 +74,7 @@ struct OrientationHeuristics {
     /// [noises] The same, at least.
     double cell_noises = heuristic("orientation.cell_noises", 1.0);
     /// [spacings] Smallest cell of any try.
-    double least_spacings = heuristic("orientation.least_spacings", 0.5);
+    double min_spacings = heuristic("orientation.min_spacings", 0.5);
     /// [indicator] That its mean over the points may differ from 1/2 without doubt.
     double off_half = heuristic("orientation.off_half", 0.02);
     /// [ratio] Of what is beyond that, against the share of normals that turned, among tries: walls that run into each
@@ -95,9 +95,9 @@ struct OrientationHeuristics {
     /// [cells] Along the longest side, at most, in the first tries.
     double first_along = heuristic("orientation.first_along", 192);
     /// [points] Most of those: time.
-    double most_sampled = heuristic("orientation.most_sampled", 100000);
+    double max_sampled = heuristic("orientation.max_sampled", 100000);
     /// [points] Fewest of those: where parts lie so far apart that the lattice has each in a cell.
-    std::size_t least_sampled = heuristic("orientation.least_sampled", 100);
+    std::size_t min_sampled = heuristic("orientation.min_sampled", 100);
     /// [spacings] Edge of the cells that those are taken from.
     double sample_spacings = heuristic("orientation.sample_spacings", 4);
     /// [spacings] Noise below which the nearest points tell the sheet that a point is on.
@@ -139,11 +139,11 @@ struct GivenSidesHeuristics {
     /// [share of the normals] That turn of an orientation beyond doubt.
     double few_turned = heuristic("given_sides.few_turned", 0.002);
     /// [share of the points] Fewest with a normal or sensor for them to be used.
-    double least_told = heuristic("given_sides.least_told", 0.5);
+    double min_known = heuristic("given_sides.min_known", 0.5);
     /// [share of the normals] That the other half has to foresee; of normals without a meaning it is half.
-    double least_foreseen = heuristic("given_sides.least_foreseen", 0.65);
+    double min_predicted = heuristic("given_sides.min_predicted", 0.65);
     /// [share of the points] That their sensor has to see: a body hides at least half of itself from a wrong place.
-    double least_free_views = heuristic("given_sides.least_free_views", 0.7);
+    double min_free_views = heuristic("given_sides.min_free_views", 0.7);
     /// [spacings or noises] Cells of the lattice on which points judge each other: about four points each.
     double vote_spacings = heuristic("given_sides.vote_spacings", 2);
     /// [rounds] Of turning normals that the others contradict.
@@ -170,7 +170,7 @@ struct PropagationHeuristics {
     /// [points] Fewest in it.
     double fewest = heuristic("propagation.fewest", 12);
     /// [points] Most in it.
-    double most = heuristic("propagation.most", 100);
+    double maximum = heuristic("propagation.maximum", 100);
     /// [points] Neighbours that a point may take its sign from.
     std::size_t neighbours = heuristic("propagation.neighbours", 10);
 };
@@ -181,7 +181,7 @@ struct ViewsHeuristics {
     /// [rays] From each cell, evenly over the sphere.
     int rays = heuristic("views.rays", 96);
     /// [cells] Along the longest side: memory.
-    int most_view_cells = heuristic("views.most_view_cells", 256);
+    int max_view_cells = heuristic("views.max_view_cells", 256);
     /// [cells] Start of a ray: beyond the point's own sheet.
     double first_step = heuristic("views.first_step", 2.5);
     /// [spacings or noises] Edge of the cells that stop a view: about four points each.
@@ -195,7 +195,7 @@ struct ViewsHeuristics {
     /// [weight] Of each point's own free directions, against the sky's.
     double beside_sky = heuristic("views.beside_sky", 0.1);
     /// [share of all directions] Less those opposite, from which a point is seen on a side.
-    double least_free = heuristic("views.least_free", 0.01);
+    double min_free = heuristic("views.min_free", 0.01);
     /// [indicator's slope over a cell] Weight with which points hold the screened indicator (Kazhdan and Hoppe,
     /// Screened Poisson surface reconstruction, ACM Trans. Graph. 32(3), 2013).
     double screening = heuristic("views.screening", 4);
@@ -209,16 +209,16 @@ struct LayersHeuristics {
     /// [distances between sheets] Of a layer below the one that hides it.
     double farthest_layer = heuristic("layers.farthest_layer", 6);
     /// [share of a patch's points] That may be farther from the surface once they are turned.
-    double most_away = heuristic("layers.most_away", 0.2);
+    double max_away = heuristic("layers.max_away", 0.2);
     /// [cells of the indicator] Surface without points as near is bare.
     double bare_cells = heuristic("layers.bare_cells", 2);
     /// [areas of the patch] Of bare surface: a cavity's far side is not much larger than its near one, a ring's hole
     /// is.
-    double most_gain = heuristic("layers.most_gain", 1.5);
+    double max_gain = heuristic("layers.max_gain", 1.5);
     /// [patches] That are tried; each costs a solution.
-    int most_patches = heuristic("layers.most_patches", 12);
+    int max_patches = heuristic("layers.max_patches", 12);
     /// [points] Fewest of a patch.
-    std::size_t least_points = heuristic("layers.least_points", 12);
+    std::size_t min_points = heuristic("layers.min_points", 12);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};
 

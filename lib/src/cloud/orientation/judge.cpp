@@ -12,7 +12,7 @@
 namespace covol::cloud {
 
 double finest_cell(const CloudScale& scale, std::size_t points) {
-    const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.most_sampled));
+    const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.max_sampled));
     return std::max(kOrientation.cell_spacings * apart, kOrientation.cell_noises * scale.noise);
 }
 
@@ -30,7 +30,7 @@ double weighed(const Orientation& o, double weight) {
 double doubt(const Orientation& o) { return weighed(o, kOrientation.off_weight); }
 bool is_settled(const Orientation& o) { return weighed(o, 1) < kGivenSides.few_turned; }
 
-double share_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+double fraction_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     std::vector<char> passed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         const Indicator::Sample at = indicator.at(points[n]);

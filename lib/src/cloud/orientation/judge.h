@@ -16,6 +16,6 @@ namespace covol::cloud {
 [[nodiscard]] bool is_settled(const Orientation& orientation);
 
 /// Share of the points that the indicator's level 1/2 passes by at more than that distance, world units.
-[[nodiscard]] double share_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
+[[nodiscard]] double fraction_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
 
 }  // namespace covol::cloud

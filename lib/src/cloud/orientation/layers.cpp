@@ -98,11 +98,11 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
     std::vector<char> turned(points.size(), 0);
     const PointCells cells(points, kLayers.cell * between);
     std::vector<Patch> patches = Opposed(cells, free, between).patches();
-    patches.resize(std::min<std::size_t>(patches.size(), kLayers.most_patches));
+    patches.resize(std::min<std::size_t>(patches.size(), kLayers.max_patches));
     const double cell = field.indicator().stack().cell();
     double bare = Level(field, cells).bare;
     for (const Patch& patch : patches) {
-        if (patch.size() < kLayers.least_points) break;
+        if (patch.size() < kLayers.min_points) break;
         run.check();
         turn(patch, orientation);
         WindingField now(field.indicator().shared_stack());
@@ -116,7 +116,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
         const double gain = (bare - level.bare) * cell * cell;
-        if (!(gain > 0 && gain < kLayers.most_gain * area) || double(away) > kLayers.most_away * double(patch.size())) {
+        if (!(gain > 0 && gain < kLayers.max_gain * area) || double(away) > kLayers.max_away * double(patch.size())) {
             turn(patch, orientation);
             continue;
         }

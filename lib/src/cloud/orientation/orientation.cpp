@@ -89,11 +89,11 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double first = first_cell(scale, points);
         // Parts thinner than the first cells need those that the points' spacing allows.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
-        const double share = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
-                                      kOrientation.most_sampled / double(points.size()));
+        const double fraction = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
+                                         kOrientation.max_sampled / double(points.size()));
         const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
-        const double most = std::max(1.0, double(points.size() / kOrientation.least_sampled));
-        const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
+        const double maximum = std::max(1.0, double(points.size() / kOrientation.min_sampled));
+        const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / fraction, 1.0, maximum)));
         const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
         std::optional<cloud::Consistency> consistency;
         std::vector<std::tuple<double, double, bool>> lattices;
@@ -112,7 +112,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             cloud::propagated_normals(sample.points, scale, scale.spacing * std::sqrt(double(sample.step)));
         for (const Try& attempt : tries) {
             const double tried_cell = cloud::indicator_cell(
-                points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
+                points, std::max(first * attempt.cell, kOrientation.min_spacings * scale.spacing));
             const std::tuple lattice{tried_cell, attempt.enclosed, attempt.is_propagated};
             if (std::count(lattices.begin(), lattices.end(), lattice) > 0) continue;
             lattices.push_back(lattice);

@@ -84,7 +84,7 @@ std::vector<Edge> edges_of(const std::vector<Vec3>& points, const std::vector<Ve
 
 std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const CloudScale& scale) {
     const double radius = kPropagation.plane_noises * scale.noise / scale.spacing;  // spacings
-    const auto count = std::size_t(std::clamp(M_PI * radius * radius, kPropagation.fewest, kPropagation.most));
+    const auto count = std::size_t(std::clamp(M_PI * radius * radius, kPropagation.fewest, kPropagation.maximum));
     const PointCells cells(points, kNear.first_radius * scale.spacing);
     std::vector<Vec3> normals(points.size());
     for_nearest(cells, scale.spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) {

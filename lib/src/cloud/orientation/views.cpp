@@ -34,7 +34,7 @@ std::vector<Vec3> directions() {
 
 /// Of length 1; 0 where as much is free on one side as on the other.
 std::vector<Vec3> towards(std::vector<Vec3> free) {
-    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.least_free ? unit(way) : Vec3{0, 0, 0};
+    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.min_free ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
 
@@ -42,7 +42,7 @@ std::vector<Vec3> towards(std::vector<Vec3> free) {
 class Occupied {
 public:
     Occupied(const std::vector<Vec3>& points, double cell)
-        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kViews.most_view_cells)) {
+        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kViews.max_view_cells)) {
         std::size_t all = 1;
         for (std::size_t a = 0; a < 3; ++a) {
             count_[a] = std::ptrdiff_t((box_.max[int(a)] - box_.min[int(a)]) / cell_) + 1;
@@ -131,16 +131,16 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
     return all;
 }
 
-double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
+double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
     const Occupied occupied(points, kViews.view_spacings * apart(scale));
     std::vector<char> free(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
     });
-    const auto told = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
+    const auto known = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
         return d != Vec3{0, 0, 0};
     });
-    return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
+    return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(known, 1));
 }
 
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,

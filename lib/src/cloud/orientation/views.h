@@ -17,8 +17,8 @@ namespace covol::cloud {
 
 /// Share of the points from which nothing is in the way in a direction of their own; those without one, 0, do not
 /// count.
-[[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
-                                const CloudScale& scale);
+[[nodiscard]] double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
+                                   const CloudScale& scale);
 
 /// Adds the indicator that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface
 /// reconstruction, ACM Trans. Graph. 32(3), 2013): sheets that enclose nothing lie at 1/2 by that alone. Normals take

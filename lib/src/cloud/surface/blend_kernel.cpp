@@ -65,7 +65,7 @@ COVOL_INLINE Real distance_to(const BlendPiece& p, float x, float y, Real z) {
 
 COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, float limit, BlendLeaf& leaf) {
     const Float8 z = Float8{0, 1, 2, 3, 4, 5, 6, 7} * h;
-    leaf.share.fill(BlendLeaf::kNone);
+    leaf.fraction.fill(BlendLeaf::kNone);
     leaf.nearest.fill(-1);
     leaf.sum.fill(0);
     leaf.weight.fill(0);
@@ -76,11 +76,11 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
         for_rows(
             p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
-                const Float8 share = (up2 + beside) * scale;
-                Float8& least = at(leaf.share.data(), row);
+                const Float8 fraction = (up2 + beside) * scale;
+                Float8& minimum = at(leaf.fraction.data(), row);
                 Int8& nearest = reinterpret_cast<Int8*>(leaf.nearest.data())[row];
-                const Int8 nearer = (share < least) & (share < 1.0F);
-                least = nearer ? share : least;
+                const Int8 nearer = (fraction < minimum) & (fraction < 1.0F);
+                minimum = nearer ? fraction : minimum;
                 nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
             });
     }
@@ -109,13 +109,13 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
             p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
                 if (!is_near[row]) return;
-                const Float8 share = (up2 + beside) * scale;
+                const Float8 fraction = (up2 + beside) * scale;
                 const Float8 same = at(leaf.normal[0].data(), row) * p.normal[0] +
                                     at(leaf.normal[1].data(), row) * p.normal[1] +
                                     at(leaf.normal[2].data(), row) * p.normal[2];
-                const Int8 counts = (share < 1.0F) & (same > 0.0F);
+                const Int8 counts = (fraction < 1.0F) & (same > 0.0F);
                 if (!detail::any(counts)) return;
-                const Float8 near = 1 - share, weight = counts ? near * near : Float8{};
+                const Float8 near = 1 - fraction, weight = counts ? near * near : Float8{};
                 at(leaf.sum.data(), row) += weight * distance_to(p, h * float(i), h * float(j), z);
                 at(leaf.weight.data(), row) += weight;
             });

@@ -20,7 +20,7 @@ struct BlendPiece {
 
 struct BlendLeaf {
     static constexpr float kNone = 1e30F;
-    alignas(32) std::array<float, 512> share;  ///< squared distance from the nearest foot over its squared reach
+    alignas(32) std::array<float, 512> fraction;  ///< squared distance from the nearest foot over its squared reach
     alignas(32) std::array<std::int32_t, 512> nearest;         ///< its piece; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< of the nearest piece
     alignas(32) std::array<float, 512> sum, weight;  ///< of the signed distances to those on the nearest one's side

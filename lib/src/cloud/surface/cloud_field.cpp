@@ -34,10 +34,10 @@ public:
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
             const double wanted = std::max(
-                {kBlend.reach_voxels * h, kBlend.reach_of_least * q.least_radius, kBlend.reach_of_radius * q.radius});
+                {kBlend.reach_voxels * h, kBlend.reach_of_min * q.min_radius, kBlend.reach_of_radius * q.radius});
             reach_.push_back(float(std::max(
-                kBlend.least_reach_voxels * h,
-                std::min({wanted, kBlend.most_of_radius * q.radius, kBlend.most_of_curvature / q.curvature()}))));
+                kBlend.min_reach_voxels * h,
+                std::min({wanted, kBlend.max_of_radius * q.radius, kBlend.max_of_curvature / q.curvature()}))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
         quadrics_ = std::move(sorted);
@@ -50,8 +50,8 @@ public:
     /// How far beside its foot a piece may be the nearest: where the surface goes on there is a nearer one.
     [[nodiscard]] double own_radius(std::size_t n) const {
         const Quadric& q = quadrics_[n];
-        return std::max({kBlend.beside_of_least * q.least_radius, kBlend.least_reach_voxels * h_,
-                         kBlend.beside_of_apart * q.apart});
+        return std::max(
+            {kBlend.beside_of_min * q.min_radius, kBlend.min_reach_voxels * h_, kBlend.beside_of_apart * q.apart});
     }
     /// Half the sides of a box around the foot that holds what the piece alone says of the band around the surface.
     [[nodiscard]] Vec3 own_box(std::size_t n) const {
@@ -91,7 +91,7 @@ private:
 
 namespace {
 
-constexpr double kMostLeaves = 2e7;  // in a list, before those that are listed twice are gone
+constexpr double kMaxLeaves = 2e7;  // in a list, before those that are listed twice are gone
 
 /// Leaves of the domain, from boxes of voxels.
 class LeafList {
@@ -165,7 +165,7 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
     double crossed = 0;
     LeafList list(domain);
     indicator.crossed([&](const WorldBox& box) {
-        if ((crossed += in_a_cell) > kMostLeaves)
+        if ((crossed += in_a_cell) > kMaxLeaves)
             throw Error(Errc::InvalidInput,
                         "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
                             std::to_string(std::int64_t(across)) +
@@ -235,7 +235,7 @@ public:
             const std::size_t n = std::size_t(at);
             if (leaf_.nearest[n] >= 0) {
                 own = std::clamp(double(leaf_.sum[n] / leaf_.weight[n]), -limit, limit);
-                trust = faded(std::sqrt(double(leaf_.share[n]))) *
+                trust = faded(std::sqrt(double(leaf_.fraction[n]))) *
                         faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
             }
             double value = trust * own;
@@ -262,8 +262,8 @@ private:
     }
 
     /// 1 below the share that is trusted, 0 from 1 on.
-    static double faded(double share) {
-        const double beyond = std::clamp((share - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
+    static double faded(double fraction) {
+        const double beyond = std::clamp((fraction - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
@@ -366,7 +366,7 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
 /// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
 /// be nodes all through the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
-    const double most = kBlend.most_noises * noise;
+    const double maximum = kBlend.max_noises * noise;
     points.squares_off.clear();
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
@@ -377,7 +377,7 @@ OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, doubl
             place = plus(place, times((0.5 - inside) / steep, gradient));
         }
         const Vec3 moved = minus(place, points.points[n]);
-        if (dot(moved, moved) < most * most) points.points[n] = place;
+        if (dot(moved, moved) < maximum * maximum) points.points[n] = place;
     });
     return points;
 }

@@ -42,7 +42,7 @@ struct Complexity {
 /// Gives a level set the topology of an indicator that has fewer pieces and handles.
 struct TopologyOf {
     Complexity own;
-    std::size_t least;  // points, on a piece
+    std::size_t minimum;  // points, on a piece
     const std::vector<Vec3>& points;
     const RunContext& run;
 
@@ -50,7 +50,7 @@ struct TopologyOf {
         if (own.all <= 1) return;
         const Domain domain = domain_of(level_set);
         const FloatGridPtr rough = cloud::level_set_of(indicator, domain, run);
-        detail::drop_bare_pieces(*rough, points, least);
+        detail::drop_bare_pieces(*rough, points, minimum);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
         // Small pieces may be torn off, large ones are bodies that the indicator's cells are too wide to tell apart.
@@ -90,25 +90,25 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
             bare += is_bare[n] * area[n];
         }
     });
-    return bare > kBlend.open_share * all;
+    return bare > kBlend.open_fraction * all;
 }
 
 }  // namespace
 
 void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     const Orientation& orientation = cloud.orientation;
-    const double share = cloud.encloses ? kBlend.least_resting_share : kBlend.least_resting_open,
+    const double fraction = cloud.encloses ? kBlend.min_resting_fraction : kBlend.min_resting_open,
                  noises = report.noise / report.spacing;
-    const auto least =
-        std::size_t(std::max({kBlend.least_resting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
-    report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, least);
+    const auto minimum =
+        std::size_t(std::max({kBlend.min_resting, fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
+    report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);
     // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
     const auto join = [&] {
         const std::size_t joined = cloud::join_pieces(field, cloud.points, std::max(report.spacing, report.noise), run);
         report.joined_pieces += joined;
         return joined > 0;
     };
-    TopologyOf topology{Complexity(field, run), least, cloud.points, run};
+    TopologyOf topology{Complexity(field, run), minimum, cloud.points, run};
     if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
     topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
                   report);

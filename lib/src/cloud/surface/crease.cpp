@@ -262,7 +262,7 @@ std::optional<Crease> fit_crease(const std::vector<CreasePoint>& points, const V
         best = std::move(crease);
         if (misfit < kFlat * radius) break;
     }
-    if (best && best->misfit > kCrease.most_misfit * radius) return {};
+    if (best && best->misfit > kCrease.max_misfit * radius) return {};
     return best;
 }
 

@@ -16,11 +16,11 @@ struct LocalFitHeuristics {
     /// [spacings] The first radius: about 12 points.
     double first_spacings = heuristic("local_fit.first_spacings", 2.0);
     /// [radii] Points closer than that are averaged first.
-    double thinned_share = heuristic("local_fit.thinned_share", 0.2);
+    double thinned_fraction = heuristic("local_fit.thinned_fraction", 0.2);
     /// [points] Fewest that a quadric is fitted to.
-    std::size_t least_points = heuristic("local_fit.least_points", 9);
+    std::size_t min_points = heuristic("local_fit.min_points", 9);
     /// [radii] Misfit above which the neighbourhood is no sheet; points that fill a ball have 0.45.
-    double sheet_share = heuristic("local_fit.sheet_share", 0.3);
+    double sheet_fraction = heuristic("local_fit.sheet_fraction", 0.3);
     /// [ratio] Of the misfit to the points' distance to the indicator's surface, above which the neighbourhood is more
     /// than one sheet. Less, and it is noise that the indicator follows; from 4 on some folds are passed by.
     double off_indicator = heuristic("local_fit.off_indicator", 3);
@@ -33,19 +33,19 @@ struct LocalFitHeuristics {
     /// [radii] What is farther off the plane may be another sheet.
     double sheet_height = heuristic("local_fit.sheet_height", 0.15);
     /// [radii] A foot farther from its node is no sheet's.
-    double most_height = heuristic("local_fit.most_height", 0.4);
+    double max_height = heuristic("local_fit.max_height", 0.4);
     /// [cosine] Between the normal as it was oriented and as it is fitted.
-    double least_cosine = heuristic("local_fit.least_cosine", 0.4);
+    double min_cosine = heuristic("local_fit.min_cosine", 0.4);
     /// [radii] Standard deviation of the points along any direction; where they fill the disc 0.35.
-    double least_spread = heuristic("local_fit.least_spread", 0.16);
+    double min_spread = heuristic("local_fit.min_spread", 0.16);
     /// [radii] Of the points' mean: half a disc has 0.29, what lies beyond a sheet's end more.
-    double most_off_centre = heuristic("local_fit.most_off_centre", 0.33);
+    double max_off_centre = heuristic("local_fit.max_off_centre", 0.33);
     /// [ratio] Of the radius, until the points are a sheet.
-    double most_growth = heuristic("local_fit.most_growth", 2.9);
+    double max_growth = heuristic("local_fit.max_growth", 2.9);
     /// [points] That tell on which side the normals are.
-    double least_majority = heuristic("local_fit.least_majority", 5);
+    double min_majority = heuristic("local_fit.min_majority", 5);
     /// [noises] That the noise is taken to have lowered the points along a bent surface.
-    double most_unbent = heuristic("local_fit.most_unbent", 0.5);
+    double max_unbent = heuristic("local_fit.max_unbent", 0.5);
     /// [ratio] Of the first nodes' cells to the last ones', a power of two.
     double widest = heuristic("local_fit.widest", 8);
     /// [distances between nodes] Least radius of all but the last: there need not be more.
@@ -65,7 +65,7 @@ struct CreaseHeuristics {
     /// [ratio] Of the misfit of the sheets to that of one quadric.
     double misfit_ratio = heuristic("crease.misfit_ratio", 0.5);
     /// [radii] Misfit above which it is noise that is divided.
-    double most_misfit = heuristic("crease.most_misfit", 0.05);
+    double max_misfit = heuristic("crease.max_misfit", 0.05);
     /// [distances between nodes] Least radius, as local_fit.wide_of_apart.
     double wide_of_apart = heuristic("crease.wide_of_apart", 3);
     /// [cosine] Between normals of sheets that meet smoothly.
@@ -80,17 +80,17 @@ struct CloudSurfaceHeuristics {
     /// [voxels] Reach of a quadric, at least.
     double reach_voxels = heuristic("blend.reach_voxels", 2.5);
     /// [least radii] The same: the smallest neighbourhood that tells of it.
-    double reach_of_least = heuristic("blend.reach_of_least", 1.25);
+    double reach_of_min = heuristic("blend.reach_of_min", 1.25);
     /// [radii] The same: the one it was fitted to.
     double reach_of_radius = heuristic("blend.reach_of_radius", 0.35);
     /// [radii] Beyond it the quadric was never fitted.
-    double most_of_radius = heuristic("blend.most_of_radius", 0.8);
+    double max_of_radius = heuristic("blend.max_of_radius", 0.8);
     /// [radii of curvature] Beyond it a quadric folds over.
-    double most_of_curvature = heuristic("blend.most_of_curvature", 0.7);
+    double max_of_curvature = heuristic("blend.max_of_curvature", 0.7);
     /// [voxels] The reach whatever else holds.
-    double least_reach_voxels = heuristic("blend.least_reach_voxels", 1.5);
+    double min_reach_voxels = heuristic("blend.min_reach_voxels", 1.5);
     /// [least radii] Beyond it, sideways, there should be other quadrics.
-    double beside_of_least = heuristic("blend.beside_of_least", 0.75);
+    double beside_of_min = heuristic("blend.beside_of_min", 0.75);
     /// [distances between nodes] The same.
     double beside_of_apart = heuristic("blend.beside_of_apart", 2);
     /// [half widths of the band] From the nearest quadric: beyond, the others are not asked.
@@ -105,21 +105,21 @@ struct CloudSurfaceHeuristics {
     /// [voxels] Distance of quadrics.
     double node_voxels = heuristic("blend.node_voxels", 0.75);
     /// [noises] That their nodes may be moved to the level.
-    double most_noises = heuristic("blend.most_noises", 3);
+    double max_noises = heuristic("blend.max_noises", 3);
     /// [steps] Of Newton's method, of that move.
     int level_steps = heuristic("blend.level_steps", 2);
     /// [points] On a piece of its own; noise makes pieces of nothing.
-    double least_resting = heuristic("blend.least_resting", 12);
+    double min_resting = heuristic("blend.min_resting", 12);
     /// [share of the points] The same.
-    double least_resting_share = heuristic("blend.least_resting_share", 1e-3);
+    double min_resting_fraction = heuristic("blend.min_resting_fraction", 1e-3);
     /// [spacings] Cells of an indicator for points with gaps.
     double coarse_spacings = heuristic("blend.coarse_spacings", 2.4);
     /// [spacings] Distance to all points from which on the surface is bare.
     double far_spacings = heuristic("blend.far_spacings", 3);
     /// [share of the area] That is bare, above which points have gaps.
-    double open_share = heuristic("blend.open_share", 0.05);
+    double open_fraction = heuristic("blend.open_fraction", 0.05);
     /// [share of the points] On a piece of its own where they enclose nothing: the pieces are none of thin parts.
-    double least_resting_open = heuristic("blend.least_resting_open", 1e-2);
+    double min_resting_open = heuristic("blend.min_resting_open", 1e-2);
 };
 COVOL_HEURISTICS CloudSurfaceHeuristics kBlend{};
 
@@ -135,7 +135,7 @@ struct JoinPiecesHeuristics {
     /// [volumes of the largest piece] Of a piece that may be torn off.
     double small = heuristic("join_pieces.small", 0.1);
     /// [distances between points] Of a gap that is closed.
-    double most_gap = heuristic("join_pieces.most_gap", 4);
+    double max_gap = heuristic("join_pieces.max_gap", 4);
     /// [distances between points] A place of the gap without a point as near is one where the surface ends.
     double near = heuristic("join_pieces.near", 1.0);
     /// [distances between points] Reach of those that tell how thick the part is.

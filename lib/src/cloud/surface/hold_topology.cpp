@@ -128,7 +128,7 @@ FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& targe
 
 }  // namespace
 
-std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run, std::size_t most) {
+std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run, std::size_t maximum) {
     auto rough_at = rough.getConstAccessor();
     auto target_at = target.getAccessor();
     // Where a surface is cut off, as at a domain's end, what lies beyond has no side.
@@ -150,7 +150,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
         if (value.isVoxelValue()) compare(value.getCoord());
     // What lies between the two surfaces, far from both, is active in neither.
     for (std::size_t n = 0; n < found.size(); ++n) {
-        if (found.size() > most) return 0;
+        if (found.size() > maximum) return 0;
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
     }

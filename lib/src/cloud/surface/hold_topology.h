@@ -17,6 +17,6 @@ namespace covol::cloud {
 /// @return the number of voxels that keep rough's sign; their value is small
 /// @throws Error Cancelled
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run,
-                          std::size_t most = std::numeric_limits<std::size_t>::max());
+                          std::size_t maximum = std::numeric_limits<std::size_t>::max());
 
 }  // namespace covol::cloud

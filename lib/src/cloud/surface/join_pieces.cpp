@@ -30,9 +30,9 @@ struct Piece {
     double volume = 0;  ///< a cavity's is negative
     Gap gap;            ///< to what it may be joined to
     /// @param most  length of a gap
-    void meet(const detail::KdTree& other, double most) {
+    void meet(const detail::KdTree& other, double maximum) {
         for (const Vec3& v : surface)
-            if (const Vec3* near = other.nearest_within(v, std::min(gap.length, most)))
+            if (const Vec3* near = other.nearest_within(v, std::min(gap.length, maximum)))
                 gap = {std::sqrt(detail::squared_distance(*near, v)), v, *near};
     }
 };
@@ -111,8 +111,8 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         large.insert(large.end(), piece->surface.begin(), piece->surface.end());
     std::vector<Piece> small(std::make_move_iterator(first_small), std::make_move_iterator(pieces.end()));
     const detail::KdTree whole(std::move(large));
-    const double most_gap = kJoin.most_gap * apart;
-    for (Piece& piece : small) piece.meet(whole, most_gap);
+    const double max_gap = kJoin.max_gap * apart;
+    for (Piece& piece : small) piece.meet(whole, max_gap);
 
     const double voxel = domain_of(level_set).voxel_size;
     const PointCells cells(points, apart);
@@ -131,7 +131,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         const auto next = std::min_element(small.begin(), small.end(),
                                            [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
         const Gap gap = next->gap;
-        if (!(gap.length < most_gap)) break;
+        if (!(gap.length < max_gap)) break;
         if (!goes_on(gap)) {
             next->gap = {};  // it may be joined to one that is joined later
             continue;
@@ -146,7 +146,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         ++joined;
         const detail::KdTree own(std::move(next->surface));
         small.erase(next);
-        for (Piece& piece : small) piece.meet(own, most_gap);
+        for (Piece& piece : small) piece.meet(own, max_gap);
     }
     return joined;
 }

@@ -73,7 +73,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const FitPoints& near = scratch.near;
     keep_near(level, origin, axes, scratch);
     Fit result;
-    if (near.size < kFit.least_points) return result;
+    if (near.size < kFit.min_points) return result;
     const FitSums sums = fit_sums(near);
     constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
                                    {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
@@ -82,12 +82,12 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
         for (int b = 0; b < 6; ++b) m(a, b) = sums.moments[kMoment[a][b]];
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
-    if (std::hypot(m(0, 1), m(0, 2)) > kFit.most_off_centre * sum) return result;
+    if (std::hypot(m(0, 1), m(0, 2)) > kFit.max_off_centre * sum) return result;
     // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
-    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kFit.least_spread * kFit.least_spread) return result;
+    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kFit.min_spread * kFit.min_spread) return result;
     for (int d = 3; d < 6; ++d) m(d, d) += kFit.ridge * sum;
     const Eigen::LDLT<Matrix6> solver(m);
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
@@ -115,7 +115,7 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
             if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
             (dot(level.normal(n), normal) > 0 ? same : opposite) += level.sorted.count[n];
         }
-    return same + opposite < kFit.least_majority ? -1 : same >= opposite;
+    return same + opposite < kFit.min_majority ? -1 : same >= opposite;
 }
 
 /// Distance of the neighbourhood's points on this side of a sheet to the indicator's surface, root mean square.
@@ -149,12 +149,12 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         level.cells.find(point, level.radius, scratch.ranges);
         if (majority < 0) {
             majority = is_of_majority(level, point, normal, scratch.ranges);
-            best.least_radius = level.radius;
+            best.min_radius = level.radius;
         }
         if (majority == 0) return best;
-        if (seen.empty() && majority >= 0 && level.radius > kFit.most_growth * best.least_radius) return best;
+        if (seen.empty() && majority >= 0 && level.radius > kFit.max_growth * best.min_radius) return best;
         Fit now = fit(level, point, best.axes, scratch);
-        if (!now.good || now.misfit > kFit.sheet_share * level.radius) {
+        if (!now.good || now.misfit > kFit.sheet_fraction * level.radius) {
             if (seen.empty()) continue;
             break;
         }
@@ -177,7 +177,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         });
         if (!agrees) break;
         if (seen.empty() &&
-            (std::abs(now.c[0]) > kFit.most_height * level.radius || dot(best.axes[2], normal) < kFit.least_cosine))
+            (std::abs(now.c[0]) > kFit.max_height * level.radius || dot(best.axes[2], normal) < kFit.min_cosine))
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
@@ -188,8 +188,8 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     }
     // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half
     // the variance times the Laplacian.
-    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kFit.most_unbent * best.noise;
-    best.c[0] -= std::clamp(lower, -most, most);
+    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), maximum = kFit.max_unbent * best.noise;
+    best.c[0] -= std::clamp(lower, -maximum, maximum);
     return best;
 }
 
@@ -236,8 +236,8 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
 /// noise is too large for that.
 double crease_radius_for(double spacing, double noise) {
     const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
-    if (noise > kCrease.most_misfit * widest) return 0;
-    return std::clamp(noise / (0.75 * kCrease.most_misfit), smallest, widest);
+    if (noise > kCrease.max_misfit * widest) return 0;
+    return std::clamp(noise / (0.75 * kCrease.max_misfit), smallest, widest);
 }
 
 /// The cloud, thinned for each radius.
@@ -251,7 +251,7 @@ public:
         for (int n = 0; n < kFit.levels; ++n, radius *= kFit.growth) {
             run.check();
             // Averages of averages cost little and miss nothing that a radius this large could see.
-            last = thinned(n == 0 ? cloud : last, kFit.thinned_share * radius);
+            last = thinned(n == 0 ? cloud : last, kFit.thinned_fraction * radius);
             levels_.emplace_back(last, radius);
         }
     }
@@ -318,25 +318,25 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
 std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
     if (quadrics.empty()) return {};
     std::vector<Vec3> feet;
-    std::vector<double> least;
+    std::vector<double> minimum;
     for (const Quadric& q : quadrics) {
         feet.push_back(q.foot());
-        least.push_back(q.least_radius);
+        minimum.push_back(q.min_radius);
     }
-    const double usual = median(least);
+    const double usual = median(minimum);
     const PointCells cells(feet, 2 * usual);
     std::vector<char> lone(quadrics.size(), 0);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quadrics.size(), 256), [&](const auto& part) {
         std::vector<PointCells::Range> ranges;
         for (std::size_t n = part.begin(); n < part.end(); ++n) {
-            const double r = least[n];
+            const double r = minimum[n];
             if (r <= kFit.lone * usual) continue;
             const Vec3& p = feet[n];
             cells.find(p, r, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
                     const Vec3 to = minus(cells.sorted()[at], p);
-                    lone[n] = dot(to, to) < r * r && kFit.lone * least[cells.order()[at]] < r;
+                    lone[n] = dot(to, to) < r * r && kFit.lone * minimum[cells.order()[at]] < r;
                 }
         }
     });
@@ -425,12 +425,12 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
         const bool is_last = !(times > 1);
-        const double least = is_last ? 0 : kFit.wide_of_apart * apart,
-                     least_of_crease = is_last ? 0 : kCrease.wide_of_apart * apart;
-        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > least_of_crease, run);
+        const double minimum = is_last ? 0 : kFit.wide_of_apart * apart,
+                     min_of_crease = is_last ? 0 : kCrease.wide_of_apart * apart;
+        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > min_of_crease, run);
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
         for (Quadric& q : found) {
-            if (!(q.radius > (q.crease ? least_of_crease : least))) continue;
+            if (!(q.radius > (q.crease ? min_of_crease : minimum))) continue;
             q.apart = apart;
             all.push_back(q);
         }

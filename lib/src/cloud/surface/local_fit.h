@@ -26,7 +26,7 @@ struct OrientedCloud {
 /// lie above the origin, across their mean normal.
 struct Quadric : Sheet {
     double radius = 0;                     ///< of the neighbourhood that it was fitted to
-    double least_radius = 0;               ///< of the smallest that tells anything
+    double min_radius = 0;                 ///< of the smallest that tells anything
     double noise = 0;                      ///< standard deviation of the points from it, along each axis
     double apart = 0;                      ///< edge of the cells that its node and those beside it were taken from
     std::shared_ptr<const Crease> crease;  ///< null: one sheet

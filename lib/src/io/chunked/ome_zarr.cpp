@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostAxes = 16, kMostLevels = 64, kMostChannels = 4096;
+constexpr std::size_t kMaxAxes = 16, kMaxLevels = 64, kMaxChannels = 4096;
 
 /// A group's attributes, with OME's where there are any, and the file they are from.
 struct Attributes {
@@ -48,8 +48,8 @@ public:
     void read() {
         read_axes();
         const Json& datasets = member(json_, "datasets");
-        if (!datasets.is_array() || datasets.empty() || datasets.size() > kMostLevels)
-            throw wrong("expected a list of 1 to " + std::to_string(kMostLevels) + " datasets in its multiscales");
+        if (!datasets.is_array() || datasets.empty() || datasets.size() > kMaxLevels)
+            throw wrong("expected a list of 1 to " + std::to_string(kMaxLevels) + " datasets in its multiscales");
         for (const Json& dataset : datasets) {
             OmeLevel level;
             level.path = text_of(member(dataset, "path"));
@@ -71,7 +71,7 @@ private:
         const Json& axes = member(json_, "axes");
         if (axes.is_null())  // before OME-Zarr 0.3
             for (const char* name : {"t", "c", "z", "y", "x"}) image_.axes.push_back({name, "", ""});
-        else if (!axes.is_array() || axes.size() > kMostAxes)
+        else if (!axes.is_array() || axes.size() > kMaxAxes)
             throw wrong("expected a list of axes in its multiscales");
         for (const Json& axis : axes) {
             const std::string name = axis.is_string() ? text_of(axis) : text_of(member(axis, "name"));
@@ -95,7 +95,7 @@ private:
     bool apply(const Json& transformations, OmeLevel& level) const {
         bool translated = false;
         if (transformations.is_null()) return translated;
-        if (!transformations.is_array() || transformations.size() > kMostAxes)
+        if (!transformations.is_array() || transformations.size() > kMaxAxes)
             throw wrong("expected a list of coordinateTransformations");
         for (const Json& transformation : transformations) {
             const std::string type = text_of(member(transformation, "type"));
@@ -138,7 +138,7 @@ std::optional<OmeImage> read_ome_image(const std::string& folder) {
     image.version = attributes->version.empty() ? text_of(member(first, "version")) : attributes->version;
     MultiscaleReader(image, first).read();
     const Json& channels = member(member(attributes->json, "omero"), "channels");
-    if (channels.is_array() && channels.size() <= kMostChannels)
+    if (channels.is_array() && channels.size() <= kMaxChannels)
         for (const Json& channel : channels) image.channels.push_back(text_of(member(channel, "label")));
     return image;
 }
@@ -167,7 +167,7 @@ OmeGroup read_ome_group(const std::string& folder) {
         group.is_series = !member(attributes->json, "bioformats2raw.layout").is_null();
         group.is_plate = member(attributes->json, "plate").is_object();
     }
-    constexpr std::size_t kMostNames = 1000;
+    constexpr std::size_t kMaxNames = 1000;
     std::error_code status;
     for (fs::directory_iterator entry(folder, status), end; !status && entry != end; entry.increment(status)) {
         std::error_code unknown;
@@ -175,7 +175,7 @@ OmeGroup read_ome_group(const std::string& folder) {
         const bool in_store = fs::exists(inside + "/.zarray", unknown) || fs::exists(inside + "/.zattrs", unknown) ||
                               fs::exists(inside + "/zarr.json", unknown) || fs::exists(inside + "/.zgroup", unknown);
         const std::string name = entry->path().filename().string();
-        if (in_store && name != "OME" && group.images.size() < kMostNames) group.images.push_back(name);
+        if (in_store && name != "OME" && group.images.size() < kMaxNames) group.images.push_back(name);
     }
     std::sort(group.images.begin(), group.images.end());
     return group;

@@ -16,8 +16,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMostDimensions = 16;
-constexpr std::uint64_t kMostIndexed = std::uint64_t(1) << 22;  ///< chunks of a shard: an index of 64 MiB
+constexpr std::size_t kMaxDimensions = 16;
+constexpr std::uint64_t kMaxIndexed = std::uint64_t(1) << 22;  ///< chunks of a shard: an index of 64 MiB
 
 /// The metadata of one array while it is read.
 class ArrayReader {
@@ -54,8 +54,8 @@ private:
 
 std::vector<std::uint64_t> ArrayReader::sizes(const Json& value, const std::string& what) const {
     std::vector<std::uint64_t> list;
-    if (!value.is_array() || value.empty() || value.size() > kMostDimensions)
-        throw wrong("expected a list of 1 to " + std::to_string(kMostDimensions) + " numbers as its " + what);
+    if (!value.is_array() || value.empty() || value.size() > kMaxDimensions)
+        throw wrong("expected a list of 1 to " + std::to_string(kMaxDimensions) + " numbers as its " + what);
     for (const Json& n : value) {
         if (!n.is_number_unsigned() || n.get<std::uint64_t>() > std::uint64_t(std::numeric_limits<std::int32_t>::max()))
             throw wrong("expected whole numbers as its " + what + ", from 0 to 2147483647");
@@ -147,7 +147,7 @@ void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
         if (n == 0) throw wrong("expected chunks of elements, got one with a side of 0");
-        if (bytes > kMostChunkBytes / n)
+        if (bytes > kMaxChunkBytes / n)
             throw unsupported("expected chunks of 1 GiB at most, got larger ones; write it with smaller chunks");
         bytes *= n;
     }
@@ -260,7 +260,7 @@ void ArrayReader::set_byte_order(const Json& codec, bool& big) const {
 }
 
 void ArrayReader::read_codecs(const Json& codecs) {
-    if (!codecs.is_array() || codecs.empty() || codecs.size() > kMostDimensions)
+    if (!codecs.is_array() || codecs.empty() || codecs.size() > kMaxDimensions)
         throw wrong("expected a list of codecs");
     std::vector<std::size_t> slowest_first(array_.shape.size());
     std::iota(slowest_first.begin(), slowest_first.end(), 0);
@@ -304,8 +304,8 @@ void ArrayReader::read_shards(const Json& sharding) {
         if (array_.chunk[d] == 0 || outer[d] == 0 || outer[d] % array_.chunk[d] != 0)
             throw wrong("expected shards that are made of whole chunks");
         counts.push_back(outer[d] / array_.chunk[d]);
-        if (counts.back() > kMostIndexed / total)
-            throw unsupported("expected at most " + std::to_string(kMostIndexed) + " chunks in a shard, got more");
+        if (counts.back() > kMaxIndexed / total)
+            throw unsupported("expected at most " + std::to_string(kMaxIndexed) + " chunks in a shard, got more");
         total *= counts.back();
     }
     const std::string place = text_of(member(sharding, "index_location"));

@@ -32,13 +32,13 @@ public:
         }
         std::shared_ptr<const ShardIndex> index = read(path, file);
         const std::lock_guard lock(mutex_);
-        if (indices_.size() >= std::max<std::uint64_t>(1, kMostEntries / count_)) indices_.clear();
+        if (indices_.size() >= std::max<std::uint64_t>(1, kMaxEntries / count_)) indices_.clear();
         indices_[path] = index;
         return index;
     }
 
 private:
-    static constexpr std::uint64_t kMostEntries = std::uint64_t(1) << 22;  ///< 64 MiB
+    static constexpr std::uint64_t kMaxEntries = std::uint64_t(1) << 22;  ///< 64 MiB
 
     [[nodiscard]] std::shared_ptr<const ShardIndex> read(const std::string& path, const StoreFile& file) const {
         const std::uint64_t bytes = count_ * sizeof(ShardEntry) + (shards_.index_has_checksum ? 4 : 0);
@@ -108,8 +108,8 @@ private:
 
     void check_packed(const std::string& path, std::uint64_t bytes) const {
         const std::uint64_t expected = array_.chunk_bytes();
-        const std::uint64_t most = array_.codecs.empty() ? expected : most_packed_bytes(expected);
-        if (bytes > most)
+        const std::uint64_t maximum = array_.codecs.empty() ? expected : max_packed_bytes(expected);
+        if (bytes > maximum)
             throw read_error(Errc::InvalidInput, path,
                              "expected a chunk of " + std::to_string(expected) + " bytes, got " +
                                  std::to_string(bytes) + (array_.codecs.empty() ? "" : " that are packed"));

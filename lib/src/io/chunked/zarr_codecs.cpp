@@ -19,22 +19,22 @@ namespace {
 struct Packed {
     const std::string& path;
     const Bytes& bytes;
-    std::uint64_t most;  ///< bytes that may come out
+    std::uint64_t maximum;  ///< bytes that may come out
 
     [[nodiscard]] Error damaged(const char* codec, const std::string& what) const {
         return read_error(Errc::InvalidInput, path, std::string("damaged ") + codec + " data: " + what);
     }
     /// @throws Error InvalidInput when a header claims more bytes than there may be.
     void check_claim(const char* codec, std::uint64_t claimed) const {
-        if (claimed > most)
-            throw damaged(codec, "expected " + std::to_string(most) + " bytes when unpacked, its header says " +
+        if (claimed > maximum)
+            throw damaged(codec, "expected " + std::to_string(maximum) + " bytes when unpacked, its header says " +
                                      std::to_string(claimed));
     }
 };
 
 /// Of one byte, by the codec's format: zlib's 258 bytes take two bits at least, LZ4 adds 255 to a length with a byte,
 /// zstd repeats a byte over a block of 128 KiB with 4. Blosc may hold zstd.
-std::uint64_t most_unpacked_of_byte(ZarrCodec codec) {
+std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     switch (codec) {
         case ZarrCodec::Deflate: return 1032;
         case ZarrCodec::Lz4: return 255;
@@ -47,9 +47,9 @@ std::uint64_t most_unpacked_of_byte(ZarrCodec codec) {
 
 /// The last codec gives all of the chunk, which it cannot from next to nothing. @throws Error InvalidInput.
 void check_ratio(const Packed& packed, ZarrCodec codec) {
-    if (packed.most / most_unpacked_of_byte(codec) > packed.bytes.size())
+    if (packed.maximum / max_unpacked_of_byte(codec) > packed.bytes.size())
         throw packed.damaged("packed", std::to_string(packed.bytes.size()) + " bytes cannot hold a chunk of " +
-                                           std::to_string(packed.most));
+                                           std::to_string(packed.maximum));
 }
 
 Bytes unpack_blosc(const Packed& packed) {
@@ -76,7 +76,7 @@ Bytes unpack_zstd(const Packed& packed) {
     if (claimed == ZSTD_CONTENTSIZE_ERROR) throw packed.damaged("zstd", "it has no header");
     // Several frames may follow each other, and one that was written as a stream does not say its size.
     if (claimed != ZSTD_CONTENTSIZE_UNKNOWN) packed.check_claim("zstd", claimed);
-    Bytes out(packed.most);
+    Bytes out(packed.maximum);
     const std::size_t got = ZSTD_decompress(out.data(), out.size(), in.data(), in.size());
     if (ZSTD_isError(got) != 0) throw packed.damaged("zstd", ZSTD_getErrorName(got));
     out.shrink(got);
@@ -90,7 +90,7 @@ Bytes unpack_deflate(const Packed& packed) {
     z_stream stream{};
     if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib does not start");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
-    Bytes out(packed.most);
+    Bytes out(packed.maximum);
     char more = 0;  // one byte that must not come out
     std::uint64_t read = 0, written = 0;
     for (bool ended = false; !ended;) {
@@ -104,7 +104,8 @@ Bytes unpack_deflate(const Packed& packed) {
         const std::uint64_t taken = in_before - stream.avail_in, made = out_before - stream.avail_out;
         read += taken;
         if (room == 0 && made > 0)
-            throw packed.damaged("zlib", "expected " + std::to_string(packed.most) + " bytes when unpacked, got more");
+            throw packed.damaged("zlib",
+                                 "expected " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
         written += made;
         if (status == Z_STREAM_END) {
             // gzip files may be several streams behind each other
@@ -159,7 +160,7 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
                          quote(name) + "; write it with one of these");
 }
 
-std::uint64_t most_packed_bytes(std::uint64_t unpacked) {
+std::uint64_t max_packed_bytes(std::uint64_t unpacked) {
     // What cannot be packed grows by a few per cent and headers; more than double is no codec's doing.
     constexpr std::uint64_t kHeaders = 1U << 16;
     return 2 * unpacked + kHeaders;
@@ -189,7 +190,7 @@ void take_crc32c(const std::string& path, const std::string& what, Bytes& bytes)
 
 Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Bytes packed, std::uint64_t expected) {
     for (std::size_t n = codecs.size(); n-- > 0;) {
-        const Packed piece{path, packed, n == 0 ? expected : most_packed_bytes(expected)};
+        const Packed piece{path, packed, n == 0 ? expected : max_packed_bytes(expected)};
         if (n == 0) check_ratio(piece, codecs[n]);
         switch (codecs[n]) {
             case ZarrCodec::Blosc: packed = unpack_blosc(piece); break;

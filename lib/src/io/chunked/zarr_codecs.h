@@ -20,7 +20,7 @@ enum class ZarrCodec {
 ZarrCodec zarr_codec(const std::string& path, const std::string& name);
 
 /// More than this no codec makes of so many bytes.
-std::uint64_t most_packed_bytes(std::uint64_t unpacked);
+std::uint64_t max_packed_bytes(std::uint64_t unpacked);
 
 /// Undoes the codecs, the last first. Sizes are compared before memory is taken.
 /// @param path  of the file that `packed` stands in

@@ -15,7 +15,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMostJson = std::uint64_t(64) << 20;
+constexpr std::uint64_t kMaxJson = std::uint64_t(64) << 20;
 constexpr int kDeepestJson = 64;
 
 Error cannot_read(const std::string& path, int code) {
@@ -66,7 +66,7 @@ Bytes StoreFile::read(std::uint64_t begin, std::uint64_t count) const {
 std::optional<Json> read_json(const std::string& path) {
     const std::optional<StoreFile> file = StoreFile::open(path);
     if (!file) return std::nullopt;
-    if (file->size() > kMostJson)
+    if (file->size() > kMaxJson)
         throw read_error(Errc::InvalidInput, path,
                          "expected metadata of 64 MiB at most, got " + std::to_string(file->size()) + " bytes");
     const Bytes text = file->read(0, file->size());

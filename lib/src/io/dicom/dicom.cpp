@@ -89,8 +89,8 @@ public:
             info_.fields.emplace_back("NumberOfFrames (0028,0008)", std::to_string(first.file_frames));
         info_.fields.emplace_back("SeriesInstanceUID (0020,000e)", first.series);
         info_.fields.emplace_back("Modality, SeriesDescription", first.description);
-        constexpr std::size_t kMostListed = 20;
-        for (std::size_t n = 0; volumes.size() > 1 && n < std::min(kMostListed, volumes.size()); ++n)
+        constexpr std::size_t kMaxListed = 20;
+        for (std::size_t n = 0; volumes.size() > 1 && n < std::min(kMaxListed, volumes.size()); ++n)
             info_.fields.emplace_back("frame " + std::to_string(n),
                                       volumes[n].name + (n == chosen ? ", whose geometry is told" : ""));
     }
@@ -119,7 +119,7 @@ private:
     /// one, packed files some at once.
     template <typename Use>
     void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
-        constexpr std::uint64_t kMostAtOnce = std::uint64_t(256) << 20;
+        constexpr std::uint64_t kMaxAtOnce = std::uint64_t(256) << 20;
         std::optional<DecodedPixels> packed;
         std::map<std::string, std::size_t> numbers;  // of the packed files that are decoded
         for (std::size_t n = begin; n < end; ++n) {
@@ -135,7 +135,7 @@ private:
                 numbers.clear();
                 packed.reset();
                 std::uint64_t bytes = 0;
-                for (std::size_t next = n; next < end && (files.empty() || bytes < kMostAtOnce); ++next) {
+                for (std::size_t next = n; next < end && (files.empty() || bytes < kMaxAtOnce); ++next) {
                     const DicomSlice& other = slices_[next];
                     if (other.plain || !numbers.try_emplace(other.path, files.size()).second) continue;
                     files.push_back({other.path, unusable(other), 0, file_bytes(other)});

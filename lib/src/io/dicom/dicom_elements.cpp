@@ -14,7 +14,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 0xFFFFFFFE;  // 2^32 - 1 means "not said"
+constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // 2^32 - 1 means "not said"
 
 template <typename T>
 std::string little_endian(T value) {
@@ -28,7 +28,7 @@ std::string tag_bytes(std::uint32_t tag) {
 }
 
 std::string length_bytes(std::uint64_t length) {
-    if (length > kMostBytes)
+    if (length > kMaxBytes)
         throw Error(Errc::Unsupported, "DICOM: expected at most 4 GB in one element, got " + std::to_string(length) +
                                            " bytes; write .nrrd or .zarr");
     return little_endian(std::uint32_t(length));

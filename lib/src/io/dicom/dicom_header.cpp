@@ -22,7 +22,7 @@ namespace {
 constexpr std::uint32_t kUndefined = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
-constexpr std::uint32_t kMostPixels = 65535;  // along a side
+constexpr std::uint32_t kMaxPixels = 65535;  // along a side
 constexpr int kDeepest = 16;
 
 constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
@@ -167,7 +167,7 @@ private:
         return (samples == 1 || samples == 3 || samples == 4) &&
                (allocated == 8 || allocated == 16 || allocated == 32) && stored > 0 && stored <= allocated &&
                number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 && number(kRows) > 0 &&
-               number(kRows) <= kMostPixels && number(kColumns) > 0 && number(kColumns) <= kMostPixels;
+               number(kRows) <= kMaxPixels && number(kColumns) > 0 && number(kColumns) <= kMaxPixels;
     }
     /// The elements up to `end`, or up to an item's end.
     bool walk(std::uint64_t end, bool in_item, int depth) {

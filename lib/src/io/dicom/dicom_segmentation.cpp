@@ -195,13 +195,13 @@ void put_image(DicomItem& file, const Index3& size, std::size_t frames) {
 }
 
 void check_size(const std::string& path, const PixelSource& source) {
-    constexpr std::int32_t kMost = 65535;
+    constexpr std::int32_t kMax = 65535;
     const Index3 size = source.geometry().size;
     if (!source.is_labels())
         throw Error(Errc::Unsupported, path +
                                            ": DICOM is written of label images alone, as a segmentation; write "
                                            ".nrrd, .nii.gz or .mha");
-    if (size[0] > kMost || size[1] > kMost)
+    if (size[0] > kMax || size[1] > kMax)
         throw Error(Errc::Unsupported, path + ": expected at most 65535 columns and rows, got " + size_text(size) +
                                            "; write .nrrd or .zarr");
 }
@@ -224,7 +224,9 @@ std::array<std::uint16_t, 3> to_cielab(const std::array<std::uint8_t, 3>& color)
         for (std::size_t m = 0; m < 3; ++m) t += kToXyz[n][m] * linear[m] / kWhite[n];
         f[n] = t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116;
     }
-    const auto word = [](double share) { return std::uint16_t(std::lround(65535 * std::clamp(share, 0.0, 1.0))); };
+    const auto word = [](double fraction) {
+        return std::uint16_t(std::lround(65535 * std::clamp(fraction, 0.0, 1.0)));
+    };
     return {word((116 * f[1] - 16) / 100), word((500 * (f[0] - f[1]) + 128) / 255),
             word((200 * (f[1] - f[2]) + 128) / 255)};
 }

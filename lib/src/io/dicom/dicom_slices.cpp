@@ -209,10 +209,10 @@ std::vector<DicomSlice> slices_of(const std::string& path, const DicomHeader& he
 
 /// @throws Error InvalidInput, with `unusable`.
 std::size_t count_frames(const DicomHeader& header, const std::string& unusable) {
-    constexpr double kMost = 65535;
+    constexpr double kMax = 65535;
     const std::vector<double> frames = header.numbers(kFrameCount);
     if (frames.size() != 1 || frames[0] <= 1) return 1;
-    if (frames[0] > kMost || frames[0] != std::floor(frames[0])) throw Error(Errc::InvalidInput, unusable);
+    if (frames[0] > kMax || frames[0] != std::floor(frames[0])) throw Error(Errc::InvalidInput, unusable);
     return static_cast<std::size_t>(frames[0]);
 }
 

@@ -198,8 +198,8 @@ ImageGeometry in_millimetres(const std::string& path, const ImageGeometry& geome
                geometry.direction[1][a] * geometry.direction[1][b] +
                geometry.direction[2][a] * geometry.direction[2][b];
     };
-    constexpr double kMost = 1e-3;  // as is_sheared() of NIfTI
-    if (std::abs(along(0, 1)) > kMost)
+    constexpr double kMax = 1e-3;  // as is_sheared() of NIfTI
+    if (std::abs(along(0, 1)) > kMax)
         throw Error(Errc::Unsupported,
                     path +
                         ": expected rows and columns that are perpendicular, as DICOM has them, got axes that lean "

@@ -20,10 +20,11 @@ std::string name_of(const DicomSlice& slice) {
 }
 
 bool same_direction(const DicomSlice& a, const DicomSlice& b) {
-    double most = 0;
+    double maximum = 0;
     for (std::size_t r = 0; r < 3; ++r)
-        for (std::size_t c = 0; c < 2; ++c) most = std::max(most, std::abs(a.direction[r][c] - b.direction[r][c]));
-    return most < 1e-3;
+        for (std::size_t c = 0; c < 2; ++c)
+            maximum = std::max(maximum, std::abs(a.direction[r][c] - b.direction[r][c]));
+    return maximum < 1e-3;
 }
 
 /// Along the normal of the first plane, of which all have the direction.
@@ -34,9 +35,9 @@ double depth(const DicomSlice& slice, const DicomSlice& first) {
 }
 
 bool same_place(const DicomSlice& a, const DicomSlice& b) {
-    double most = 0;
-    for (std::size_t c = 0; c < 3; ++c) most = std::max(most, std::abs(a.origin[c] - b.origin[c]));
-    return most < 1e-4;
+    double maximum = 0;
+    for (std::size_t c = 0; c < 3; ++c) maximum = std::max(maximum, std::abs(a.origin[c] - b.origin[c]));
+    return maximum < 1e-4;
 }
 
 void sort_by_depth(Slices& slices) {
@@ -130,14 +131,14 @@ void check_gaps(const std::string& path, const Slices& slices) {
 /// Slices of a tilted gantry lie on a line that is oblique to them, but on a line.
 void check_straight(const std::string& path, const Slices& slices, const Vec3& step) {
     const DicomSlice& first = slices.front();
-    const double pixel = std::min(first.step[0], first.step[1]), most = pixel > 0 ? pixel / 2 : 0.5;
+    const double pixel = std::min(first.step[0], first.step[1]), maximum = pixel > 0 ? pixel / 2 : 0.5;
     for (std::size_t k = 0; k < slices.size(); ++k) {
         double square = 0;
         for (std::size_t a = 0; a < 3; ++a) {
             const double off = slices[k].origin[a] - first.origin[a] - double(k) * step[a];
             square += off * off;
         }
-        if (square > most * most)
+        if (square > maximum * maximum)
             throw read_error(Errc::InvalidInput, path,
                              "expected slices along one line, got " + name_of(slices[k]) + " " +
                                  number(std::sqrt(square)) +

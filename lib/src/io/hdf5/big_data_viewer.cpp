@@ -13,7 +13,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMostBdvLevels = 64;
+constexpr std::size_t kMaxBdvLevels = 64;
 
 /// A <ViewSetup> of the XML.
 struct Setup {
@@ -74,10 +74,10 @@ std::string xml_beside(const std::string& path) { return path.substr(0, path.rfi
 
 /// By their numbers.
 std::map<int, Setup> read_setups(const std::string& path) {
-    constexpr std::uint64_t kMostXml = std::uint64_t(64) << 20;
+    constexpr std::uint64_t kMaxXml = std::uint64_t(64) << 20;
     std::map<int, Setup> setups;
     const std::optional<StoreFile> file = StoreFile::open(path);
-    if (!file || file->size() > kMostXml) return setups;
+    if (!file || file->size() > kMaxXml) return setups;
     const Bytes bytes = file->read(0, file->size());
     const std::string text(bytes.data(), bytes.size());
     XmlTags tags(text);
@@ -167,7 +167,7 @@ private:
     [[nodiscard]] std::vector<Vec3> factors() const {
         const std::vector<double> numbers = file_.table("/" + setups_.front() + "/resolutions");
         std::vector<Vec3> factors;
-        for (std::size_t n = 0; n + 3 <= numbers.size() && factors.size() < kMostBdvLevels; n += 3) {
+        for (std::size_t n = 0; n + 3 <= numbers.size() && factors.size() < kMaxBdvLevels; n += 3) {
             factors.push_back({numbers[n], numbers[n + 1], numbers[n + 2]});
             for (const double f : factors.back())
                 if (!std::isfinite(f) || !(f > 0))

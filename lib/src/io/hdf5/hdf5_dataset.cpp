@@ -13,7 +13,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kMostDimensions = 16;
+constexpr int kMaxDimensions = 16;
 
 struct KnownType {
     hid_t id;
@@ -140,7 +140,7 @@ void Hdf5Dataset::read_type(hid_t type) {
 
 void Hdf5Dataset::read_shape(hid_t space) {
     const int count = H5Sget_simple_extent_type(space) == H5S_SIMPLE ? H5Sget_simple_extent_ndims(space) : 0;
-    if (count < 3 || count > kMostDimensions)
+    if (count < 3 || count > kMaxDimensions)
         throw read_error(Errc::InvalidInput, path_,
                          "expected a dataset of 3 dimensions or a few more, got " + std::to_string(count));
     std::vector<hsize_t> shape(static_cast<std::size_t>(count));
@@ -153,9 +153,9 @@ void Hdf5Dataset::read_shape(hid_t space) {
 }
 
 void Hdf5Dataset::read_filters(hid_t properties) {
-    constexpr int kMostFilters = 32;  // the library's own limit
+    constexpr int kMaxFilters = 32;  // the library's own limit
     const int count = H5Pget_nfilters(properties);
-    if (count < 0 || count > kMostFilters) throw damaged("its filters cannot be read");
+    if (count < 0 || count > kMaxFilters) throw damaged("its filters cannot be read");
     for (int n = 0; n < count; ++n) {
         std::array<unsigned, 32> values{};
         std::array<char, 64> name{};
@@ -202,18 +202,18 @@ void Hdf5Dataset::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
         if (n == 0) throw damaged("its header claims chunks with a side of 0");
-        if (bytes > kMostChunkBytes / n)
+        if (bytes > kMaxChunkBytes / n)
             throw read_error(Errc::Unsupported, path_, "expected chunks of 1 GiB at most, got larger ones");
         bytes *= n;
     }
 }
 
 void Hdf5Dataset::set_bricks() {
-    constexpr std::uint64_t kSide = 64, kMostElements = kSide * kSide * kSide;
+    constexpr std::uint64_t kSide = 64, kMaxElements = kSide * kSide * kSide;
     std::uint64_t elements = 1;
     array_.chunk.assign(array_.shape.size(), 1);
     for (std::size_t d = array_.shape.size(); d-- > 0; elements *= array_.chunk[d])
-        array_.chunk[d] = std::clamp<std::uint64_t>(std::min(array_.shape[d], kMostElements / elements), 1, kSide);
+        array_.chunk[d] = std::clamp<std::uint64_t>(std::min(array_.shape[d], kMaxElements / elements), 1, kSide);
 }
 
 void Hdf5Dataset::read_layout(hid_t properties) {
@@ -222,8 +222,8 @@ void Hdf5Dataset::read_layout(hid_t properties) {
         throw read_error(Errc::Unsupported, path_,
                          "its values lie in other files, which are not read; copy it into one file (h5repack)");
     if (layout == H5D_CHUNKED) {
-        std::array<hsize_t, kMostDimensions> chunk{};
-        const int count = H5Pget_chunk(properties, kMostDimensions, chunk.data());
+        std::array<hsize_t, kMaxDimensions> chunk{};
+        const int count = H5Pget_chunk(properties, kMaxDimensions, chunk.data());
         if (count != int(array_.shape.size())) throw damaged("its chunks have other dimensions");
         array_.chunk.assign(chunk.begin(), chunk.begin() + count);
     } else if (layout == H5D_CONTIGUOUS || layout == H5D_COMPACT) {
@@ -259,7 +259,7 @@ std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>&
     }
     if (stored == 0) return std::nullopt;
     const std::uint64_t expected = array_.chunk_bytes();
-    if (stored > file_->bytes() || stored > (filters_.empty() ? expected : most_packed_bytes(expected)))
+    if (stored > file_->bytes() || stored > (filters_.empty() ? expected : max_packed_bytes(expected)))
         throw damaged("expected a chunk of " + std::to_string(expected) + " bytes when unpacked, got " +
                       std::to_string(stored) + " bytes");
     Bytes packed(stored);
@@ -313,7 +313,7 @@ Hdf5Shape shape_of(const Hdf5File& file, const std::string& name) {
     const H5T_class_t kind = H5Tget_class(type.get());
     found.has_numbers = kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
     const int count = H5Sget_simple_extent_ndims(space.get());
-    if (count < 1 || count > kMostDimensions) return found;
+    if (count < 1 || count > kMaxDimensions) return found;
     std::vector<hsize_t> shape(static_cast<std::size_t>(count));
     H5Sget_simple_extent_dims(space.get(), shape.data(), nullptr);
     found.shape.assign(shape.begin(), shape.end());

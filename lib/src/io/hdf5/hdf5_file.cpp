@@ -11,8 +11,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMostNumbers = 4096;
-constexpr std::uint64_t kMostText = std::uint64_t(1) << 20;
+constexpr std::uint64_t kMaxNumbers = 4096;
+constexpr std::uint64_t kMaxText = std::uint64_t(1) << 20;
 
 std::mutex& library_mutex() {
     static std::mutex mutex;
@@ -26,17 +26,17 @@ thread_local int held_locks = 0;
 herr_t refuse_link(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) { return -1; }
 
 herr_t add_name(hid_t, const char* name, const H5L_info_t*, void* list) {
-    constexpr std::size_t kMostNames = 100000;
+    constexpr std::size_t kMaxNames = 100000;
     auto& names = *static_cast<std::vector<std::string>*>(list);
     names.emplace_back(name);
-    return names.size() < kMostNames ? 0 : 1;
+    return names.size() < kMaxNames ? 0 : 1;
 }
 
 /// Elements of a simple dataspace; 0 where it is none, or has more than `most`.
-std::uint64_t count_of(const Hdf5Id& space, std::uint64_t most) {
+std::uint64_t count_of(const Hdf5Id& space, std::uint64_t maximum) {
     if (!space || H5Sget_simple_extent_type(space.get()) == H5S_NULL) return 0;
     const hssize_t count = H5Sget_simple_extent_npoints(space.get());
-    return count > 0 && std::uint64_t(count) <= most ? std::uint64_t(count) : 0;
+    return count > 0 && std::uint64_t(count) <= maximum ? std::uint64_t(count) : 0;
 }
 
 bool holds_numbers(const Hdf5Id& type) {
@@ -50,7 +50,7 @@ std::string cut(const char* begin, std::size_t size) { return {begin, std::find(
 std::vector<std::string> strings_of(const Hdf5Id& attribute) {
     std::vector<std::string> texts;
     const Hdf5Id type(H5Aget_type(attribute.get()), H5Tclose), space(H5Aget_space(attribute.get()), H5Sclose);
-    const std::uint64_t count = count_of(space, kMostNumbers);
+    const std::uint64_t count = count_of(space, kMaxNumbers);
     if (count == 0 || !type || H5Tget_class(type.get()) != H5T_STRING) return texts;
     if (H5Tis_variable_str(type.get()) > 0) {
         std::vector<char*> read(count, nullptr);
@@ -61,7 +61,7 @@ std::vector<std::string> strings_of(const Hdf5Id& attribute) {
         return texts;
     }
     const std::size_t width = H5Tget_size(type.get());
-    if (width == 0 || width > kMostText / count) return texts;
+    if (width == 0 || width > kMaxText / count) return texts;
     std::vector<char> read(count * width);
     if (H5Aread(attribute.get(), type.get(), read.data()) < 0) return texts;
     for (std::uint64_t n = 0; n < count; ++n) texts.push_back(cut(read.data() + n * width, width));
@@ -164,7 +164,7 @@ std::vector<std::string> Hdf5File::members(const std::string& group) const {
 
 std::vector<std::string> Hdf5File::datasets(const std::string& group) const {
     constexpr int kDeepest = 16;
-    constexpr std::size_t kMostObjects = 100000;
+    constexpr std::size_t kMaxObjects = 100000;
     const Hdf5Lock lock;
     std::vector<std::string> found, groups{group};
     std::set<haddr_t> seen;  // hard links may lead round in circles
@@ -179,7 +179,7 @@ std::vector<std::string> Hdf5File::datasets(const std::string& group) const {
                 const std::string whole = (parent == "/" ? "" : parent) + "/" + name;
                 H5L_info_t link{};
                 H5O_info_t info{};
-                if (++looked_at > kMostObjects) return found;
+                if (++looked_at > kMaxObjects) return found;
                 if (H5Lget_info(file_.get(), whole.c_str(), &link, access_.get()) < 0 || link.type != H5L_TYPE_HARD)
                     continue;
                 if (H5Oget_info_by_name2(file_.get(), whole.c_str(), &info, H5O_INFO_BASIC, access_.get()) < 0 ||
@@ -204,7 +204,7 @@ std::vector<double> Hdf5File::numbers(const std::string& object, const char* att
     const Hdf5Id opened = open_attribute(object, attribute);
     if (!opened) return {};
     const Hdf5Id type(H5Aget_type(opened.get()), H5Tclose), space(H5Aget_space(opened.get()), H5Sclose);
-    std::vector<double> values(holds_numbers(type) ? count_of(space, kMostNumbers) : 0);
+    std::vector<double> values(holds_numbers(type) ? count_of(space, kMaxNumbers) : 0);
     if (values.empty() || H5Aread(opened.get(), H5T_NATIVE_DOUBLE, values.data()) < 0) return {};
     return values;
 }
@@ -226,7 +226,7 @@ std::vector<double> Hdf5File::table(const std::string& name) const {
     const Hdf5Id object(has_dataset(name) ? H5Oopen(file_.get(), name.c_str(), access_.get()) : -1, H5Oclose);
     if (!object) return {};
     const Hdf5Id type(H5Dget_type(object.get()), H5Tclose), space(H5Dget_space(object.get()), H5Sclose);
-    std::vector<double> values(holds_numbers(type) ? count_of(space, kMostNumbers) : 0);
+    std::vector<double> values(holds_numbers(type) ? count_of(space, kMaxNumbers) : 0);
     if (values.empty() || H5Dread(object.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
         return {};
     return values;

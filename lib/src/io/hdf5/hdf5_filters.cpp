@@ -79,10 +79,10 @@ std::uint64_t big_endian(const char* bytes, int width) {
 
 /// Big-endian: 8 bytes with the size, 4 with that of a block, and each block behind 4 with its packed size.
 Bytes unpack_lz4(const std::string& path, const Bytes& packed, std::uint64_t expected) {
-    constexpr std::uint64_t kHeader = 12, kMostBlock = std::uint64_t(1) << 30;
+    constexpr std::uint64_t kHeader = 12, kMaxBlock = std::uint64_t(1) << 30;
     if (packed.size() < kHeader || big_endian(packed.data(), 8) != expected) throw damaged(path, "LZ4");
     const std::uint64_t block = big_endian(packed.data() + 8, 4);
-    if (block == 0 || block > kMostBlock) throw damaged(path, "LZ4");
+    if (block == 0 || block > kMaxBlock) throw damaged(path, "LZ4");
     Bytes out(expected);
     std::uint64_t at = kHeader;
     for (std::uint64_t made = 0; made < expected;) {
@@ -90,7 +90,7 @@ Bytes unpack_lz4(const std::string& path, const Bytes& packed, std::uint64_t exp
         if (packed.size() - at < 4) throw damaged(path, "LZ4");
         const std::uint64_t stored = big_endian(packed.data() + at, 4);
         at += 4;
-        if (stored > packed.size() - at || stored > kMostBlock) throw damaged(path, "LZ4");
+        if (stored > packed.size() - at || stored > kMaxBlock) throw damaged(path, "LZ4");
         if (stored == here)
             std::memcpy(out.data() + made, packed.data() + at, here);
         else if (LZ4_decompress_safe(packed.data() + at, out.data() + made, int(stored), int(here)) != int(here))

@@ -11,7 +11,7 @@ namespace covol::detail {
 namespace {
 
 constexpr const char *kLevel = "ResolutionLevel ", *kTime = "TimePoint ", *kChannel = "Channel ";
-constexpr int kMostImarisLevels = 32;
+constexpr int kMaxImarisLevels = 32;
 
 /// What a path chose.
 struct ImarisChoice {
@@ -45,11 +45,12 @@ class Extent {
 public:
     explicit Extent(const Hdf5File& file) : file_(file) {
         for (int a = 0; a < 3; ++a) {
-            const auto least = number("ExtMin" + std::to_string(a)), most = number("ExtMax" + std::to_string(a));
-            known_ = known_ && least && most && std::isfinite(*least) && std::isfinite(*most) && *most > *least;
+            const auto minimum = number("ExtMin" + std::to_string(a)), maximum = number("ExtMax" + std::to_string(a));
+            known_ = known_ && minimum && maximum && std::isfinite(*minimum) && std::isfinite(*maximum) &&
+                     *maximum > *minimum;
             if (!known_) return;
-            min_[a] = *least;
-            side_[a] = *most - *least;
+            min_[a] = *minimum;
+            side_[a] = *maximum - *minimum;
         }
     }
     [[nodiscard]] bool is_known() const { return known_; }
@@ -144,7 +145,7 @@ Vec3 times(const Vec3& a, const Vec3& b) { return {a[0] * b[0], a[1] * b[1], a[2
 void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& fine, const ImarisChoice& choice,
                      Hdf5Layout& layout) {
     ImageInfo& info = layout.info;
-    const int count = std::min(count_of(file, "/DataSet", kLevel), kMostImarisLevels);
+    const int count = std::min(count_of(file, "/DataSet", kLevel), kMaxImarisLevels);
     for (int level = 0; level < count; ++level) {
         const std::string name = level_name(level);
         try {

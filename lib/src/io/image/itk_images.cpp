@@ -65,13 +65,14 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
 /// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
 std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
     const std::string file = header.data_file();
-    if (header.says("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
-    if (header.says("elementdatafile", "list") || file.find('%') != std::string::npos) return std::nullopt;
+    if (header.has_value("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
+    if (header.has_value("elementdatafile", "list") || file.find('%') != std::string::npos) return std::nullopt;
     PixelPlace place;
     place.path = file.empty() ? path : (fs::path(path).parent_path() / file).string();
     place.file_offset = file.empty() ? header.end : 0;
-    place.packed = header.says("compresseddata", "true");
-    const bool big = header.says("binarydatabyteordermsb", "true") || header.says("elementbyteordermsb", "true");
+    place.packed = header.has_value("compresseddata", "true");
+    const bool big =
+        header.has_value("binarydatabyteordermsb", "true") || header.has_value("elementbyteordermsb", "true");
     place.swap = big == (std::endian::native == std::endian::little) && pixel_bytes(type) > 1;
     place.type = type;
     return place;
@@ -88,11 +89,12 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
         return std::nullopt;
     if (!header.value_of({"line skip", "lineskip", "byte skip", "byteskip"}).empty()) return std::nullopt;
     if (channels > 1 &&
-        (header.value("kinds").empty() || header.says("kinds", "domain") || header.says("kinds", "space")))
+        (header.value("kinds").empty() || header.has_value("kinds", "domain") || header.has_value("kinds", "space")))
         return std::nullopt;
     place.path = file.empty() ? path : (fs::path(path).parent_path() / file).string();
     place.file_offset = file.empty() ? header.end : 0;
-    place.swap = header.says("endian", "big") == (std::endian::native == std::endian::little) && pixel_bytes(type) > 1;
+    place.swap =
+        header.has_value("endian", "big") == (std::endian::native == std::endian::little) && pixel_bytes(type) > 1;
     place.type = type;
     return place;
 }
@@ -229,12 +231,12 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     info.type = image.type;
     info.geometry = itk_geometry(path, image);
     info.axis_order = image.size.size() > 3 ? "XYZT" : "XYZ";
-    constexpr std::uint64_t kMost = std::uint64_t(1) << 20;
+    constexpr std::uint64_t kMax = std::uint64_t(1) << 20;
     std::uint64_t frames = 1;
     for (std::size_t a = 3; a < image.size.size(); ++a)
-        if (__builtin_mul_overflow(frames, image.size[a], &frames)) frames = kMost + 1;
+        if (__builtin_mul_overflow(frames, image.size[a], &frames)) frames = kMax + 1;
     const std::uint64_t channels = image.components;
-    if (frames < 1 || frames > kMost || channels < 1 || channels > kMost)
+    if (frames < 1 || frames > kMax || channels < 1 || channels > kMax)
         throw read_error(Errc::InvalidInput, path,
                          "expected 1 to 2^20 frames and channels, the header claims " + std::to_string(frames) +
                              " frames and " + std::to_string(channels) + " channels");
@@ -258,8 +260,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
         placed->refer_to(files);
         return placed;
     }
-    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 48;
-    if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMostPixels / voxel_count(info.geometry.size))
+    constexpr std::uint64_t kMaxPixels = std::uint64_t(1) << 48;
+    if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMaxPixels / voxel_count(info.geometry.size))
         throw read_error(Errc::InvalidInput, path,
                          "the header claims " + size_text(info.geometry.size) + " voxels of " +
                              std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +

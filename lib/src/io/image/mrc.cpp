@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::uint64_t kHeaderBytes = 1024;
 // Byte positions of header words.
-constexpr int kSize = 0, kMode = 12, kStart = 16, kSampling = 28, kCell = 40, kAngles = 52, kAxes = 64, kLeast = 76;
-constexpr int kMost = 80, kSpaceGroup = 88, kExtended = 92, kImodStamp = 152, kImodFlags = 156, kOrigin = 196;
+constexpr int kSize = 0, kMode = 12, kStart = 16, kSampling = 28, kCell = 40, kAngles = 52, kAxes = 64, kMin = 76;
+constexpr int kMax = 80, kSpaceGroup = 88, kExtended = 92, kImodStamp = 152, kImodFlags = 156, kOrigin = 196;
 constexpr int kVolumeStack = 401;
 constexpr std::int32_t kImod = 1146047817;
 
@@ -55,7 +55,7 @@ void set_type(const std::string& path, const Header& header, ImageInfo& info, Pi
             // Signed by the standard; before it, and in IMOD's files unless a flag says otherwise, unsigned.
             const bool imod = header.integer(kImodStamp) == kImod;
             const bool is_unsigned =
-                imod ? (header.integer(kImodFlags) & 1) == 0 : header.number(kLeast) >= 0 && header.number(kMost) > 127;
+                imod ? (header.integer(kImodFlags) & 1) == 0 : header.number(kMin) >= 0 && header.number(kMax) > 127;
             place.type = is_unsigned ? PixelType::UInt8 : PixelType::Int8;
             break;
         }

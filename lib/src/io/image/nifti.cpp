@@ -103,11 +103,11 @@ private:
 std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
     const auto type = nifti_type(header.integer(70));
     const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
-    constexpr double kLeastOffset = 352;
+    constexpr double kMinOffset = 352;
     if (!type || !header.in_one_piece() || !(offset >= 0 && offset < 1e9)) return std::nullopt;
     place.swap = header.swap() && pixel_bytes(*type) > 1;
     place.type = *type;
-    place.skip = static_cast<std::uint64_t>(std::max(kLeastOffset, offset));
+    place.skip = static_cast<std::uint64_t>(std::max(kMinOffset, offset));
     if (std::isfinite(slope) && std::isfinite(intercept) && slope != 0) {
         place.slope = slope;
         place.intercept = intercept;
@@ -169,14 +169,14 @@ NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
 
 /// The largest distance between the places that both give a corner voxel.
 double distance_between(const NiftiAffine& p, const NiftiAffine& q, const Index3& size) {
-    double most = 0;
+    double maximum = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
         Vec3 index{};
         for (std::size_t a = 0; a < 3; ++a) index[a] = (corner >> a & 1) != 0 ? size[a] - 1 : 0;
         const Vec3 one = p.at(index), other = q.at(index);
-        most = std::max(most, std::hypot(one[0] - other[0], one[1] - other[1], one[2] - other[2]));
+        maximum = std::max(maximum, std::hypot(one[0] - other[0], one[1] - other[1], one[2] - other[2]));
     }
-    return most;
+    return maximum;
 }
 
 bool is_invertible(const NiftiAffine& affine) {
@@ -283,10 +283,10 @@ std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext&
     info.type = rescaled_nifti_type(*place);
     info.geometry.size = require_3d(path, {sizes[0], sizes[1], sizes[2]});
     info.geometry.unit = header.unit_name();
-    constexpr std::uint64_t kMost = std::uint64_t(1) << 20;
+    constexpr std::uint64_t kMax = std::uint64_t(1) << 20;
     std::uint64_t frames = 1;
     for (std::size_t a = 3; a < sizes.size(); ++a)
-        if (__builtin_mul_overflow(frames, sizes[a], &frames) || frames > kMost)
+        if (__builtin_mul_overflow(frames, sizes[a], &frames) || frames > kMax)
             throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 frames, the header claims more");
     info.frames = static_cast<int>(frames);
     info.axis_order = header.dimensions() > 3 ? "XYZT" : "XYZ";

@@ -35,7 +35,7 @@ NpyHeader read_header(const std::string& path) {
     };
     PixelPlace begin;
     begin.path = path;
-    constexpr std::uint64_t kVersion1 = 10, kVersion2 = 12, kMostText = 1U << 16;
+    constexpr std::uint64_t kVersion1 = 10, kVersion2 = 12, kMaxText = 1U << 16;
     const std::uint64_t file_bytes = std::filesystem::file_size(path);
     std::array<unsigned char, kVersion2> first{};
     if (file_bytes < kVersion2 || !read_bytes(begin, kVersion2, first.data()) ||
@@ -47,8 +47,8 @@ NpyHeader read_header(const std::string& path) {
     NpyHeader header;
     begin.skip = is_first ? kVersion1 : kVersion2;
     header.end = begin.skip + length;
-    std::string text(length <= kMostText ? length : 0, '\0');
-    if (length > kMostText || header.end > file_bytes || !read_bytes(begin, length, text.data()))
+    std::string text(length <= kMaxText ? length : 0, '\0');
+    if (length > kMaxText || header.end > file_bytes || !read_bytes(begin, length, text.data()))
         throw damaged("a header of " + std::to_string(length) + " bytes");
     header.descr = value_of(text, "descr");
     header.order = value_of(text, "fortran_order");

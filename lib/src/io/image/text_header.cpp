@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFiles = 100000;
+constexpr std::size_t kMaxFiles = 100000;
 
 /// "slice%03d.raw 1 12 1": the names of all numbers, as printf() makes them of %d, with a width and zeros or without.
 std::vector<std::string> numbered_files(const std::string& text) {
@@ -30,7 +30,7 @@ std::vector<std::string> numbered_files(const std::string& text) {
     std::int64_t first = 0, last = -1, step = 1;
     if (!(numbers >> first >> last)) return names;
     if (!(numbers >> step) || step == 0) step = last < first ? -1 : 1;
-    for (std::int64_t n = first; (step > 0 ? n <= last : n >= last) && names.size() < kMostFiles; n += step) {
+    for (std::int64_t n = first; (step > 0 ? n <= last : n >= last) && names.size() < kMaxFiles; n += step) {
         std::string number = std::to_string(n);
         if (number.size() < digits) number.insert(0, digits - number.size(), fill);
         names.push_back(text.substr(0, percent) + number + text.substr(letter + 1, blank - letter - 1));
@@ -41,11 +41,11 @@ std::vector<std::string> numbered_files(const std::string& text) {
 }  // namespace
 
 TextHeader::TextHeader(const std::string& path) : path_(path) {
-    constexpr std::size_t kMost = 1000;
+    constexpr std::size_t kMax = 1000;
     std::ifstream file(path, std::ios::binary);
     std::string line;
     bool list = false;
-    while (lines.size() < kMost && std::getline(file, line) && !line.empty() && line != "\r") {
+    while (lines.size() < kMax && std::getline(file, line) && !line.empty() && line != "\r") {
         lines.push_back(line);
         const std::string small = lower(line);
         const bool is_meta = small.starts_with("elementdatafile");
@@ -54,7 +54,7 @@ TextHeader::TextHeader(const std::string& path) : path_(path) {
         if (list || is_meta) break;
     }
     if (file) end = static_cast<std::uint64_t>(file.tellg());
-    while (list && listed_.size() < kMostFiles && std::getline(file, line))
+    while (list && listed_.size() < kMaxFiles && std::getline(file, line))
         if (const std::string name(trim(line)); !name.empty()) listed_.push_back(name);
 }
 
@@ -76,7 +76,7 @@ std::string TextHeader::value_of(std::initializer_list<const char*> keys) const 
     return {};
 }
 
-bool TextHeader::says(const std::string& key, const std::string& wanted) const {
+bool TextHeader::has_value(const std::string& key, const std::string& wanted) const {
     return lower(value(key)).starts_with(wanted);
 }
 

@@ -16,7 +16,7 @@ struct TextHeader {
     [[nodiscard]] std::string value(const std::string& key) const;
     /// The first of the keys that there is.
     [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const;
-    [[nodiscard]] bool says(const std::string& key, const std::string& wanted) const;
+    [[nodiscard]] bool has_value(const std::string& key, const std::string& wanted) const;
     /// The file with the pixels, as written; empty when they follow the header.
     [[nodiscard]] std::string data_file() const;
     /// Paths of all files with pixels that the header names: one, a list of them, or numbered ones. They need not be

@@ -11,9 +11,9 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kLeastBytes = std::uint64_t(64) << 10;  // of a chunk
-constexpr std::size_t kMostHandles = 64;                        // kept open while idle
-constexpr std::int32_t kBrick = 256;                            // strips are cut into columns
+constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;  // of a chunk
+constexpr std::size_t kMaxHandles = 64;                       // kept open while idle
+constexpr std::int32_t kBrick = 256;                          // strips are cut into columns
 
 /// Open files: libtiff's handles serve one thread at a time.
 class TiffHandles {
@@ -44,7 +44,7 @@ public:
 
     void give_back(Handle handle) {
         const std::lock_guard<std::mutex> lock(mutex_);
-        if (idle_.size() >= kMostHandles) idle_.erase(idle_.begin());
+        if (idle_.size() >= kMaxHandles) idle_.erase(idle_.begin());
         idle_.push_back(std::move(handle));
     }
 
@@ -165,8 +165,8 @@ private:
 
 Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame) {
     const bool tiled = frame.contiguous == 0 && TIFFIsTiled(tiff.get()) != 0;
-    const auto up_to = [](std::uint64_t n, std::int32_t most) {
-        return std::int32_t(std::clamp<std::uint64_t>(n, 1, std::uint64_t(most)));
+    const auto up_to = [](std::uint64_t n, std::int32_t maximum) {
+        return std::int32_t(std::clamp<std::uint64_t>(n, 1, std::uint64_t(maximum)));
     };
     const std::uint64_t width = pixel_bytes(frame.type);
     Index3 chunk{std::min(kBrick, frame.size[0]), std::min(kBrick, frame.size[1]), 1};
@@ -177,11 +177,11 @@ Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame) {
         // whole strips
         const auto rows = std::uint64_t(
             up_to(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, std::uint32_t(frame.size[1])), frame.size[1]));
-        const std::uint64_t least = std::max<std::uint64_t>(kLeastBytes / width / std::uint64_t(chunk[0]), 1);
-        if (rows < least) chunk[1] = up_to((least + rows - 1) / rows * rows, frame.size[1]);
+        const std::uint64_t minimum = std::max<std::uint64_t>(kMinBytes / width / std::uint64_t(chunk[0]), 1);
+        if (rows < minimum) chunk[1] = up_to((minimum + rows - 1) / rows * rows, frame.size[1]);
     }
     for (int a = 0; tiled && a < 2; ++a)
-        while (voxel_count(chunk) * width < kLeastBytes && chunk[a] < std::min(kBrick, frame.size[a]))
+        while (voxel_count(chunk) * width < kMinBytes && chunk[a] < std::min(kBrick, frame.size[a]))
             chunk[a] = up_to(2 * std::uint64_t(chunk[a]), frame.size[a]);
     return chunk;
 }

@@ -29,8 +29,8 @@ public:
         if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack)
             return false;
         const std::uint64_t block_bytes = width_ * height_ * samples_ * bytes_;
-        const tmsize_t told = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
-        if (told < 0 || std::uint64_t(told) != block_bytes || block_bytes > most_in_file()) return false;
+        const tmsize_t reported = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
+        if (reported < 0 || std::uint64_t(reported) != block_bytes || block_bytes > max_in_file()) return false;
         block_.resize(block_bytes);
         const auto first_x = std::uint64_t(box_.min[0]), first_y = std::uint64_t(box_.min[1]);
         for (std::uint64_t y = first_y / height_ * height_; y <= std::uint64_t(box_.max[1]); y += height_)
@@ -43,11 +43,11 @@ public:
 
 private:
     /// Bytes that the file can hold, by its own size.
-    [[nodiscard]] std::uint64_t most_in_file() const {
-        constexpr std::uint64_t kMostOfByte = 32768;  // zstd's, which is beyond those of the other codecs
+    [[nodiscard]] std::uint64_t max_in_file() const {
+        constexpr std::uint64_t kMaxOfByte = 32768;  // zstd's, which is beyond those of the other codecs
         const std::uint64_t bytes = TIFFGetSizeProc(tiff_.get())(TIFFClientdata(tiff_.get()));
         const bool packed = tiff_.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE;
-        return packed ? kMostOfByte * bytes : bytes;
+        return packed ? kMaxOfByte * bytes : bytes;
     }
 
     bool decode(std::uint64_t x, std::uint64_t y) {
@@ -105,13 +105,13 @@ TiffPage current_page(const Tiff& tiff) {
 }
 
 std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
-    constexpr std::uint64_t kLeastLimit = std::uint64_t(1) << 28;
+    constexpr std::uint64_t kMinLimit = std::uint64_t(1) << 28;
     std::error_code status;
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status)
         throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
     // m: not mapped, for pages of packed tiles that were read once would stay in memory
-    auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kLeastLimit, 4 * bytes));
+    auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kMinLimit, 4 * bytes));
     if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, path + ": not a usable TIFF file");
     return tiff;
 }

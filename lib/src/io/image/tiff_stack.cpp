@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // More planes than any microscope makes; a damaged description may claim more.
-constexpr std::uint64_t kMostPlanes = std::uint64_t(1) << 24;
+constexpr std::uint64_t kMaxPlanes = std::uint64_t(1) << 24;
 
 double to_number(const std::string& text) {
     double value = 0;
@@ -146,7 +146,7 @@ void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
         std::uint64_t& count = axis == 'C' ? read.channels : axis == 'T' ? read.frames : read.slices;
         count = shape[n];
         read.order += axis == 'C' || axis == 'T' ? axis : 'Z';
-        if (shape[n] == 0 || (planes *= shape[n]) > kMostPlanes) break;
+        if (shape[n] == 0 || (planes *= shape[n]) > kMaxPlanes) break;
     }
     for (const char axis : {'Z', 'C', 'T'})
         if (read.order.find(axis) == std::string::npos) read.order += axis;
@@ -305,7 +305,7 @@ public:
                 count = to_count(block.plane_count, 0);
             else if (block.ifd.empty())
                 count = pages_of(file);
-            for (std::uint64_t n = 0; n < count && first + n < planes && page + n < kMostPlanes; ++n)
+            for (std::uint64_t n = 0; n < count && first + n < planes && page + n < kMaxPlanes; ++n)
                 stack_.planes[first + n] = {file, static_cast<std::uint32_t>(page + n)};
         }
     }
@@ -374,8 +374,8 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
     const bool named =
         std::any_of(ome.channels.begin(), ome.channels.end(), [](const std::string& n) { return !n.empty(); });
     if (named && ome.channels.size() == stack.channels) stack.channel_names = ome.channels;
-    if (stack.slices > kMostPlanes || stack.channels > kMostPlanes || stack.frames > kMostPlanes ||
-        stack.slices * stack.channels > kMostPlanes || stack.slices * stack.channels * stack.frames > kMostPlanes)
+    if (stack.slices > kMaxPlanes || stack.channels > kMaxPlanes || stack.frames > kMaxPlanes ||
+        stack.slices * stack.channels > kMaxPlanes || stack.slices * stack.channels * stack.frames > kMaxPlanes)
         throw read_error(Errc::InvalidInput, facts.path, "its OME-XML claims more planes than there can be; damaged");
     if (!ome.data.empty()) OmePlanes(facts, stack).assign(ome.data);
 }
@@ -413,7 +413,7 @@ TiffStack describe_tiff(const TiffFacts& facts) {
     else if (text.rfind('{', 0) == 0)
         read_tifffile(facts, stack);
     const bool in_order = stack.planes.empty();
-    if (in_order && (stack.slices > kMostPlanes || stack.channels > kMostPlanes || stack.frames > kMostPlanes ||
+    if (in_order && (stack.slices > kMaxPlanes || stack.channels > kMaxPlanes || stack.frames > kMaxPlanes ||
                      stack.slices * stack.channels * stack.frames != facts.pages)) {
         // The description is stale (a tool that kept it while it changed the pages): the pages are right.
         stack.slices = facts.pages;

@@ -79,7 +79,7 @@ private:
         for (const std::uint32_t v : corners) places.push_back(meshing::to_vec3(mesh_.vertices[v]));
         const auto pieces = meshing::cut_polygon(places);
         if (pieces.empty())
-            source_.fail("expected concave faces of at most " + std::to_string(meshing::kMostPolygonCorners) +
+            source_.fail("expected concave faces of at most " + std::to_string(meshing::kMaxPolygonCorners) +
                          " corners, got one of " + std::to_string(corners.size()) +
                          "; triangulate the mesh in the program that made it");
         for (const auto& t : pieces) triangle(corners[t[0]], corners[t[1]], corners[t[2]]);

@@ -40,7 +40,7 @@ std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOpt
 }
 
 /// Tells of a format that holds single precision alone, and so no origin.
-void tell_of_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
+void report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
 /// What begins a PLY file, up to its vertices. @throws Error Unsupported (more vertices than its numbers tell apart).
 struct PlyCounts {

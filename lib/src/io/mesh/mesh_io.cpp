@@ -101,7 +101,7 @@ std::vector<std::string> mesh_io::one_line_each(std::vector<std::string> comment
     return comments;
 }
 
-void mesh_io::tell_of_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options) {
+void mesh_io::report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options) {
     if (origin == Vec3{0, 0, 0} || detail::extension(path) != ".stl" || !options.binary || !options.warn) return;
     std::ostringstream text;
     text << std::setprecision(15) << origin[0] << ", " << origin[1] << ", " << origin[2];
@@ -114,7 +114,7 @@ void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options) {
     const Writer writer = writer_of(path);
     const Prepared prepared = prepare(detail::extension(path), mesh, options);
-    tell_of_origin(path, mesh.origin, options);
+    report_origin(path, mesh.origin, options);
     save(path, [&](Output& out) { writer(out, prepared); });
 }
 

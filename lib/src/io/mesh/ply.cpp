@@ -154,17 +154,17 @@ private:
     /// Refuses counts that the rest of the file has no room for, before any memory is taken.
     /// @param wanted  as of for_each_row()
     void check_size(const PlyElement& element, std::size_t wanted) const {
-        std::uint64_t least = 0, room = source_.bytes_left();
+        std::uint64_t minimum = 0, room = source_.bytes_left();
         if (format_ == PlyFormat::Ascii) {
-            least = 2 * std::max<std::uint64_t>(wanted, 1);
+            minimum = 2 * std::max<std::uint64_t>(wanted, 1);
             ++room;  // the last line may lack its end
         } else {
             for (const PlyProperty& property : element.properties)
-                least += size_of(property.count.value_or(property.type));
+                minimum += size_of(property.count.value_or(property.type));
         }
-        if (!element.properties.empty() && element.count > room / least)
+        if (!element.properties.empty() && element.count > room / minimum)
             source_.fail("the header promises " + std::to_string(element.count) + " of element " + quote(element.name) +
-                         ", the file has room for at most " + std::to_string(room / least) + "; it is truncated");
+                         ", the file has room for at most " + std::to_string(room / minimum) + "; it is truncated");
     }
 
     [[noreturn]] void fail_cut_off(const PlyElement& element, std::uint64_t got) const {
@@ -347,8 +347,8 @@ void read_ply(Source& source, Receiver& receiver) { PlyReader(source, receiver).
 void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const std::vector<std::string>& comments,
                       const std::vector<VertexAttribute>& attributes, bool binary) {
     // Many readers keep the numbers of vertices as int, and the count of faces too.
-    constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
-    if (counts.vertices > kMost || counts.triangles > kMost)
+    constexpr std::uint64_t kMax = std::numeric_limits<std::int32_t>::max();
+    if (counts.vertices > kMax || counts.triangles > kMax)
         throw Error(Errc::Unsupported, "PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +
                                            std::to_string(counts.vertices) + " and " +
                                            std::to_string(counts.triangles) + "; decimate it or use larger voxels");

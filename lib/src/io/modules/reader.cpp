@@ -39,7 +39,7 @@ ReaderPart check_reader_program() {
 }
 
 bool FlatHeader::take(const ItkHeader& header) {
-    if (header.size.size() > kMost) return false;
+    if (header.size.size() > kMax) return false;
     type_ = header.type;
     components_ = header.components;
     is_rgb_ = header.is_rgb ? 1 : 0;
@@ -55,7 +55,7 @@ bool FlatHeader::take(const ItkHeader& header) {
 }
 
 std::optional<ItkHeader> FlatHeader::header() const {
-    if (dimensions_ < 1 || dimensions_ > kMost || static_cast<unsigned>(type_) > unsigned(PixelType::Double))
+    if (dimensions_ < 1 || dimensions_ > kMax || static_cast<unsigned>(type_) > unsigned(PixelType::Double))
         return std::nullopt;
     ItkHeader header;
     header.type = type_;
@@ -73,7 +73,7 @@ std::optional<ItkHeader> FlatHeader::header() const {
 
 std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const std::vector<Piece>& files,
                                                          const RunContext& run) {
-    const std::vector<Trial> trials = try_task(task, files, SharedMemory(0), kMostSecondsForHeader, run);
+    const std::vector<Trial> trials = try_task(task, files, SharedMemory(0), kMaxSecondsForHeader, run);
     std::vector<std::variant<ItkHeader, Error>> headers;
     for (std::size_t n = 0; n < files.size(); ++n) {
         FlatHeader flat;
@@ -92,12 +92,12 @@ std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const 
 DecodedPixels::DecodedPixels(ReaderTask task, std::vector<Piece> files, const RunContext& run)
     : begin_(begins_of(files)), memory_(begin_.back()) {
     if (files.empty()) return;
-    std::uint64_t most = 0;
+    std::uint64_t maximum = 0;
     for (std::size_t n = 0; n < files.size(); ++n) {
         files[n].begin = begin_[n];
-        most = std::max(most, files[n].bytes);
+        maximum = std::max(maximum, files[n].bytes);
     }
-    const std::vector<Trial> trials = try_task(task, files, memory_, most_seconds_for_pixels(most), run);
+    const std::vector<Trial> trials = try_task(task, files, memory_, max_seconds_for_pixels(maximum), run);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (const auto error = reading_error(trials[n], files[n].path, library_of(task))) throw Error(*error);
 }
@@ -107,7 +107,7 @@ void try_hdf5(const std::string& path, const std::string& inside) {
     file.path = path;
     file.detail = inside;
     const std::vector<Trial> trials =
-        try_task(ReaderTask::Hdf5, {file}, SharedMemory(0), kMostSecondsForHeader, RunContext());
+        try_task(ReaderTask::Hdf5, {file}, SharedMemory(0), kMaxSecondsForHeader, RunContext());
     if (const auto error = reading_error(trials.front(), path, "HDF5")) throw Error(*error);
 }
 

@@ -40,11 +40,11 @@ public:
     [[nodiscard]] std::optional<ItkHeader> header() const;
 
 private:
-    static constexpr std::size_t kMost = 10;
+    static constexpr std::size_t kMax = 10;
     PixelType type_ = PixelType::UInt8;
     std::uint32_t components_ = 0, is_rgb_ = 0, dimensions_ = 0;
-    std::uint64_t size_[kMost] = {};
-    double spacing_[kMost] = {}, origin_[kMost] = {}, axes_[kMost][kMost] = {};
+    std::uint64_t size_[kMax] = {};
+    double spacing_[kMax] = {}, origin_[kMax] = {}, axes_[kMax][kMax] = {};
     std::int64_t bytes_ = 0;
     double slope_ = 1, intercept_ = 0;
 };

@@ -51,7 +51,7 @@ void ChunkCache::count(const Key& key, std::uint64_t bytes) {
     if (own == entries_.end()) return;  // given up meanwhile: whoever asked for it holds it
     own->second.bytes = bytes;
     bytes_ += bytes;
-    while (bytes_ > most_bytes_ && order_.size() > 1) {
+    while (bytes_ > max_bytes_ && order_.size() > 1) {
         const auto last = entries_.find(order_.back());
         if (last == own) break;
         bytes_ -= last->second.bytes;

@@ -16,15 +16,15 @@ public:
     /// Its voxels, as ChunkSource::read() gives them; they stay as long as somebody holds them.
     using Chunk = std::shared_ptr<const char[]>;
 
-    /// @param most_bytes  of all chunks together; a larger chunk is kept until the next one comes
-    explicit ChunkCache(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
+    /// @param max_bytes  of all chunks together; a larger chunk is kept until the next one comes
+    explicit ChunkCache(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
 
     /// @param source  outlives the cache
     /// @throws as ChunkSource::read(), and Error InvalidInput at a value that is NaN or infinite.
     [[nodiscard]] Chunk get(const ChunkSource& source, const Index3& chunk);
 
     [[nodiscard]] std::uint64_t bytes() const;  ///< that are kept
-    [[nodiscard]] std::uint64_t most_bytes() const noexcept { return most_bytes_; }
+    [[nodiscard]] std::uint64_t max_bytes() const noexcept { return max_bytes_; }
     [[nodiscard]] std::uint64_t decoded() const;  ///< chunks so far; again those that were given up
 
 private:
@@ -51,7 +51,7 @@ private:
     [[nodiscard]] Chunk fill_of(const ChunkSource& source);
     void count(const Key& key, std::uint64_t bytes);
 
-    const std::uint64_t most_bytes_;
+    const std::uint64_t max_bytes_;
     mutable std::mutex mutex_;
     std::list<Key> order_;  ///< what was used last stands first
     std::unordered_map<Key, Entry, Hash> entries_;

@@ -74,9 +74,9 @@ ChunkSource::ChunkSource(std::string path, PixelType type, const Index3& size, c
     for (const std::int32_t n : chunk_size) {
         if (n < 1)
             throw read_error(Errc::InvalidInput, path_, "expected chunks of voxels, got " + size_text(chunk_size));
-        bytes = bytes > kMostChunkBytes ? bytes : bytes * std::uint64_t(n);
+        bytes = bytes > kMaxChunkBytes ? bytes : bytes * std::uint64_t(n);
     }
-    if (bytes > kMostChunkBytes)
+    if (bytes > kMaxChunkBytes)
         throw read_error(Errc::Unsupported, path_,
                          "expected chunks of 1 GiB at most, got " + size_text(chunk_size) + " voxels of " +
                              std::to_string(pixel_bytes(type)) + " bytes; write it with smaller chunks");

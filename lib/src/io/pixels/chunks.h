@@ -41,7 +41,7 @@ public:
     [[nodiscard]] const Index3& chunk_size() const noexcept { return chunk_size_; }  ///< voxels along i, j, k; >= 1
 
 protected:
-    /// @throws Error InvalidInput, Unsupported when chunks are larger than kMostChunkBytes or have no voxels.
+    /// @throws Error InvalidInput, Unsupported when chunks are larger than kMaxChunkBytes or have no voxels.
     ChunkSource(std::string path, PixelType type, const Index3& size, const Index3& chunk_size);
 
 private:
@@ -58,7 +58,7 @@ private:
 void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk);
 
 /// What one chunk may take when it is unpacked. Zarr's own codecs stop at 2 GiB; the usual size is below 16 MiB.
-constexpr std::uint64_t kMostChunkBytes = std::uint64_t(1) << 30;
+constexpr std::uint64_t kMaxChunkBytes = std::uint64_t(1) << 30;
 
 /// The chunks of a source, each decoded when its first voxel is asked for, and kept; those that the file does not have
 /// share one chunk of fill values. Safe to use by several threads.

@@ -10,8 +10,8 @@ namespace {
 constexpr int kAnyHeader = 15 + 32;  // gzip's or zlib's
 constexpr int kNoHeader = -15;
 constexpr std::size_t kWindow = 32768;
-constexpr std::uint64_t kLeastGap = std::uint64_t(8) << 20;
-constexpr std::uint64_t kMostPlaces = 4096;
+constexpr std::uint64_t kMinGap = std::uint64_t(8) << 20;
+constexpr std::uint64_t kMaxPlaces = 4096;
 
 }  // namespace
 
@@ -58,7 +58,7 @@ void Inflater::step() {
 InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t unpacked, bool to_the_end,
                            const RunContext& run)
     : path_(std::move(path)) {
-    const std::uint64_t gap = std::max(kLeastGap, unpacked / kMostPlaces);
+    const std::uint64_t gap = std::max(kMinGap, unpacked / kMaxPlaces);
     const auto damaged = [&] { return read_error(Errc::InvalidInput, path_, "damaged or truncated"); };
     std::ifstream file(path_, std::ios::binary);
     file.seekg(static_cast<std::streamoff>(offset));
@@ -74,7 +74,7 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
     begin.packed = offset;
     begin.at_header = true;
     places_.push_back(std::move(begin));
-    std::uint64_t packed = 0, done = 0, told = 0;
+    std::uint64_t packed = 0, done = 0, reported = 0;
     bool first = true, ended = false;
     // With all bytes there, one step more looks at the checksum; a file that lacks it is taken as it is.
     while (done < unpacked || (to_the_end && !ended)) {
@@ -116,9 +116,9 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
             place.window.shrink_to_fit();
             places_.push_back(std::move(place));
         }
-        constexpr std::uint64_t kTell = std::uint64_t(64) << 20;
-        if (done >= told + kTell) {
-            told = done;
+        constexpr std::uint64_t kReportEvery = std::uint64_t(64) << 20;
+        if (done >= reported + kReportEvery) {
+            reported = done;
             run.report("image", double(done) / double(unpacked));
         }
     }

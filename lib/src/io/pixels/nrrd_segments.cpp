@@ -11,7 +11,7 @@
 namespace covol::detail {
 
 std::vector<NrrdSegment> read_nrrd_segments(const std::string& path) {
-    constexpr std::size_t kMostLines = 100000;
+    constexpr std::size_t kMaxLines = 100000;
     const std::string end = extension(path);
     std::error_code status;
     if ((end != ".nrrd" && end != ".nhdr") || !std::filesystem::is_regular_file(path, status)) return {};
@@ -19,7 +19,7 @@ std::vector<NrrdSegment> read_nrrd_segments(const std::string& path) {
     std::vector<std::string> order;
     std::ifstream file = open_regular_file(path);
     std::string line;
-    for (std::size_t n = 0; n < kMostLines && std::getline(file, line); ++n) {
+    for (std::size_t n = 0; n < kMaxLines && std::getline(file, line); ++n) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
         if (line.empty()) break;  // the pixels follow
         const std::size_t value = line.find(":="), field = line.find('_');

@@ -310,9 +310,9 @@ Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]) {
         std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);
     if (std::min({size[0], size[1], size[2]}) < 2)
         throw read_error(Errc::InvalidInput, path, "expected a 3D image, got " + text);
-    constexpr std::uint64_t kMostVoxels = std::uint64_t(1) << 52;
+    constexpr std::uint64_t kMaxVoxels = std::uint64_t(1) << 52;
     if (std::max({size[0], size[1], size[2]}) > std::uint64_t(std::numeric_limits<std::int32_t>::max()) / 2 ||
-        size[0] * size[1] > kMostVoxels / size[2])
+        size[0] * size[1] > kMaxVoxels / size[2])
         throw read_error(Errc::InvalidInput, path, "the header claims " + text + " voxels");
     return {static_cast<std::int32_t>(size[0]), static_cast<std::int32_t>(size[1]), static_cast<std::int32_t>(size[2])};
 }

@@ -205,7 +205,7 @@ private:
         is_header = true;
         find_structures(fields);
         needed = columns.count();
-        tell_title();
+        report_title();
         return true;
     }
     void find_structures(const std::vector<string_view>& fields) {
@@ -230,15 +230,15 @@ private:
         if (fields.size() == 6) columns.normal = {3, 4, 5};
         columns.normal_is_guess = columns.normal.has_value();
         if (title_ > 0 && !is_word_only_) fail(path_, line_, why_);
-        tell_title();
+        report_title();
     }
-    void tell_title() {
+    void report_title() {
         if (title_ > 0)
             columns.rule += ", below " + std::to_string(title_) + (title_ > 1 ? " lines" : " line") + " of title";
     }
     /// Of a line that is neither.
     void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
-        constexpr std::size_t kMostTitle = 100;
+        constexpr std::size_t kMaxTitle = 100;
         std::vector<string_view> fields = fields_;
         for (const char candidate : kDelimitersOfNames.substr(0, 3))
             if (line.find(candidate) != string_view::npos) {
@@ -261,7 +261,7 @@ private:
         }
         is_table_without_names_ = is_table_without_names_ || (!has_number && fields.size() >= 3);
         is_word_only_ = is_word_only_ && !has_number;
-        if (++title_ > kMostTitle) refuse();
+        if (++title_ > kMaxTitle) refuse();
     }
 
     std::string path_, structures_by_, why_;

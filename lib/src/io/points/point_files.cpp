@@ -89,8 +89,8 @@ const std::vector<Format>& formats() {
 std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v) {
     double longest = 0;
     for (int a = 0; a < 3; ++a) longest = std::max({longest, std::abs(u[a]), std::abs(v[a])});
-    constexpr double kFewest = 16, kMost = 4096;
-    const int count = static_cast<int>(std::clamp(std::ceil(2 * std::numbers::pi * longest), kFewest, kMost));
+    constexpr double kFewest = 16, kMax = 4096;
+    const int count = static_cast<int>(std::clamp(std::ceil(2 * std::numbers::pi * longest), kFewest, kMax));
     std::vector<Vec3> points;
     for (int n = 0; n < count; ++n) {
         const double angle = 2 * std::numbers::pi * n / count, c = std::cos(angle), s = std::sin(angle);
@@ -113,15 +113,15 @@ void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, c
 }
 
 void name_structure(PointTable& table, const std::string& path, const std::string& name) {
-    constexpr std::size_t kMost = 254;  // as a label image
+    constexpr std::size_t kMax = 254;  // as a label image
     auto& names = table.structures;
     const bool is_last = !table.structure.empty() && names[table.structure.back()] == name;
     const auto found = is_last ? names.begin() + table.structure.back() : std::find(names.begin(), names.end(), name);
     const auto number = std::uint32_t(found - names.begin());
     if (found == names.end()) {
-        if (names.size() == kMost)
+        if (names.size() == kMax)
             throw Error(Errc::InvalidInput,
-                        path + ": `structure_column`: expected at most " + std::to_string(kMost) +
+                        path + ": `structure_column`: expected at most " + std::to_string(kMax) +
                             " structures, got more; is it another column that names them?",
                         "structure_column");
         names.push_back(name);

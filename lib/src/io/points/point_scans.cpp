@@ -39,15 +39,15 @@ struct PcdHeader {
     }
 };
 
-std::uint64_t to_count(const std::string& path, std::size_t line, string_view text, std::uint64_t most) {
+std::uint64_t to_count(const std::string& path, std::size_t line, string_view text, std::uint64_t maximum) {
     const double value = to_coordinate(path, line, text);
-    if (!(value >= 0) || value != std::floor(value) || value > double(most))
-        fail(path, line, "expected a whole number up to " + std::to_string(most) + ", got " + quote(text));
+    if (!(value >= 0) || value != std::floor(value) || value > double(maximum))
+        fail(path, line, "expected a whole number up to " + std::to_string(maximum) + ", got " + quote(text));
     return static_cast<std::uint64_t>(value);
 }
 
 PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
-    constexpr std::uint64_t kMostFields = 1000, kMostPoints = std::uint64_t(1) << 40;
+    constexpr std::uint64_t kMaxFields = 1000, kMaxPoints = std::uint64_t(1) << 40;
     PcdHeader header;
     std::optional<std::uint64_t> points;
     std::uint64_t width = 0, height = 1;
@@ -59,7 +59,7 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
         if (words.size() < 2 || (per_field && words.size() != header.fields.size() + 1))
             fail(path, lines.number(), "not a line of a PCD header: " + quote(line));
         if (key == "FIELDS" || key == "COLUMNS") {
-            if (words.size() > kMostFields) fail(path, lines.number(), "expected fewer fields");
+            if (words.size() > kMaxFields) fail(path, lines.number(), "expected fewer fields");
             header.fields.assign(words.size() - 1, {});
             for (std::size_t n = 1; n < words.size(); ++n) header.fields[n - 1].name = lower(words[n]);
         } else if (per_field) {
@@ -74,12 +74,12 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
         } else if (key == "HEIGHT") {
             height = to_count(path, lines.number(), words[1], 1U << 31);
         } else if (key == "POINTS") {
-            points = to_count(path, lines.number(), words[1], kMostPoints);
+            points = to_count(path, lines.number(), words[1], kMaxPoints);
         } else if (key == "DATA") {
             header.data = lower(words[1]);
             header.points = points.value_or(width * height);
             header.is_organised = height > 1;
-            if (header.points > kMostPoints) fail(path, "expected fewer points");
+            if (header.points > kMaxPoints) fail(path, "expected fewer points");
             return header;
         } else if (key == "VIEWPOINT" && words.size() >= 4) {
             Vec3 at;
@@ -240,7 +240,7 @@ struct PtxHeader {
 constexpr std::array<std::size_t, 10> kPtxNumbers{1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
 
 PtxHeader read_ptx_header(const std::string& path, Lines& lines) {
-    constexpr std::uint64_t kMost = 1U << 20U;
+    constexpr std::uint64_t kMax = 1U << 20U;
     PtxHeader header;
     string_view line;
     std::vector<string_view> words;
@@ -250,7 +250,7 @@ PtxHeader read_ptx_header(const std::string& path, Lines& lines) {
             fail(path, lines.number(),
                  "expected " + std::to_string(kPtxNumbers[n]) + " numbers in line " + std::to_string(n + 1) +
                      " of a PTX scan's header, got " + quote(line));
-        if (n < 2) (n == 0 ? header.columns : header.rows) = to_count(path, lines.number(), words[0], kMost);
+        if (n < 2) (n == 0 ? header.columns : header.rows) = to_count(path, lines.number(), words[0], kMax);
         for (std::size_t w = 0; w < words.size(); ++w) {
             const double value = to_coordinate(path, lines.number(), words[w]);
             if (n == 2) header.scanner[w] = value;

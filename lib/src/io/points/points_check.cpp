@@ -113,15 +113,15 @@ public:
         if (world_.size() < kFewest || cloud_.stated || now_.scale != 1) return {};
         const int axes = axes_on_centres(now_);
         std::vector<Reading> best;
-        int most = axes;
+        int maximum = axes;
         for (const Reading& reading : others()) {
             // Slices that count channels are whole numbers whatever the marks are.
             if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
                 reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
             const int count = axes_on_centres(reading.options);
-            if (count > most) {
-                most = count;
+            if (count > maximum) {
+                maximum = count;
                 best.assign(1, reading);
             }
         }
@@ -162,11 +162,11 @@ private:
     [[nodiscard]] bool is_speck(const Reading& reading, int rank) const {
         constexpr std::size_t kFewest = 8;
         const bool is_odd = rank > 2;
-        const double least = is_odd ? 0.2 : 0.02;  // of the image's edge
+        const double minimum = is_odd ? 0.2 : 0.02;  // of the image's edge
         if (is_odd && cloud_.points.size() < kFewest) return true;
         const WorldBox box = index_box(reading);
         for (int a = 0; a < 3; ++a)
-            if (box.max[a] - box.min[a] >= least * geometry_.size[a]) return false;
+            if (box.max[a] - box.min[a] >= minimum * geometry_.size[a]) return false;
         return true;
     }
 
@@ -214,9 +214,9 @@ private:
                     add(list, {space, order, voxels && lengths ? 1.0 : now_.scale * scale, 1});
                 }
         }
-        constexpr int kMostChannels = 6;
+        constexpr int kMaxChannels = 6;
         if (!lengths)
-            for (int channels = 2; channels <= kMostChannels; ++channels)
+            for (int channels = 2; channels <= kMaxChannels; ++channels)
                 add(list, {now_.space, now_.order, now_.scale, channels});
         std::stable_sort(list.begin(), list.end(),
                          [](const Reading& a, const Reading& b) { return a.changes < b.changes; });
@@ -224,7 +224,7 @@ private:
     }
 
     void add(std::vector<Reading>& list, const ReadPointsOptions& options) const {
-        constexpr int kMostChanges = 2;
+        constexpr int kMaxChanges = 2;
         Reading reading{options, 0, ""};
         const auto change = [&](const std::string& advice) {
             ++reading.changes;
@@ -239,7 +239,7 @@ private:
             scale << "points_scale = " << options.scale;
             change(scale.str());
         }
-        if (reading.changes > 0 && reading.changes <= kMostChanges) list.push_back(reading);
+        if (reading.changes > 0 && reading.changes <= kMaxChanges) list.push_back(reading);
     }
 
     static std::string text_of(const WorldBox& box) {

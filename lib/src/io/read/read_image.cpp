@@ -151,7 +151,7 @@ PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const
 
 }  // namespace
 
-ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options, std::uint64_t most_bytes,
+ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options, std::uint64_t max_bytes,
                               const RunContext& run) {
     ImageLevels whole(image);
     if (image.view()) return whole;  // it is in memory, or mapped
@@ -173,7 +173,7 @@ ImageLevels open_image_levels(const Image& image, const ReadImageOptions& option
             if (error.code() == Errc::Cancelled) throw;
             run.warn(std::string(error.what()) + ": this level of the pyramid is not used");
         }
-    return {image, std::move(sources), most_bytes};
+    return {image, std::move(sources), max_bytes};
 }
 
 Image read_image(const std::string& path, const ReadImageOptions& options, const RunContext& run) {

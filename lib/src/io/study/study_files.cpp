@@ -39,8 +39,8 @@ public:
                                ? make_guess(image_of(path, guess.digest, run), guess.label, image_)
                                : read_guess(path, image_, options, run);
         given.mask.reset();
-        constexpr std::size_t kMostKept = 4;
-        if (known_.size() == kMostKept) known_.pop_front();
+        constexpr std::size_t kMaxKept = 4;
+        if (known_.size() == kMaxKept) known_.pop_front();
         known_.emplace_back(guess, given);
         return given;
     }

@@ -65,7 +65,7 @@ bool is_ome_tiff(const std::string& path) {
 
 /// How far single precision moves a voxel at most, in voxels.
 double moved_by_rounding(const ImageGeometry& geometry) {
-    double most = 0;
+    double maximum = 0;
     for (int corner = 0; corner < 8; ++corner) {
         Vec3 index, rounded;
         for (int a = 0; a < 3; ++a) index[a] = (corner >> a & 1) != 0 ? geometry.size[a] - 1 : 0;
@@ -75,20 +75,20 @@ double moved_by_rounding(const ImageGeometry& geometry) {
                 rounded[a] += double(float(geometry.direction[a][b] * geometry.spacing[b])) * index[b];
         }
         const Vec3 found = geometry.world_to_index(rounded);
-        for (int a = 0; a < 3; ++a) most = std::max(most, std::abs(found[a] - index[a]));
+        for (int a = 0; a < 3; ++a) maximum = std::max(maximum, std::abs(found[a] - index[a]));
     }
-    return most;
+    return maximum;
 }
 
 /// NIfTI-1 has single precision: far from 0 that is not enough.
 /// @throws Error Unsupported where voxels would lie where others are
 void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
-    constexpr double kTold = 0.01, kMost = 0.5;  // voxels
+    constexpr double kMaxReported = 0.01, kMax = 0.5;  // voxels
     const double moved = moved_by_rounding(geometry);
     const std::string what = path + ": NIfTI-1 keeps places in single precision, which moves voxels by up to " +
                              detail::number(moved) + " of their size so far from 0";
-    if (moved > kMost) throw Error(Errc::Unsupported, what + "; write .nrrd or .mha, which keep them");
-    if (moved > kTold) run.warn(what + "; .nrrd and .mha keep them");
+    if (moved > kMax) throw Error(Errc::Unsupported, what + "; write .nrrd or .mha, which keep them");
+    if (moved > kMaxReported) run.warn(what + "; .nrrd and .mha keep them");
 }
 
 /// What of the geometry such a file has no place for.

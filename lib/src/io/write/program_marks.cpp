@@ -62,8 +62,8 @@ void put(std::string& bytes, std::size_t at, T value) {
 
 /// Layout: ij/io/RoiEncoder.java of ImageJ 1.53. Pixels as ImageJ counts them, centres at whole numbers for points.
 std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks) {
-    constexpr std::size_t kMost = 65535;  // a 16-bit count
-    if (marks.size() > kMost)
+    constexpr std::size_t kMax = 65535;  // a 16-bit count
+    if (marks.size() > kMax)
         throw Error(Errc::Unsupported, path + ": a multi-point of Fiji has at most 65535 points, got " +
                                            std::to_string(marks.size()) + "; write .csv or .mrk.json");
     const std::size_t n = marks.size();

@@ -129,12 +129,12 @@ std::array<double, 3> quaternion(const Matrix3& r) {
 using nifti::kCodes, nifti::kPixdim, nifti::kQuatern, nifti::kSrow;
 
 bool is_sheared(const Matrix3& direction) {
-    double most = 0;
+    double maximum = 0;
     for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t b = 0; b < a; ++b)
-            most = std::max(most, std::abs(direction[0][a] * direction[0][b] + direction[1][a] * direction[1][b] +
-                                           direction[2][a] * direction[2][b]));
-    return most > 1e-3;
+            maximum = std::max(maximum, std::abs(direction[0][a] * direction[0][b] + direction[1][a] * direction[1][b] +
+                                                 direction[2][a] * direction[2][b]));
+    return maximum > 1e-3;
 }
 
 /// Whether one of the forms that an input stated means the lattice that this header has.

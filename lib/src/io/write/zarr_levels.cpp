@@ -12,14 +12,14 @@ namespace {
 template <typename T>
 T most_frequent_of(const T* values, int count) {
     T best = values[0];
-    int most = 0;
+    int maximum = 0;
     for (int n = 0; n < count; ++n) {
         const auto times = static_cast<int>(std::count(values, values + count, values[n]));
-        if (times > most) {
-            most = times;
+        if (times > maximum) {
+            maximum = times;
             best = values[n];
         }
-        if (2 * most > count) break;
+        if (2 * maximum > count) break;
     }
     return best;
 }

@@ -23,18 +23,18 @@ void visit_pixels(double x0, double y0, double x1, double y1, const Rect& clip, 
 Canvas::Canvas(int width, int height, const Color& background)
     : width_(width), height_(height), pixels_(std::size_t(width) * height, background) {}
 
-void Canvas::blend(int x, int y, const Color& color, double share) {
+void Canvas::blend(int x, int y, const Color& color, double fraction) {
     Color& pixel = at(x, y);
-    pixel = mix(pixel, color, share);
+    pixel = mix(pixel, color, fraction);
 }
 
-void Canvas::fill(const Rect& rect, const Color& color, double share) {
+void Canvas::fill(const Rect& rect, const Color& color, double fraction) {
     visit_pixels(rect.x + 1, rect.y + 1, rect.right() - 1, rect.bottom() - 1, rect, whole(),
-                 [&](int x, int y, double, double) { blend(x, y, color, share); });
+                 [&](int x, int y, double, double) { blend(x, y, color, fraction); });
 }
 
 void Canvas::line(const std::array<double, 2>& from, const std::array<double, 2>& to, double width, const Color& color,
-                  double share, const Rect& clip) {
+                  double fraction, const Rect& clip) {
     const double dx = to[0] - from[0], dy = to[1] - from[1], square = dx * dx + dy * dy, half = 0.5 * width;
     visit_pixels(std::min(from[0], to[0]) - half, std::min(from[1], to[1]) - half, std::max(from[0], to[0]) + half,
                  std::max(from[1], to[1]) + half, clip, whole(), [&](int x, int y, double px, double py) {
@@ -42,15 +42,15 @@ void Canvas::line(const std::array<double, 2>& from, const std::array<double, 2>
                          square > 0 ? std::clamp(((px - from[0]) * dx + (py - from[1]) * dy) / square, 0.0, 1.0) : 0.0;
                      const double away = std::hypot(px - from[0] - t * dx, py - from[1] - t * dy);
                      const double in = std::clamp(half + 0.5 - away, 0.0, 1.0);
-                     if (in > 0) blend(x, y, color, share * in);
+                     if (in > 0) blend(x, y, color, fraction * in);
                  });
 }
 
-void Canvas::disc(double x, double y, double radius, const Color& color, double share, const Rect& clip) {
+void Canvas::disc(double x, double y, double radius, const Color& color, double fraction, const Rect& clip) {
     visit_pixels(x - radius, y - radius, x + radius, y + radius, clip, whole(),
                  [&](int i, int j, double px, double py) {
                      const double in = std::clamp(radius + 0.5 - std::hypot(px - x, py - y), 0.0, 1.0);
-                     if (in > 0) blend(i, j, color, share * in);
+                     if (in > 0) blend(i, j, color, fraction * in);
                  });
 }
 

@@ -26,12 +26,12 @@ public:
     [[nodiscard]] Rect whole() const { return {0, 0, width_, height_}; }
     [[nodiscard]] Color& at(int x, int y) { return pixels_[std::size_t(y) * width_ + x]; }
     /// Covers a share of a pixel.
-    void blend(int x, int y, const Color& color, double share);
+    void blend(int x, int y, const Color& color, double fraction);
 
-    void fill(const Rect& rect, const Color& color, double share = 1);
+    void fill(const Rect& rect, const Color& color, double fraction = 1);
     void line(const std::array<double, 2>& from, const std::array<double, 2>& to, double width, const Color& color,
-              double share, const Rect& clip);
-    void disc(double x, double y, double radius, const Color& color, double share, const Rect& clip);
+              double fraction, const Rect& clip);
+    void disc(double x, double y, double radius, const Color& color, double fraction, const Rect& clip);
 
     [[nodiscard]] Picture picture() const;
 

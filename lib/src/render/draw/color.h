@@ -11,8 +11,8 @@ namespace covol::figure {
 using Color = std::array<float, 3>;
 
 inline Color gray(double v) { return {float(v), float(v), float(v)}; }
-inline Color mix(const Color& a, const Color& b, double share) {
-    const auto t = float(share);
+inline Color mix(const Color& a, const Color& b, double fraction) {
+    const auto t = float(fraction);
     return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
 }
 inline Color scaled(const Color& c, double by) { return {float(by * c[0]), float(by * c[1]), float(by * c[2])}; }

@@ -124,16 +124,16 @@ public:
         }
     }
 
-    [[nodiscard]] std::vector<float> shares() const {
-        std::vector<float> shares(std::size_t(width_) * height_);
+    [[nodiscard]] std::vector<float> fractions() const {
+        std::vector<float> fractions(std::size_t(width_) * height_);
         for (int row = 0; row < height_; ++row) {
             float sum = 0;
             for (int x = 0; x < width_; ++x) {
                 sum += cells_[std::size_t(row) * (width_ + 2) + x];
-                shares[std::size_t(row) * width_ + x] = std::min(1.0F, std::abs(sum));
+                fractions[std::size_t(row) * width_ + x] = std::min(1.0F, std::abs(sum));
             }
         }
-        return shares;
+        return fractions;
     }
 
 private:
@@ -176,24 +176,24 @@ void draw_text(Canvas& canvas, double x, double y, const std::string& utf8, cons
             coverage.add({at + scale * from[0], y - scale * from[1]}, {at + scale * to[0], y - scale * to[1]});
         at += scale * glyph.advance;
     }
-    const std::vector<float> shares = coverage.shares();
-    const auto share = [&](int i, int j) {
+    const std::vector<float> fractions = coverage.fractions();
+    const auto fraction = [&](int i, int j) {
         const bool in = i >= 0 && j >= 0 && i < coverage.width() && j < coverage.height();
-        return in ? shares[std::size_t(j) * coverage.width() + i] : 0.0F;
+        return in ? fractions[std::size_t(j) * coverage.width() + i] : 0.0F;
     };
     const int reach = int(std::ceil(style.halo));
     for (int j = 0; j < coverage.height(); ++j)
         for (int i = 0; i < coverage.width(); ++i) {
             const int px = left + i, py = top + j;
             if (px < 0 || py < 0 || px >= canvas.width() || py >= canvas.height()) continue;
-            float rim_share = 0;
+            float rim_fraction = 0;
             for (int dy = -reach; dy <= reach; ++dy)
                 for (int dx = -reach; dx <= reach; ++dx) {
                     const double near = std::clamp(style.halo + 0.5 - std::hypot(dx, dy), 0.0, 1.0);
-                    rim_share = std::max(rim_share, float(near) * share(i + dx, j + dy));
+                    rim_fraction = std::max(rim_fraction, float(near) * fraction(i + dx, j + dy));
                 }
-            if (style.halo > 0) canvas.blend(px, py, style.halo_color, 0.75 * rim_share);
-            canvas.blend(px, py, style.color, share(i, j));
+            if (style.halo > 0) canvas.blend(px, py, style.halo_color, 0.75 * rim_fraction);
+            canvas.blend(px, py, style.color, fraction(i, j));
         }
 }
 

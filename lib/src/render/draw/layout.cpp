@@ -36,17 +36,17 @@ Tiling::Placed Tiling::place(const Rect& room, int gap) const {
     }
     placed.pixel = std::max(placed.pixel, all / std::max(1, room.width - gap * int(columns.size() - 1)));
     const auto pixels = [&](double length) { return std::max(1, int(std::floor(length / placed.pixel + 1e-9))); };
-    int x = 0, most = 0;
+    int x = 0, maximum = 0;
     for (std::size_t c = 0; c < columns.size(); ++c) {
         int y = 0;
         for (const Cell& cell : columns[c]) {
             placed.at.push_back({x, y, pixels(cell.width), pixels(cell.height)});
             y += placed.at.back().height + gap;
         }
-        most = std::max(most, y - gap);
+        maximum = std::max(maximum, y - gap);
         x += pixels(widths[c]) + gap;
     }
-    placed.bounds = {room.x + (room.width - (x - gap)) / 2, room.y + (room.height - most) / 2, x - gap, most};
+    placed.bounds = {room.x + (room.width - (x - gap)) / 2, room.y + (room.height - maximum) / 2, x - gap, maximum};
     for (Rect& rect : placed.at) {
         rect.x += placed.bounds.x;
         rect.y += placed.bounds.y;
@@ -77,12 +77,12 @@ std::vector<Tiling> ways_for_equals(double width, double height, int count) {
 Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>& ways, int gap) {
     Split best;
     bool is_beside = true;
-    double most = -1;
+    double maximum = -1;
     for (int way = 0; way < int(ways.size()); ++way)
         for (const bool beside : {true, false})
-            for (double share = 0.35; share < 0.76; share += 0.01) {
+            for (double fraction = 0.35; fraction < 0.76; fraction += 0.01) {
                 Rect view = room, rest = room;
-                (beside ? view.width : view.height) = int(share * (beside ? room.width : room.height));
+                (beside ? view.width : view.height) = int(fraction * (beside ? room.width : room.height));
                 const int used = (beside ? view.width : view.height) + gap;
                 (beside ? rest.x : rest.y) += used;
                 (beside ? rest.width : rest.height) -= used;
@@ -91,8 +91,8 @@ Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>&
                 const double score = 0.55 * std::log(fitted(view, aspect, rim)) +
                                      0.45 * std::log(std::max(1.0, area(parts))) + 0.3 * std::log(filled) +
                                      (beside ? 0.03 : 0);
-                if (score <= most + 1e-9) continue;
-                most = score;
+                if (score <= maximum + 1e-9) continue;
+                maximum = score;
                 best = {view, parts, way};
                 is_beside = beside;
             }
@@ -108,11 +108,11 @@ Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>&
 
 Split fill(const Rect& room, const std::vector<Tiling>& ways, int gap) {
     Split best;
-    double most = -1;
+    double maximum = -1;
     for (int way = 0; way < int(ways.size()); ++way) {
         const Tiling::Placed parts = ways[way].place(room, gap);
-        if (area(parts) <= most) continue;
-        most = area(parts);
+        if (area(parts) <= maximum) continue;
+        maximum = area(parts);
         best = {{}, parts, way};
     }
     return best;

@@ -22,7 +22,7 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr std::size_t kLoopsToTell = 8;
+constexpr std::size_t kMaxReportedLoops = 8;
 
 int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
 
@@ -97,7 +97,7 @@ struct Maker {
             case Holes::Flat: return flatten_holes(made.mesh, made.distance_to_points, distance, slack, run());
             case Holes::Auto: break;
         }
-        if (made.share_without_points <= kFinal.warn_without_points || options().contours) return {};
+        if (made.fraction_without_points <= kFinal.warn_without_points || options().contours) return {};
         try {
             TreatedHoles open = trimmed();
             double rims = 0;
@@ -105,7 +105,7 @@ struct Maker {
             // What closes a sheet is as large as the sheet itself, or larger; along curves there are strips of points,
             // and no sheet.
             const bool is_sheet = measure(open.mesh).area > 2 * distance * rims;
-            if (is_sheet && open.report.share > 0.5) return open;
+            if (is_sheet && open.report.fraction > 0.5) return open;
         } catch (const Error& error) {
             // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
             if (error.code() != Errc::InvalidInput) throw;
@@ -115,12 +115,13 @@ struct Maker {
 
     /// How much of the surface no point holds, and what becomes of that.
     void treat_holes() {
-        const HolesOptions& asked = options().holes;
+        const HolesOptions& requested = options().holes;
         HolesReport& holes = made.holes;
-        const double automatic = choose_hole_distance(points, choices.h), distance = asked.distance.value_or(automatic);
+        const double automatic = choose_hole_distance(points, choices.h),
+                     distance = requested.distance.value_or(automatic);
         const double slack = kFinal.rim_slack * std::min(automatic, distance);
         made.distance_to_points = measure_distances(made.mesh, points, run());
-        made.share_without_points = measure_share_beyond(made.mesh, made.distance_to_points, distance);
+        made.fraction_without_points = measure_fraction_beyond(made.mesh, made.distance_to_points, distance);
         holes.distance = distance;
         std::optional<TreatedHoles> treated = treated_holes(distance, slack);
         if (!treated) return;
@@ -128,28 +129,28 @@ struct Maker {
         if (holes.policy == Holes::Open) {
             const double volume = measure(made.mesh).volume;
             made.mesh = std::move(treated->mesh);
-            if (holes.share > 0) {
+            if (holes.fraction > 0) {
                 holes.closed_volume = volume;
                 relax();
             }
-        } else if (holes.share > 0) {
+        } else if (holes.fraction > 0) {
             replace_by(treated->mesh);
         }
-        if (holes.share > 0) made.distance_to_points = measure_distances(made.mesh, points, run());
-        tell_of_holes();
+        if (holes.fraction > 0) made.distance_to_points = measure_distances(made.mesh, points, run());
+        report_holes();
     }
 
-    void tell_of_holes() {
+    void report_holes() {
         const HolesReport& holes = made.holes;
         std::string lengths;
-        for (std::size_t n = 0; n < holes.loops.size() && n < kLoopsToTell; ++n)
+        for (std::size_t n = 0; n < holes.loops.size() && n < kMaxReportedLoops; ++n)
             lengths += (n > 0 ? ", " : "") + number(holes.loops[n].length);
         made.report.remarks.choose(
             "holes", to_string(holes.policy),
             (options().holes.policy == Holes::Auto ? "the points hold one side of something; " : std::string()) +
                 (holes.loops.empty() ? "none: all of the surface is within " + number(holes.distance) + " of points"
                                      : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
-                                           (holes.loops.size() > kLoopsToTell ? ", ..." : "") +
+                                           (holes.loops.size() > kMaxReportedLoops ? ", ..." : "") +
                                            (holes.policy == Holes::Open ? "; the level set stays closed" : "")),
             run());
     }
@@ -161,7 +162,7 @@ struct Maker {
                 options().holes.distance ? *options().holes.distance : choose_hole_distance(points, choices.h);
             const detail::BeyondPoints measured =
                 detail::measure_beyond(*made.level_set, points, made.holes.distance, run());
-            made.share_without_points = measured.share;
+            made.fraction_without_points = measured.fraction;
             mesh = measured.mesh;
         } else {
             mesh = measure_surface(*made.level_set, 0, run());

@@ -17,7 +17,7 @@ struct Surface {
     MeshMeasures measures;
     RelaxReport mesh_report;
     HolesReport holes;
-    double share_without_points = 0;
+    double fraction_without_points = 0;
     StepReport report;
 };
 

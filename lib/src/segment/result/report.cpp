@@ -23,12 +23,12 @@ namespace {
 std::vector<Vec3> places_on(const FloatGrid& surface) {
     std::vector<Vec3> places;
     for (auto leaf = surface.tree().cbeginLeaf(); leaf; ++leaf) {
-        float least = float(surface.voxelSize()[0]);
+        float minimum = float(surface.voxelSize()[0]);
         openvdb::Coord at;
         bool found = false;
         for (auto value = leaf->cbeginValueOn(); value; ++value)
-            if (std::abs(*value) < least) {
-                least = std::abs(*value);
+            if (std::abs(*value) < minimum) {
+                minimum = std::abs(*value);
                 at = value.getCoord();
                 found = true;
             }
@@ -85,10 +85,10 @@ private:
         const detail::KdTree tree(marks_);
         const auto beyond = std::count_if(places.begin(), places.end(),
                                           [&](const Vec3& place) { return tree.nearest(place) > far * far; });
-        const double share = double(beyond) / double(std::max<std::size_t>(1, places.size()));
-        report_.surface_beyond_marks = share;
-        if (share > kDoubts.far_share)
-            warn(number(std::round(100 * share)) + " % of the surface lie farther than " + number(far) +
+        const double fraction = double(beyond) / double(std::max<std::size_t>(1, places.size()));
+        report_.surface_beyond_marks = fraction;
+        if (fraction > kDoubts.far_fraction)
+            warn(number(std::round(100 * fraction)) + " % of the surface lie farther than " + number(far) +
                  ", half of what the marks measure across, from every mark: it goes on where nothing is marked; mark "
                  "more there, or give a place outside the body (`outside`)");
     }
@@ -146,28 +146,28 @@ private:
         const detail::ImageSupport support =
             detail::measure_support(*problem_.image, at.places, at.normals, h_, problem_.run);
         if (support.places == 0) return;
-        report_.image_support = support.share;
+        report_.image_support = support.fraction;
         const GuidanceReport& guidance = solution_.guidance;
         const EdgeFeature feature = guidance.used ? guidance.feature.feature : solution_.edges.options.feature;
         const detail::StrongestBorder border = detail::find_strongest_border(
             *problem_.image, at.places, at.normals, h_,
             is_line(feature) ? detail::BorderKind::Line : detail::BorderKind::Slope, problem_.run);
-        report_.image_border = {border.at, border.share, border.errors};
+        report_.image_border = {border.at, border.fraction, border.errors};
         const char* const look = ": look whether the marks belong to this image, channel and space";
-        if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
+        if (support.fraction + kDoubts.support_errors * support.error < kDoubts.image_support)
             warn("the image varies more five voxels beside the marks than where they lie (in " +
-                 number(std::round(100 * (1 - support.share))) + " of 100 pairs)" + look);
-        else if (guidance.used && guidance.gain < kDoubts.least_gain && support.share < kDoubts.clear_support)
+                 number(std::round(100 * (1 - support.fraction))) + " of 100 pairs)" + look);
+        else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
             warn("what the image shows at some marks hardly foretells where the others lie (gain " +
                  number(guidance.gain) + " nats a mark)" + look);
-        else if (border.share < kDoubts.border_share && border.errors > kDoubts.border_errors)
+        else if (border.fraction < kDoubts.border_fraction && border.errors > kDoubts.border_errors)
             warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
                  (border.at < 0 ? "inside" : "outside") + " the marks, all along (where they lie it has " +
-                 number(std::round(100 * border.share)) + " % of that)" + look + ", and are of its size");
+                 number(std::round(100 * border.fraction)) + " % of that)" + look + ", and are of its size");
     }
 
     void find_silent_image() {
-        if (solution_.was_asked && !solution_.guidance.used && !solution_.start.inference.used)
+        if (solution_.was_requested && !solution_.guidance.used && !solution_.start.inference.used)
             warn("the image had no say between the marks: " + solution_.guidance.reason);
     }
 
@@ -186,7 +186,7 @@ private:
 
     void find_doubtful_body() {
         const auto& expected = solution_.start.inference.expected;
-        if (!expected || expected->value >= kDoubts.least_expected_dice) return;
+        if (!expected || expected->value >= kDoubts.min_expected_dice) return;
         const auto percent = [](double value) { return number(std::round(100 * value) / 100); };
         warn(
             "the body is likely not found well: by marks that were left out, its Dice coefficient with the truth is "
@@ -219,8 +219,8 @@ private:
     void find_holes() {
         const HolesReport& holes = surface_.holes;
         // What ends where the points end is right; the choice of it is told where it is made.
-        if (surface_.share_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
-        warn(number(std::round(1000 * surface_.share_without_points) / 10) + " % of the surface lie farther than " +
+        if (surface_.fraction_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
+        warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface lie farther than " +
              number(holes.distance) + " from every point: " +
              (holes.policy == Holes::Flat ? "there flat patches close it" : "there curvature alone closes it"));
     }
@@ -234,7 +234,7 @@ private:
     Remarks& remarks_;
 };
 
-Start resolved_start(StartMethod method, const Start& asked) {
+Start resolved_start(StartMethod method, const Start& requested) {
     switch (method) {
         case StartMethod::Guess: return GuessStart{};
         case StartMethod::Cloud: return CloudStart{};
@@ -243,7 +243,7 @@ Start resolved_start(StartMethod method, const Start& asked) {
         case StartMethod::Seeds:
         case StartMethod::Named: break;
     }
-    return asked;
+    return requested;
 }
 
 }  // namespace
@@ -286,7 +286,7 @@ SegmentReport measure(const Problem& problem, const Choices& choices, const Step
     report.surface = surface.measures;
     report.mesh = surface.mesh_report;
     report.correction = start.correction_report;
-    report.share_without_points = surface.share_without_points;
+    report.fraction_without_points = surface.fraction_without_points;
     report.holes = surface.holes;
     report.resolved = resolved_options(problem, choices, solution);
     {

@@ -13,9 +13,9 @@ namespace covol::pipeline {
 namespace {
 
 bool is_large(const Domain& d) {
-    int least = d.max[0] - d.min[0];
-    for (int a = 1; a < 3; ++a) least = std::min(least, d.max[a] - d.min[a]);
-    return least >= kCoarse.least_coarsened;
+    int minimum = d.max[0] - d.min[0];
+    for (int a = 1; a < 3; ++a) minimum = std::min(minimum, d.max[a] - d.min[a]);
+    return minimum >= kCoarse.min_coarsened;
 }
 
 /// Automatic where the way to the surface may be long: tagging and a result of another run end beside it.
@@ -33,7 +33,7 @@ EvolveOptions coarsened(EvolveOptions flow, double h) {
     else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // else it grows by itself
         flow.tau = kCoarse.coarse_tau * h;
     if (const double range = flow.attraction_range.value_or(0); range > 0)
-        flow.attraction_range = std::max(range, kCoarse.least_coarse_attraction * h);
+        flow.attraction_range = std::max(range, kCoarse.min_coarse_attraction * h);
     return flow;
 }
 
@@ -46,7 +46,7 @@ void step_back(FloatGrid& u, const FloatGrid& start, double h) {
 }
 
 EdgeOptions coarsened(EdgeOptions edge, double h) {
-    edge.sigma = std::max(edge.sigma.value_or(0), kCoarse.least_coarse_sigma * h);
+    edge.sigma = std::max(edge.sigma.value_or(0), kCoarse.min_coarse_sigma * h);
     return edge;
 }
 

@@ -66,8 +66,8 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
 
 /// How far beside the marks a side is that is still inside: across a thin body the other wall would be taken for it.
 double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
-                    double reach, double least) {
-    for (; reach > least; reach *= 0.75) {
+                    double reach, double minimum) {
+    for (; reach > minimum; reach *= 0.75) {
         std::size_t inside = 0;
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
@@ -76,7 +76,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         }
         if (2 * inside > places.size()) return reach;
     }
-    return least;
+    return minimum;
 }
 
 }  // namespace

@@ -77,7 +77,7 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
 }
 
 /// A surface through the marks, moved to where the image shows, between them, what it shows at them.
-FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const FloatGridPtr& u, Solution& solution) {
+FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const FloatGridPtr& u, Solution& solution) {
     if (!uses_image(start.flow) || start.origin == StartOrigin::Corrected || start.origin == StartOrigin::Settled)
         return u;
     const std::vector<Vec3>& marks = start.origin == StartOrigin::Guess ? start.on_surface : start.marks.trusted;
@@ -89,7 +89,7 @@ FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const Fl
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     options.error_slope = start.inference.error_slope;
     if (start.inference.used) options.range = kFlow.inferred_range * start.domain.voxel_size;
-    solution.was_asked = true;
+    solution.was_requested = true;
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
     // Between contours the start may be far off: where the image errs less, its result is a better one to ask from.
     const int passes = start.origin == StartOrigin::Contours ? kFlow.contour_passes : 1;
@@ -159,7 +159,7 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
         return solution;
     }
     const Timed timed(solution.report.seconds.solve);
-    solution.u = ask_image(problem, solution.start, solution.u, solution);
+    solution.u = query_image(problem, solution.start, solution.u, solution);
     solution.solve = report_of_rest(*solution.u);
     return solution;
 }
@@ -167,7 +167,7 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
 bool has_lost(const Solution& solution, const FloatGrid& start) {
     if (solution.has_vanished()) return true;
     if (solution.start.origin == StartOrigin::Grown)
-        return inside_volume(*solution.u) < kFlow.least_of_grown * inside_volume(start);
+        return inside_volume(*solution.u) < kFlow.min_of_grown * inside_volume(start);
     const std::vector<Vec3>& trusted = solution.start.marks.trusted;
     return mean_distance(trusted, *solution.u) > mean_distance(trusted, start) + kFlow.leaves_voxels * solution.h();
 }

@@ -14,7 +14,7 @@ struct Solution {
     Edges edges;
     EvolveReport solve;
     GuidanceReport guidance;
-    bool was_asked = false;                          ///< the image, by guide()
+    bool was_requested = false;                      ///< the image, by guide()
     std::vector<SegmentReport::CoarseLevel> coarse;  ///< the coarsest first
     int coarse_levels = 0;
     StepReport report;

@@ -101,7 +101,7 @@ Solution guess_instead(const Problem& problem, const Choices& choices, Solution 
     guess->facts.report = report;
     solution.report.remarks.warn(
         std::string("the surface ") +
-            (vanished ? "vanished" : "left more than " + number(100 * kDoubts.missed_share) + " % of the marks") +
+            (vanished ? "vanished" : "left more than " + number(100 * kDoubts.missed_fraction) + " % of the marks") +
             ": this is the one through the marks that bends least instead",
         problem.run);
     Solution guessed = flow(problem, std::move(*guess), solution.edges.options, reached);

@@ -21,7 +21,7 @@ FloatGridPtr raised(const FloatGrid& start, double depth) {
     return obstacle;
 }
 
-void tell_of_hints(const HintsReport& hints, Remarks& remarks, const RunContext& run) {
+void report_hints(const HintsReport& hints, Remarks& remarks, const RunContext& run) {
     if (hints.normals + hints.sensors == 0) return;
     const bool normals = hints.normals > 0 && !hints.from_sensor;
     if (!hints.used)
@@ -38,7 +38,7 @@ void tell_of_hints(const HintsReport& hints, Remarks& remarks, const RunContext&
                      run);
 }
 
-void tell_of_cloud(const CloudReport& report, std::size_t points, Remarks& remarks, const RunContext& run) {
+void report_cloud(const CloudReport& report, std::size_t points, Remarks& remarks, const RunContext& run) {
     const std::string how = report.fills      ? "; they fill a solid: it ends where their density is half of its median"
                             : report.encloses ? "; averaged within " + number(report.radius)
                                               : "; they enclose nothing: inside is what they hide";
@@ -51,7 +51,7 @@ void tell_of_cloud(const CloudReport& report, std::size_t points, Remarks& remar
             "the points fill a solid, they do not lie on a surface: the surface is where their density falls "
             "to half of its median; if they do lie on one, there are too few of them for their noise",
             run);
-    tell_of_hints(report.hints, remarks, run);
+    report_hints(report.hints, remarks, run);
     if (report.stray > 0)
         remarks.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out",
                        run);
@@ -76,7 +76,7 @@ void tell_of_cloud(const CloudReport& report, std::size_t points, Remarks& remar
 
 Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<Vec3>& points) {
     return problem.domain(h, points,
-                          kStarts.margin_share * longest_side(bounding_box(points)) + kJob.margin_voxels * h);
+                          kStarts.margin_fraction * longest_side(bounding_box(points)) + kJob.margin_voxels * h);
 }
 
 StartSurface start_from_cloud(const Problem& problem, const Choices& choices, MarkSets marks) {
@@ -105,7 +105,7 @@ StartSurface start_from_cloud(const Problem& problem, const Choices& choices, Ma
         if (!report.encloses) start.obstacle = raised(*start.u, kFlow.hold_depth * choices.h);
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
     }
-    tell_of_cloud(report, facts.marks.attracting.size(), remarks, run);
+    report_cloud(report, facts.marks.attracting.size(), remarks, run);
     return start;
 }
 

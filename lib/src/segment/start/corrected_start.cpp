@@ -14,13 +14,13 @@ namespace {
 
 CorrectionOptions correction_options(const Problem& problem, double h) {
     CorrectionOptions options = problem.options.correction;
-    if (options.least_radius) return options;
-    double least = kCorrectionVoxels * h;
+    if (options.min_radius) return options;
+    double minimum = kCorrectionVoxels * h;
     if (problem.image != nullptr) {
         const Vec3& spacing = problem.image->geometry().spacing;
-        least = std::max(least, kStarts.radius_spacings * *std::max_element(spacing.begin(), spacing.end()));
+        minimum = std::max(minimum, kStarts.radius_spacings * *std::max_element(spacing.begin(), spacing.end()));
     }
-    options.least_radius = least;
+    options.min_radius = minimum;
     return options;
 }
 
@@ -78,7 +78,7 @@ StartSurface start_from_corrected_guess(const Problem& problem, const Choices& c
         correct(problem, problem.options.contours ? facts.marks.trusted : facts.marks.attracting, start));
     const CorrectionReport& report = facts.correction_report;
     facts.report.remarks.choose("start", "guess",
-                                "corrected within " + number(report.least_radius) + " to " +
+                                "corrected within " + number(report.min_radius) + " to " +
                                     number(report.largest_radius) + " of " + std::to_string(report.marks) +
                                     " marks and " + std::to_string(report.seeds) +
                                     " seeds that it had on the wrong side; " + distances(report),

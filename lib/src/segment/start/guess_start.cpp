@@ -32,16 +32,17 @@ std::array<Vec3, 3> deviation(const Problem& problem, double h) {
 }
 
 GuessOptions guess_options(const Problem& problem, double h, const std::vector<Vec3>& marks) {
-    const SegmentOptions& asked = problem.options;
+    const SegmentOptions& requested = problem.options;
     GuessOptions options;
     options.deviation = deviation(problem, h);
-    if (problem.image == nullptr && !asked.mark_precision)
-        options.most_deviation = measure_cloud_scale(marks, problem.run).noise;
-    options.inside = asked.inside;
-    options.outside = asked.outside;
-    options.outside.insert(options.outside.end(), asked.exterior_seeds.begin(), asked.exterior_seeds.end());
+    if (problem.image == nullptr && !requested.mark_precision)
+        options.max_deviation = measure_cloud_scale(marks, problem.run).noise;
+    options.inside = requested.inside;
+    options.outside = requested.outside;
+    options.outside.insert(options.outside.end(), requested.exterior_seeds.begin(), requested.exterior_seeds.end());
     // Those of a file may point inwards, or anywhere.
-    if (asked.hints.is_outward && asked.hints.normals.size() == marks.size()) options.normals = asked.hints.normals;
+    if (requested.hints.is_outward && requested.hints.normals.size() == marks.size())
+        options.normals = requested.hints.normals;
     return options;
 }
 

@@ -88,7 +88,7 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
         return start;
     }
     if (uses_points(facts.flow) && problem.is_guided() && !is_rough &&
-        facts.marks.trusted.size() <= kAutomatic.most_guess_marks &&
+        facts.marks.trusted.size() <= kAutomatic.max_guess_marks &&
         (is_settled || !misses_marks(problem, facts, *start.u))) {
         correct_start(problem, start);
         facts.on_surface = facts.marks.trusted;

@@ -41,18 +41,18 @@ struct Case {
 
 TEST_CASE("Consistency: normals of a solid's border are the most consistent ones, whatever is turned as a whole") {
     for (const double noise : {0.0, 0.4}) {
-        const auto least_off = [&](const test::Solid3& shape, auto where) {
+        const auto min_off = [&](const test::Solid3& shape, auto where) {
             Case c(shape, noise);
             std::vector<Vec3> normals = c.sample.normals, others = turned(c.sample, where);
             const double right = mean(c.consistency.off(normals)), wrong = mean(c.consistency.off(others));
             INFO("right " << right << ", wrong " << wrong << ", noise " << noise);
             CHECK(right < 0.8 * wrong);
         };
-        least_off(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });            // a part
-        least_off(test::shell(1, 0.6), [](const Vec3& p) { return test::norm(p) < 0.8; });    // a cavity's wall
-        least_off(test::block({0.8, 0.5, 0.06}), [](const Vec3& p) { return p[2] > 0; });     // both to one side
-        least_off(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });  // legs
-        least_off(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });            // all
+        min_off(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });            // a part
+        min_off(test::shell(1, 0.6), [](const Vec3& p) { return test::norm(p) < 0.8; });    // a cavity's wall
+        min_off(test::block({0.8, 0.5, 0.06}), [](const Vec3& p) { return p[2] > 0; });     // both to one side
+        min_off(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });  // legs
+        min_off(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });            // all
     }
 }
 

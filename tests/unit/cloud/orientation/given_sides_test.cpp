@@ -22,10 +22,10 @@ test::SurfaceSample noisy(const test::Solid3& shape, std::size_t count, double s
     return s;
 }
 
-std::vector<Vec3> flipped(std::vector<Vec3> normals, double share, unsigned seed) {
+std::vector<Vec3> flipped(std::vector<Vec3> normals, double fraction, unsigned seed) {
     std::mt19937 random(seed);
     for (Vec3& n : normals)
-        if (random() < share * 4294967296.0) n = test::scaled(-1, n);
+        if (random() < fraction * 4294967296.0) n = test::scaled(-1, n);
     return normals;
 }
 
@@ -37,7 +37,7 @@ std::vector<Vec3> garbage(std::size_t count, unsigned seed) {
     return all;
 }
 
-double share_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
+double fraction_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
     std::size_t wrong = 0;
     for (std::size_t n = 0; n < truth.size(); ++n) wrong += !(test::dot(found[n], truth[n]) > 0);
     return double(wrong) / double(truth.size());
@@ -66,12 +66,12 @@ TEST_CASE("good normals orient, flipped ones are mended, those that all point in
             CHECK(good.hints.normals == s.points.size());
             CHECK(good.hints.agree > 0.99);
             CHECK_FALSE(good.hints.inward);
-            CHECK(share_wrong(good.orientation.normals, s.normals) < 0.005);
+            CHECK(fraction_wrong(good.orientation.normals, s.normals) < 0.005);
 
             const CloudOrientation mended = with_normals(s.points, flipped(s.normals, 0.2, seed));
             CHECK(mended.hints.used);
             CHECK(mended.hints.agree == Approx(0.8).margin(0.03));
-            CHECK(share_wrong(mended.orientation.normals, s.normals) < 0.01);
+            CHECK(fraction_wrong(mended.orientation.normals, s.normals) < 0.01);
 
             const CloudOrientation inward = with_normals(s.points, flipped(s.normals, 1, seed));
             CHECK(inward.hints.used);
@@ -113,7 +113,7 @@ TEST_CASE("a part that is turned as a whole is found by what the points say them
         REQUIRE(double(turned) > 0.05 * double(normals.size()));
         const CloudOrientation cloud = with_normals(s.points, normals);
         CHECK_FALSE(cloud.hints.used);
-        CHECK(share_wrong(cloud.orientation.normals, s.normals) < 0.01);
+        CHECK(fraction_wrong(cloud.orientation.normals, s.normals) < 0.01);
         CHECK(cloud.hints.foreseen > 0.9);  // each half alone finds nothing
     }
 }
@@ -125,7 +125,7 @@ TEST_CASE("a point without a normal takes the side of those around it") {
     const CloudOrientation cloud = with_normals(s.points, normals);
     CHECK(cloud.hints.used);
     CHECK(cloud.hints.normals < s.points.size());
-    CHECK(share_wrong(cloud.orientation.normals, s.normals) < 0.001);
+    CHECK(fraction_wrong(cloud.orientation.normals, s.normals) < 0.001);
 }
 
 TEST_CASE("a sensor orients what it saw, and is not believed where it could not have seen the points") {
@@ -141,11 +141,11 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
     CHECK(cloud.hints.used);
     CHECK(cloud.hints.from_sensor);
     CHECK(cloud.hints.sensors == seen.points.size());
-    CHECK(share_wrong(cloud.orientation.normals, seen.normals) < 0.002);
+    CHECK(fraction_wrong(cloud.orientation.normals, seen.normals) < 0.002);
     // Half of the whole ball is hidden from anywhere.
     const CloudOrientation whole = orient_cloud(s.points, PointHints{{}, towards(sensor, s.points)});
     CHECK_FALSE(whole.hints.used);
-    CHECK(share_wrong(whole.orientation.normals, s.normals) < 0.001);
+    CHECK(fraction_wrong(whole.orientation.normals, s.normals) < 0.001);
 }
 
 TEST_CASE("walls that touch and bodies that cross: points within the solid are left out") {

@@ -60,10 +60,10 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
         CHECK(m.volume < 2.0 / 3 * kPi * 1.4);
         CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
         // A flat lid would be a third of the area; its rim is near the points.
-        const double share = measure_share_without_points(mesh, cloud.points, 0.15);
-        CHECK(share > 0.15);
-        CHECK(share < 0.45);
-        CHECK(measure_share_without_points(mesh, cloud.points, 3.0) == 0);
+        const double fraction = measure_fraction_without_points(mesh, cloud.points, 0.15);
+        CHECK(fraction > 0.15);
+        CHECK(fraction < 0.45);
+        CHECK(measure_fraction_without_points(mesh, cloud.points, 3.0) == 0);
     }
 }
 
@@ -84,7 +84,7 @@ TEST_CASE("segment: a bowl is closed by a lid, on the points elsewhere") {
     CHECK(result.report.surface.genus == 0);
     CHECK(result.report.surface.components == 1);
     CHECK(result.report.fit.mean < 0.5 * 0.04);
-    CHECK(result.report.share_without_points > 0.1);
+    CHECK(result.report.fraction_without_points > 0.1);
 }
 
 TEST_CASE("segment: a noisy torus of which each part was seen from one side has genus 1") {

@@ -24,7 +24,7 @@ RunContext on_threads(int n) {
 }
 
 /// Share of the normals that point to the wrong side.
-double share_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
+double fraction_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
     std::size_t wrong = 0;
     for (std::size_t n = 0; n < truth.size(); ++n) wrong += !(test::dot(found[n], truth[n]) > 0);
     return double(wrong) / double(truth.size());
@@ -107,10 +107,10 @@ TEST_CASE("orient: the normals of closed shapes point outward, into cavities too
             for (const double a : o.areas) area += a;
             for (const Vec3& n : o.normals) off_unit = std::max(off_unit, std::abs(test::norm(n) - 1));
             INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": wrong "
-                            << share_wrong(o.normals, s.normals) << ", mean cosine "
+                            << fraction_wrong(o.normals, s.normals) << ", mean cosine "
                             << mean_cosine(o.normals, s.normals) << ", turned " << o.turned << ", area "
                             << area / s.area);
-            CHECK(share_wrong(o.normals, s.normals) < (spacings > 0 ? 0.007 : 0.001));
+            CHECK(fraction_wrong(o.normals, s.normals) < (spacings > 0 ? 0.007 : 0.001));
             CHECK(mean_cosine(o.normals, s.normals) > (spacings > 0 ? 0.91 : 0.95));
             CHECK(o.turned < 0.004);
             CHECK(area / s.area == Approx(1).margin(0.2));
@@ -176,7 +176,7 @@ TEST_CASE("orient: points given several times") {
     normals.insert(normals.end(), s.normals.begin(), s.normals.end());
     const CloudScale scale = measure_cloud_scale(s.points);
     const Orientation o = orient(doubled, scale);
-    CHECK(share_wrong(o.normals, normals) < 0.007);
+    CHECK(fraction_wrong(o.normals, normals) < 0.007);
     for (std::size_t n = 0; n < s.points.size(); ++n) REQUIRE(o.normals[n] == o.normals[n + s.points.size()]);
     // A cloud's duplicates are left out.
     const CloudOrientation once = orient_cloud(s.points), twice = orient_cloud(doubled);
@@ -218,7 +218,7 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
                 normals.push_back(cloud.orientation.normals[m++]);
                 truth.push_back(s.normals[n]);
             }
-            CHECK(share_wrong(normals, truth) < 0.01);
+            CHECK(fraction_wrong(normals, truth) < 0.01);
         }
     }
 }

@@ -35,9 +35,9 @@ Charged sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
 using Stack = std::shared_ptr<const GridStack>;
 
 /// All points on the finest grid, about `cells` of it along the longest side, the part beyond the points included.
-Stack grids(const std::vector<Vec3>& points, int cells, double share = 0.2) {
+Stack grids(const std::vector<Vec3>& points, int cells, double fraction = 0.2) {
     return std::make_shared<const GridStack>(points, std::vector<std::uint8_t>{},
-                                             longest_side(bounding_box(points)) * (1 + 2 * share) / cells, share);
+                                             longest_side(bounding_box(points)) * (1 + 2 * fraction) / cells, fraction);
 }
 
 double largest_difference(const StackField& a, const StackField& b) {
@@ -216,9 +216,9 @@ TEST_CASE("a few points far away make few blocks, and leave the indicator as it 
     }
     std::vector<double> areas(s.points.size(), 4 * M_PI / 40000);
     areas.resize(with.points.size(), 1e9);
-    const auto told = indicator_grid(with.points, areas, cell);
-    CHECK(told->block_count() < 1.2 * double(alone->block_count()));
-    WindingField field(told);
+    const auto with_areas = indicator_grid(with.points, areas, cell);
+    CHECK(with_areas->block_count() < 1.2 * double(alone->block_count()));
+    WindingField field(with_areas);
     field.solve(with.points, with.vectors, 20);
     CHECK(field.indicator().value_at({0, 0, 0}) == Approx(1).margin(0.02));
     CHECK(std::abs(field.indicator().value_at({1.5, 0, 0})) < 0.02);
@@ -252,21 +252,21 @@ TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rise
         field.solve(s.points, s.vectors, 12);
         const StackField& chi = field.indicator();
         const double cell = stack->cell();
-        double worst_in = 0, worst_out = 0, worst_on = 0, least_cosine = 1;
+        double worst_in = 0, worst_out = 0, worst_on = 0, min_cosine = 1;
         for (const Vec3& direction : test::sphere_cloud(400, 1, 7)) {
             const auto at = [&](double r) { return chi.at(test::sum(center, test::scaled(r, direction))); };
             worst_in = std::max({worst_in, std::abs(at(0).value - 1), std::abs(at(1 - 3 * cell).value - 1)});
             worst_out = std::max(worst_out, std::abs(at(1 + 3 * cell).value));
             worst_on = std::max(worst_on, std::abs(at(1).value - 0.5));
             const Vec3 g = at(1).gradient;
-            least_cosine = std::min(least_cosine, -test::dot(g, direction) / test::norm(g));
+            min_cosine = std::min(min_cosine, -test::dot(g, direction) / test::norm(g));
         }
         INFO(cells << " cells: in " << worst_in << " out " << worst_out << " on " << worst_on << " cosine "
-                   << least_cosine);
+                   << min_cosine);
         CHECK(worst_in < 0.02);
         CHECK(worst_out < 0.02);
         CHECK(worst_on < 0.06);
-        CHECK(least_cosine > 0.99);
+        CHECK(min_cosine > 0.99);
     }
 }
 

@@ -149,7 +149,7 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
                 at.setValue({i, j, k}, float(std::clamp(box({double(i), double(j), double(k)}), -3.0, 3.0)));
     TriangleMesh mesh = extract_mesh(*extract_surface(*grid));
     const auto off_corners = [&] {  // of the corners, to the nearest vertex
-        double most = 0;
+        double maximum = 0;
         for (int n = 0; n < 8; ++n) {
             Vec3 corner{0, 0, 0};
             for (std::size_t a = 0; a < 3; ++a)
@@ -157,9 +157,9 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
             double nearest = 1e9;
             for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
                 nearest = std::min(nearest, length(minus(mesh.place(v), corner)));
-            most = std::max(most, nearest);
+            maximum = std::max(maximum, nearest);
         }
-        return most;
+        return maximum;
     };
     CHECK(off_corners() > 0.1);
     std::vector<Quadric> quadrics;

@@ -96,10 +96,10 @@ TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is n
             level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18 || bar(i, j, k)); });
         const FloatGridPtr rough =
             level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18); });
-        std::size_t least = 0;
+        std::size_t minimum = 0;
         for (int j = 0; j < kSide; ++j)
-            for (int k = 0; k < kSide; ++k) least += bar(narrow, j, k);
-        CHECK(cloud::hold_topology(*rough, *target, {}) == least);
+            for (int k = 0; k < kSide; ++k) minimum += bar(narrow, j, k);
+        CHECK(cloud::hold_topology(*rough, *target, {}) == minimum);
         CHECK(measure(extract_mesh(*target)).components == 2);
     }
 }

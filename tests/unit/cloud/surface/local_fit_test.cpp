@@ -37,7 +37,7 @@ double median(std::vector<double> v) {
 
 /// How quadrics at a sample of a shape's points, moved by noise, fit the shape.
 struct Found {
-    double share = 0;                             // of the nodes that have a quadric
+    double fraction = 0;                          // of the nodes that have a quadric
     double off = 0;                               // root mean square of the feet's distance to the shape
     double noise = 0, radius = 0, curvature = 0;  // medians
     double off_beside = 0;  // root mean square error of distance() half a radius beside and above the foot
@@ -62,7 +62,7 @@ Found fit_shape(const test::Solid3& shape, std::size_t count, double spacings, u
         beside += std::pow(q.distance(x) - shape.distance(x), 2);
     }
     const double fitted = double(radius.size());
-    found.share = fitted / (double(count) / 10);
+    found.fraction = fitted / (double(count) / 10);
     found.off = std::sqrt(squares / fitted);
     found.off_beside = std::sqrt(beside / fitted);
     found.noise = median(noise);
@@ -86,9 +86,9 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
                      << ", seed " << seed << ", noise of " << spacings << " spacings: off " << f.off / spacing
                      << " spacings, beside " << f.off_beside / spacing << ", radius " << f.radius / spacing
                      << ", curvature " << f.curvature / curvature);
-                CHECK(f.share > 0.99);
-                const double most = spacings > 0 ? 0.5 * spacings : 0.001;
-                CHECK(f.off < most * spacing);
+                CHECK(f.fraction > 0.99);
+                const double maximum = spacings > 0 ? 0.5 * spacings : 0.001;
+                CHECK(f.off < maximum * spacing);
                 CHECK(f.off_beside < (spacings > 0 ? 0.6 * spacings : 0.003) * spacing);
                 CHECK(f.curvature / curvature == Approx(1).margin(spacings > 0 ? 0.4 : 0.02));
                 // As wide as the noise asks for.
@@ -136,7 +136,7 @@ TEST_CASE("an exact paraboloid is found as it is") {
     const Quadric q = fit_quadrics(node, cloud, spacing, {}).front();
     REQUIRE(q.radius > 0);
     CHECK(test::dot(q.axes[2], {0, 0, 1}) > 0.999);
-    CHECK(q.radius >= q.least_radius);
+    CHECK(q.radius >= q.min_radius);
     double worst = 0;
     for (const Vec3& p : test::box_cloud(100, {{-0.05, -0.05, 0}, {0.05, 0.05, 0}}, 5))
         worst = std::max(worst, std::abs(q.distance({p[0], p[1], height(p[0], p[1])})));
@@ -181,7 +181,7 @@ TEST_CASE("two sheets back to back do not mix") {
 }
 
 TEST_CASE("no quadric through the sheets of two folds that the indicator tells apart") {
-    for (const bool told : {true, false}) {
+    for (const bool known : {true, false}) {
         const std::size_t each = 3000;
         const double spacing = std::sqrt(4.0 / each);
         OrientedCloud cloud;
@@ -190,13 +190,13 @@ TEST_CASE("no quadric through the sheets of two folds that the indicator tells a
             cloud.points.push_back({p[0], p[1], (cloud.size() % 2 ? 0.5 : -0.5) * spacing});
             cloud.normals.push_back({0, 0, 1});
             cloud.counts.push_back(1);
-            if (told) cloud.squares_off.push_back(float(0.01 * spacing * spacing));
+            if (known) cloud.squares_off.push_back(float(0.01 * spacing * spacing));
         }
         const std::vector<Quadric> quadrics = fit_quadrics(cloud, cloud, spacing, {});
         const auto fitted =
             std::count_if(quadrics.begin(), quadrics.end(), [](const Quadric& q) { return q.radius > 0; });
         INFO(fitted << " of " << quadrics.size());
-        CHECK((told ? double(fitted) < 0.01 * double(each) : double(fitted) > 0.9 * double(each)));
+        CHECK((known ? double(fitted) < 0.01 * double(each) : double(fitted) > 0.9 * double(each)));
     }
 }
 
@@ -344,7 +344,7 @@ TEST_CASE("points far from all others make no quadrics beside those of a sheet")
     std::size_t bare = 0;
     double widest = 0;
     for (const Quadric& q : quadrics_over(cloud, cloud, spacing, spacing, 0, bare, {}))
-        widest = std::max(widest, q.least_radius);
+        widest = std::max(widest, q.min_radius);
     INFO("widest " << widest << " spacing " << spacing);
     CHECK(widest < 6 * spacing);
 }

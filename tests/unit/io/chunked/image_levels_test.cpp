@@ -64,9 +64,9 @@ struct Pyramid {
                                              {geometry_of({20, 12, 18}, {1, 1, 1}), half},
                                              {geometry_of({10, 6, 18}, {2, 2, 1}), quarter}};
 
-    [[nodiscard]] ImageLevels open(std::uint64_t most_bytes = 1 << 20) const {
+    [[nodiscard]] ImageLevels open(std::uint64_t max_bytes = 1 << 20) const {
         const std::vector<float> nothing(detail::voxel_count(size));
-        return {Image::from_values(sources.front().geometry, nothing.data()), sources, most_bytes};
+        return {Image::from_values(sources.front().geometry, nothing.data()), sources, max_bytes};
     }
 };
 
@@ -236,7 +236,7 @@ TEST_CASE("An image that is held is shown as it is") {
     for (std::size_t n = 0; n < values.size(); ++n) values[n] = float(n);
     const ImageLevels levels(Image::from_values(geometry, values.data()));
     CHECK_FALSE(levels.is_in_chunks());
-    CHECK(levels.cache().most_bytes == 0);
+    CHECK(levels.cache().max_bytes == 0);
     CHECK(levels.range() == std::array<double, 2>{0, 23});
     const std::vector<int> coded = unpacked(make_page_slice(levels, {2, 1, 2, {}}, {0, 65535}));
     CHECK(coded == std::vector<int>{15, 17, 21, 23});  // means of 2 x 2, and of what is left

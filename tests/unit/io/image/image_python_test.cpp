@@ -80,18 +80,18 @@ TEST_CASE("NumPy's arrays in both orders, of several types") {
 
 TEST_CASE("NumPy's arrays that are none, or no volumes") {
     const Scratch scratch;
-    const auto says = [&](const std::string& bytes, const std::string& part) {
+    const auto is_refused = [&](const std::string& bytes, const std::string& part) {
         CHECK_THAT(message_of([&] { (void)read_image(scratch.write("a.npy", bytes)); }), Catch::Contains(part));
     };
     const std::string good = npy<std::uint16_t>("<u2", "False", "(2, 3, 4)", 24);
-    says("this is no array", "expected NumPy's mark");
-    says(good.substr(0, 60), "a header of 118 bytes");
-    says(good.substr(0, good.size() - 1), "a.npy");
-    says(npy<std::uint16_t>("<u2", "None", "(2, 3, 4)", 24), "expected descr, fortran_order and shape");
-    says(npy<double>("<c8", "False", "(2, 3, 4)", 24), "got values of the type '<c8'");
-    says(npy<std::uint16_t>("<u2", "False", "(6, 4)", 24), "expected an array of three axes");
-    says(npy<std::uint16_t>("<u2", "False", "(2, x, 4)", 24), "expected sizes in its shape");
-    says(npy<std::uint16_t>("<u2", "False", "(0, 3, 4)", 0), "expected a 3D image");
+    is_refused("this is no array", "expected NumPy's mark");
+    is_refused(good.substr(0, 60), "a header of 118 bytes");
+    is_refused(good.substr(0, good.size() - 1), "a.npy");
+    is_refused(npy<std::uint16_t>("<u2", "None", "(2, 3, 4)", 24), "expected descr, fortran_order and shape");
+    is_refused(npy<double>("<c8", "False", "(2, 3, 4)", 24), "got values of the type '<c8'");
+    is_refused(npy<std::uint16_t>("<u2", "False", "(6, 4)", 24), "expected an array of three axes");
+    is_refused(npy<std::uint16_t>("<u2", "False", "(2, x, 4)", 24), "expected sizes in its shape");
+    is_refused(npy<std::uint16_t>("<u2", "False", "(0, 3, 4)", 0), "expected a 3D image");
 }
 
 TEST_CASE("tifffile's description: axes, spacing, and what does not fit the pages") {

@@ -279,9 +279,9 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     CHECK(g.unit == "um");
     CHECK(g.spacing_known);
     // what the user says wins
-    ReadImageOptions said;
-    said.spacing = Vec3{0.4, 0.5, 3};
-    CHECK(read_image_geometry(path, said).spacing == said.spacing);
+    ReadImageOptions stated;
+    stated.spacing = Vec3{0.4, 0.5, 3};
+    CHECK(read_image_geometry(path, stated).spacing == stated.spacing);
 }
 
 TEST_CASE("one channel and frame of a hyperstack is chosen") {
@@ -348,47 +348,48 @@ TEST_CASE("ImageJ's way with huge stacks: one directory, the slices behind each 
 
 TEST_CASE("unusable images end in one line that says why") {
     const Scratch scratch;
-    const auto says = [](const std::string& message, const std::string& part) {
+    const auto contains = [](const std::string& message, const std::string& part) {
         INFO(message);
         CHECK(message.find(part) != std::string::npos);
         CHECK(message.find('\n') == std::string::npos);
     };
-    says(read_error(scratch.path("none.nrrd")), "no such file");
+    contains(read_error(scratch.path("none.nrrd")), "no such file");
     for (const char* name : {"t.nrrd", "t.nii", "t.nii.gz", "t.mha", "t.mhd", "t.tif"}) {
         INFO(name);
-        says(read_error(scratch.write(name, "")), "the file is empty");
-        says(read_error(scratch.write(name, "this is just text\nnothing else\n")), name);
+        contains(read_error(scratch.write(name, "")), "the file is empty");
+        contains(read_error(scratch.write(name, "this is just text\nnothing else\n")), name);
     }
-    says(read_error(scratch.write("a.jpg", "x")), "expected a name ending in");
-    says(read_error(make_tiff<std::uint8_t>(scratch.path("rgb.tif"), {8, SAMPLEFORMAT_UINT, 3}, number)),
-         "expected one channel, got 3; choose 0 (red), 1 (green), 2 (blue) with `channel`");
+    contains(read_error(scratch.write("a.jpg", "x")), "expected a name ending in");
+    contains(read_error(make_tiff<std::uint8_t>(scratch.path("rgb.tif"), {8, SAMPLEFORMAT_UINT, 3}, number)),
+             "expected one channel, got 3; choose 0 (red), 1 (green), 2 (blue) with `channel`");
     TiffFormat one_page;
     one_page.pages = 1;
-    says(read_error(make_tiff<std::uint8_t>(scratch.path("flat.tif"), one_page, number)),
-         "expected a 3D image, got 20 x 17 x 1");
+    contains(read_error(make_tiff<std::uint8_t>(scratch.path("flat.tif"), one_page, number)),
+             "expected a 3D image, got 20 x 17 x 1");
     ImageGeometry flat;
     flat.size = {5, 4, 1};
     write_image(scratch.path("flat.nrrd"), flat, std::vector<std::uint8_t>(20).data());
-    says(read_error(scratch.path("flat.nrrd")), "expected a 3D image, got 5 x 4 x 1");
+    contains(read_error(scratch.path("flat.nrrd")), "expected a 3D image, got 5 x 4 x 1");
     const std::string header = "NRRD0004\ntype: uint8\nencoding: raw\nendian: little\n";
-    says(read_error(scratch.write("2d.nrrd", header + "dimension: 2\nsizes: 3 2\n\nabcdef")), "got 3 x 2 x 1");
-    says(read_error(scratch.write("rgb.nrrd",
-                                  header + "dimension: 4\nsizes: 3 2 2 2\nkinds: RGB-color domain domain domain\n\n" +
-                                      std::string(24, 'a'))),
-         "expected one channel, got 3");
-    says(read_error(scratch.write("4d.nrrd", header + "dimension: 4\nsizes: 2 2 2 3\n\n" + std::string(24, 'a'))),
-         "expected one frame, got 3; choose 0 to 2 with `frame`");
-    says(read_error(scratch.write("huge.nrrd", header + "dimension: 3\nsizes: 100000 100000 100000\n\nabc")),
-         "cannot hold");
-    says(read_error(scratch.write("plane.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"
-                                                         "space directions: (1,0,0) (0.5,1,0) (1,1,0.01)\n\nabcdefgh")),
-         "axes that span the space");
+    contains(read_error(scratch.write("2d.nrrd", header + "dimension: 2\nsizes: 3 2\n\nabcdef")), "got 3 x 2 x 1");
+    contains(read_error(scratch.write(
+                 "rgb.nrrd", header + "dimension: 4\nsizes: 3 2 2 2\nkinds: RGB-color domain domain domain\n\n" +
+                                 std::string(24, 'a'))),
+             "expected one channel, got 3");
+    contains(read_error(scratch.write("4d.nrrd", header + "dimension: 4\nsizes: 2 2 2 3\n\n" + std::string(24, 'a'))),
+             "expected one frame, got 3; choose 0 to 2 with `frame`");
+    contains(read_error(scratch.write("huge.nrrd", header + "dimension: 3\nsizes: 100000 100000 100000\n\nabc")),
+             "cannot hold");
+    contains(
+        read_error(scratch.write("plane.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"
+                                                        "space directions: (1,0,0) (0.5,1,0) (1,1,0.01)\n\nabcdefgh")),
+        "axes that span the space");
     const ImageGeometry g = oblique();
     std::vector<float> values = ramp<float>(g);
     values[7 * 6 * 2 + 7 * 3 + 4] = std::numeric_limits<float>::quiet_NaN();
     for (const char* name : {"nan.nrrd", "nan.tif"}) {
         write_image(scratch.path(name), g, values.data());
-        says(read_error(scratch.path(name)), "got NaN or infinity at voxel (4, 3, 2)");
+        contains(read_error(scratch.path(name)), "got NaN or infinity at voxel (4, 3, 2)");
     }
     CHECK_THROWS_AS(check_image_extension("a.png"), Error);
     CHECK_NOTHROW(check_image_extension("a.nii.gz"));

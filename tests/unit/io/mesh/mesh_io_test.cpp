@@ -404,9 +404,9 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     CHECK(bare.triangles[1] == std::array<std::uint32_t, 3>{4, 5, 6});
     CHECK(bare.vertices[4] == std::array<float, 3>{1, 0, 0});
 
-    const auto refused = [&](const std::string& what, const std::string& with, const std::string& says,
+    const auto refused = [&](const std::string& what, const std::string& with, const std::string& wanted,
                              Errc code = Errc::InvalidInput) {
-        check_refused(folder.file("c.glb", glb_of(replaced(json, what, with), binary)), says, code);
+        check_refused(folder.file("c.glb", glb_of(replaced(json, what, with), binary)), wanted, code);
     };
     refused(R"("count":4)", R"("count":5)", "beyond its data");
     refused(R"("count":4)", R"("count":18446744073709551615)", "count: expected at most");
@@ -458,9 +458,9 @@ TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "
     const Folder folder;
     TriangleMesh mesh = tetrahedron();
     mesh.origin = {500000, 5400000, -3000};
-    std::vector<std::string> said;
+    std::vector<std::string> messages;
     WriteMeshOptions options;
-    options.warn = [&](const std::string& line) { said.push_back(line); };
+    options.warn = [&](const std::string& line) { messages.push_back(line); };
     for (const char* name : {"a.ply", "a.obj", "a.off", "a.glb", "a.stl", "b.ply", "b.stl"}) {
         INFO(name);
         options.binary = name[0] == 'a';
@@ -481,8 +481,8 @@ TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "
             CHECK(nearest < 1e-4);
         }
     }
-    REQUIRE(said.size() == 1);
-    CHECK_THAT(said.front(), Catch::Contains("relative to (500000, 5400000, -3000)"));
+    REQUIRE(messages.size() == 1);
+    CHECK_THAT(messages.front(), Catch::Contains("relative to (500000, 5400000, -3000)"));
     // in another unit, y up
     options = {};
     options.y_up = true;

@@ -376,7 +376,7 @@ std::string read_error(const Scratch& scratch, const std::string& name, const st
     return message_of([&] { (void)read_points(path); });
 }
 
-void says(const std::string& message, const std::string& part) {
+void contains(const std::string& message, const std::string& part) {
     INFO(message);
     CHECK(message.find(part) != std::string::npos);
 }
@@ -434,7 +434,7 @@ TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
     CHECK(cloud.points[0][0] < cloud.points[1][0]);
     REQUIRE(cloud.lines.size() == 1);
     CHECK_FALSE(cloud.lines[0].closed);
-    says(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
+    contains(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
 }
 
 TEST_CASE("Fiji's areas, lines and points have their own lattice") {
@@ -500,10 +500,10 @@ TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its n
     CHECK(cloud.points[0][2] == 11);
     CHECK(cloud.lines[0].name == "0012-0100-0200");
     spec.name = "cell";
-    says(read_error(scratch, "a.roi", roi(spec)), "ROI 'cell' (polygon): expected a slice");
+    contains(read_error(scratch, "a.roi", roi(spec)), "ROI 'cell' (polygon): expected a slice");
     spec.position = 3;
     spec.channel = 1;  // on all slices of channel 1
-    says(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
+    contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
 }
 
 TEST_CASE("markups give lines, their own names and nothing that is not placed") {
@@ -520,16 +520,18 @@ TEST_CASE("markups give lines, their own names and nothing that is not placed") 
     CHECK(cloud.lines[0].name == "rim");
     CHECK_FALSE(cloud.lines[1].closed);
     CHECK(cloud.points == std::vector<Vec3>{{-1, -2, 3}, {-4, -5, 6}, {-7, -8, 9}, {-1, -1, 1}});
-    says(read_error(scratch, "a.json",
-                    "{\"markups\": [{\"coordinateSystem\": \"IJK\", \"controlPoints\": [{\"position\": [1,2,3]}]}]}"),
-         "expected the coordinate system RAS or LPS, got 'IJK'");
-    says(read_error(scratch, "a.json", "{\"markups\": 3}"), "found no list 'markups'");
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2]}]}]}"),
-         "expected a position of 3 numbers");
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2,1e999]}]}]}"),
-         "a.json: not the JSON");
-    says(read_error(scratch, "a.json", std::string(100000, '[')), "a.json: not the JSON");
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"type\": 5, \"controlPoints\": 7}]}"), "a.json: not the JSON");
+    contains(
+        read_error(scratch, "a.json",
+                   "{\"markups\": [{\"coordinateSystem\": \"IJK\", \"controlPoints\": [{\"position\": [1,2,3]}]}]}"),
+        "expected the coordinate system RAS or LPS, got 'IJK'");
+    contains(read_error(scratch, "a.json", "{\"markups\": 3}"), "found no list 'markups'");
+    contains(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2]}]}]}"),
+             "expected a position of 3 numbers");
+    contains(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2,1e999]}]}]}"),
+             "a.json: not the JSON");
+    contains(read_error(scratch, "a.json", std::string(100000, '[')), "a.json: not the JSON");
+    contains(read_error(scratch, "a.json", "{\"markups\": [{\"type\": 5, \"controlPoints\": 7}]}"),
+             "a.json: not the JSON");
 }
 
 TEST_CASE("scans: invalid points are left out, compressed and newer files refused in words") {
@@ -539,36 +541,36 @@ TEST_CASE("scans: invalid points are left out, compressed and newer files refuse
         const PointCloud cloud =
             read_points(scratch.write("a.pcd", pcd({{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}}, data)));
         CHECK(cloud.points == std::vector<Vec3>{{1, 2, 3}, {4, 5, 6}});
-        says(cloud.rule, "1 invalid ones left out");
+        contains(cloud.rule, "1 invalid ones left out");
     }
-    says(read_error(scratch, "a.laz", "LASF"), "LAZ is not read; unpack it");
-    says(read_error(scratch, "a.las", las({{1, 2, 3}}, 2, 0x80 | 1)), "its compressed form LAZ");
-    says(read_error(scratch, "a.las", las({{1, 2, 3}}, 5)), "expected LAS 1.0 to 1.4, got 1.5");
-    says(read_error(scratch, "a.las", las({{1, 2, 3}}, 2).substr(0, 250)),
-         "expected 1 points of 28 bytes from byte 237");
-    says(read_error(scratch, "a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"),
-         "expected a field 'z'");
+    contains(read_error(scratch, "a.laz", "LASF"), "LAZ is not read; unpack it");
+    contains(read_error(scratch, "a.las", las({{1, 2, 3}}, 2, 0x80 | 1)), "its compressed form LAZ");
+    contains(read_error(scratch, "a.las", las({{1, 2, 3}}, 5)), "expected LAS 1.0 to 1.4, got 1.5");
+    contains(read_error(scratch, "a.las", las({{1, 2, 3}}, 2).substr(0, 250)),
+             "expected 1 points of 28 bytes from byte 237");
+    contains(read_error(scratch, "a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"),
+             "expected a field 'z'");
     const std::string whole = pcd({{1, 2, 3}, {4, 5, 6}}, "binary");
-    says(read_error(scratch, "a.pcd", whole.substr(0, whole.size() - 1)), "truncated");
-    says(read_error(scratch, "a.pcd", "FIELDS x y z\nPOINTS 999999999999\nDATA binary\nabc"), "truncated");
+    contains(read_error(scratch, "a.pcd", whole.substr(0, whole.size() - 1)), "truncated");
+    contains(read_error(scratch, "a.pcd", "FIELDS x y z\nPOINTS 999999999999\nDATA binary\nabc"), "truncated");
 }
 
 TEST_CASE("archives that lie are refused before memory is taken") {
     const Scratch scratch;
-    says(read_error(scratch, "a.zip", "PK nothing"), "expected a ZIP archive");
-    says(read_error(scratch, "a.zip", zip({{"a.txt", "text"}})), "expected Fiji ROIs in the archive, got none");
-    says(read_error(scratch, "a.zip", zip({{"a.roi", "no ROI"}})), "expected a Fiji ROI");
+    contains(read_error(scratch, "a.zip", "PK nothing"), "expected a ZIP archive");
+    contains(read_error(scratch, "a.zip", zip({{"a.txt", "text"}})), "expected Fiji ROIs in the archive, got none");
+    contains(read_error(scratch, "a.zip", zip({{"a.roi", "no ROI"}})), "expected a Fiji ROI");
     std::string archive = zip({{"a.roi", roi(multi_point())}});
     const std::size_t entry = archive.find("PK\1\2");
     std::string huge = archive;
     huge.replace(entry + 24, 4, "\xF0\xFF\xFF\xFF");  // the size it claims
-    says(read_error(scratch, "a.zip", huge), "bytes cannot hold 4294967280");
+    contains(read_error(scratch, "a.zip", huge), "bytes cannot hold 4294967280");
     std::string secret = archive;
     secret[entry + 8] = 1;
-    says(read_error(scratch, "a.zip", secret), "is encrypted");
+    contains(read_error(scratch, "a.zip", secret), "is encrypted");
     std::string broken = archive;
     broken[entry + 16] ^= 1;  // its checksum
-    says(read_error(scratch, "a.zip", broken), "does not agree with its checksum");
+    contains(read_error(scratch, "a.zip", broken), "does not agree with its checksum");
 }
 
 TEST_CASE("damaged files of every format end in an Error, never in a crash") {

@@ -35,7 +35,7 @@ std::string verdict(const PointCloud& cloud, const ImageGeometry& geometry) {
     return error.empty() ? warnings : error;
 }
 
-bool says(const std::string& message, const std::string& part) {
+bool contains(const std::string& message, const std::string& part) {
     INFO(message);
     INFO(part);
     CHECK(message.find(part) != std::string::npos);
@@ -59,9 +59,9 @@ TEST_CASE("points outside the image are counted, and both boxes told") {
     // 10 x 8 x 20 in world units, half a voxel wider on each side
     CHECK(verdict(cloud_of({{0, 0, 0}, {9.9, 7.9, 19}, {-0.05, -0.05, -0.5}}), geometry).empty());
     const std::string message = verdict(cloud_of({{1, 1, 1}, {1, 1, 20.5}, {0, -60, 0}}), geometry);
-    says(message, "cloud.csv: 2 of 3 points");
-    says(message, "points from (0, -60, 0) to (1, 1, 20.5)");
-    says(message, "image from (-0.05, -0.05, -0.5) to (9.95, 7.95, 19.5)");
+    contains(message, "cloud.csv: 2 of 3 points");
+    contains(message, "points from (0, -60, 0) to (1, 1, 20.5)");
+    contains(message, "image from (-0.05, -0.05, -0.5) to (9.95, 7.95, 19.5)");
     CHECK(message.find('`') == std::string::npos);
 }
 
@@ -70,41 +70,44 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
     const auto advice = [&](const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
         return verdict(cloud_of(points, space), geometry);
     };
-    says(advice({{15, 4, 3}}), "`points_order = zyx` would bring them inside (the order of the axes is reversed)");
-    says(advice({{90, 70, 15}}), "; `points_space = index` would bring them inside (they are voxels, not world units)");
-    says(advice({{15, 70, 90}}), "; `points_space = index, points_order = zyx` would");
-    says(advice({{-5, -3, 15}}),
-         "; `points_space = ras` would bring them inside (they are in RAS, the image is in LPS)");
-    says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}),
-         "; `points_scale = 0.001` would bring them inside (their unit");
-    says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; `points_space = ras, points_scale = 0.001` would");
-    says(advice({{100, 80, 20}}), "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
-    says(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
-    says(advice({{100, 80, 20}}, PointSpace::Index), "; `points_space = index1` would bring");
+    contains(advice({{15, 4, 3}}), "`points_order = zyx` would bring them inside (the order of the axes is reversed)");
+    contains(advice({{90, 70, 15}}),
+             "; `points_space = index` would bring them inside (they are voxels, not world units)");
+    contains(advice({{15, 70, 90}}), "; `points_space = index, points_order = zyx` would");
+    contains(advice({{-5, -3, 15}}),
+             "; `points_space = ras` would bring them inside (they are in RAS, the image is in LPS)");
+    contains(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}),
+             "; `points_scale = 0.001` would bring them inside (their unit");
+    contains(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}),
+             "; `points_space = ras, points_scale = 0.001` would");
+    contains(advice({{100, 80, 20}}),
+             "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
+    contains(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
+    contains(advice({{100, 80, 20}}, PointSpace::Index), "; `points_space = index1` would bring");
     // the positions of a multi-point in a hyperstack of two channels
-    says(advice({{15, 70, 39}}, PointSpace::Index),
-         "`points_channels = 2` would bring them inside (their slices count the channels");
+    contains(advice({{15, 70, 39}}, PointSpace::Index),
+             "`points_channels = 2` would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};
-    says(advice({{5, 4, 10}, {1, 1, 1}}),
-         "`points_space = local` would bring them inside (they leave out the image's origin)");
+    contains(advice({{5, 4, 10}, {1, 1, 1}}),
+             "`points_space = local` would bring them inside (they leave out the image's origin)");
 }
 
 TEST_CASE("readings that fit equally well are all told") {
     const ImageGeometry geometry = small_image();
     // as voxels, or in world units with the axes reversed
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
-    says(message, "; `points_order = zyx` would");
-    says(message, "or `points_space = index` would");
-    says(message, "more than one reading fits");
+    contains(message, "; `points_order = zyx` would");
+    contains(message, "or `points_space = index` would");
+    contains(message, "more than one reading fits");
 }
 
 TEST_CASE("an image without spacing is asked for it where points are lengths") {
     ImageGeometry geometry = small_image();
     geometry.spacing = {1, 1, 1};
     geometry.spacing_known = false;
-    says(verdict(cloud_of({{500, 90, 90}, {-3000, 3, 3}}), geometry), "`spacing = sx,sy,sz`");
-    says(verdict(cloud_of({{5, 9, 9}}), geometry),
-         "[cloud.csv: the points are in world units, and the image states no spacing");
+    contains(verdict(cloud_of({{500, 90, 90}, {-3000, 3, 3}}), geometry), "`spacing = sx,sy,sz`");
+    contains(verdict(cloud_of({{5, 9, 9}}), geometry),
+             "[cloud.csv: the points are in world units, and the image states no spacing");
     CHECK(verdict(cloud_of({{5, 9, 9}}, PointSpace::Index), geometry).empty());
 }
 
@@ -119,8 +122,8 @@ TEST_CASE("points that lie inside by accident are told by their slices") {
         world.push_back(geometry.index_to_world(p));
         reversed.push_back({world.back()[2], world.back()[1], world.back()[0]});
     }
-    says(verdict(cloud_of(voxels), geometry), "`points_space = index` would put them on voxel centres");
-    says(verdict(cloud_of(reversed), geometry), "`points_order = zyx` would put them on voxel centres");
+    contains(verdict(cloud_of(voxels), geometry), "`points_space = index` would put them on voxel centres");
+    contains(verdict(cloud_of(reversed), geometry), "`points_order = zyx` would put them on voxel centres");
     CHECK(verdict(cloud_of(world), geometry).empty());
     // who says it is not asked again
     PointCloud stated = cloud_of(voxels);
@@ -143,7 +146,7 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         for (const Vec3& p : world) written.push_back(as_written(p));
         const std::string path = scratch.path("marks.xyz");
         write_points(path, written);
-        says(verdict(read_points(path), geometry), "; " + advice + " would bring them inside");
+        contains(verdict(read_points(path), geometry), "; " + advice + " would bring them inside");
         const PointCloud mended = read_points(path, options);
         CHECK(verdict(mended, geometry).empty());
         const std::vector<Vec3> back = to_world(mended, geometry);

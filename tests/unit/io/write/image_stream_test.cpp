@@ -204,9 +204,9 @@ TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, c
                 std::map<int, int> times;
                 for (int y = 2 * j; y < std::min(2 * j + 2, 290); ++y)
                     for (int x = 2 * i; x < std::min(2 * i + 2, 301); ++x) ++times[source.value(x, y, k)];
-                int most = 0;
-                for (const auto& [value, count] : times) most = std::max(most, count);
-                different += times[int(coarse.at(i, j, k))] == most ? 0 : 1;
+                int maximum = 0;
+                for (const auto& [value, count] : times) maximum = std::max(maximum, count);
+                different += times[int(coarse.at(i, j, k))] == maximum ? 0 : 1;
             }
     CHECK(different == 0);
 }

@@ -26,15 +26,16 @@ public:
     }
     double number(const char* what) { return to_coordinate(path_, lines_.number(), next(what)); }
     /// A whole number from `least` to `most`.
-    std::size_t count(const char* what, std::size_t least, std::size_t most) {
-        return to_count(next(what), what, least, most);
+    std::size_t count(const char* what, std::size_t minimum, std::size_t maximum) {
+        return to_count(next(what), what, minimum, maximum);
     }
-    std::size_t to_count(string_view word, const char* what, std::size_t least, std::size_t most) const {
+    std::size_t to_count(string_view word, const char* what, std::size_t minimum, std::size_t maximum) const {
         const std::optional<double> value = to_number(word);
-        if (!value || !(*value >= double(least)) || !(*value <= double(most)) || *value != double(std::size_t(*value)))
+        if (!value || !(*value >= double(minimum)) || !(*value <= double(maximum)) ||
+            *value != double(std::size_t(*value)))
             fail(path_, lines_.number(),
-                 std::string("expected ") + what + ", a whole number from " + std::to_string(least) + " to " +
-                     std::to_string(most) + ", got " + quote(word));
+                 std::string("expected ") + what + ", a whole number from " + std::to_string(minimum) + " to " +
+                     std::to_string(maximum) + ", got " + quote(word));
         return std::size_t(*value);
     }
 
@@ -52,14 +53,14 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
     Words words(path, text);
     if (words.next("CSLC") != "CSLC") fail(path, "expected the header CSLC of sections in planes");
     // No number of things is larger than the file, which holds each in two bytes at least.
-    const std::size_t most = text.size();
-    const std::size_t planes = words.count("the number of planes", 0, most);
-    const std::size_t labels = words.count("the number of labels", 1, most);
+    const std::size_t maximum = text.size();
+    const std::size_t planes = words.count("the number of planes", 0, maximum);
+    const std::size_t labels = words.count("the number of labels", 1, maximum);
     std::optional<std::size_t> only;
     for (std::size_t plane = 0; plane < planes; ++plane) {
-        const std::string name = std::to_string(words.count("a plane's number", 0, most));
-        const std::size_t vertices = words.count("the number of a plane's vertices", 0, most);
-        const std::size_t contours = words.count("the number of a plane's contours", 0, most);
+        const std::string name = std::to_string(words.count("a plane's number", 0, maximum));
+        const std::size_t vertices = words.count("the number of a plane's vertices", 0, maximum);
+        const std::size_t contours = words.count("the number of a plane's contours", 0, maximum);
         for (int n = 0; n < 4; ++n) (void)words.number("the four numbers of a plane");
         std::vector<Vec3> places;
         for (std::size_t n = 0; n < vertices; ++n) {
@@ -69,7 +70,7 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
         for (std::size_t n = 0; n < contours; ++n) {
             const string_view sizes = words.next("a contour");
             const std::size_t count =
-                words.to_count(sizes.substr(0, sizes.find('h')), "the number of a contour's vertices", 0, most);
+                words.to_count(sizes.substr(0, sizes.find('h')), "the number of a contour's vertices", 0, maximum);
             const std::size_t label = words.count("a contour's label", 0, labels);
             if (structures_by.empty() && only.value_or(label) != label)
                 throw Error(Errc::InvalidInput,

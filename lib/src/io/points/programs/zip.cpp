@@ -94,7 +94,7 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
     const std::uint64_t end = find_end(bytes, path);
     const int count = bytes.at<std::uint16_t>(end + 10);
     std::uint64_t at = bytes.at<std::uint32_t>(end + 16);
-    const std::uint64_t most = kAlways + kLargestArchiveRatio * bytes.size();
+    const std::uint64_t maximum = kAlways + kLargestArchiveRatio * bytes.size();
     std::uint64_t total = 0, unpacked = 0;
     for (int n = 0; n < count; ++n) {
         const Entry entry = read_entry(bytes, at, path);
@@ -105,9 +105,9 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
         if (!wanted(entry.name)) continue;
         const std::string_view packed = find_packed(bytes, entry, path);
         unpacked += entry.size;
-        if (unpacked > most)
+        if (unpacked > maximum)
             throw Error(Errc::Unsupported, path + ": an archive of " + std::to_string(bytes.size()) +
-                                               " bytes claims to hold more than " + std::to_string(most) +
+                                               " bytes claims to hold more than " + std::to_string(maximum) +
                                                ", which no marks do; unpack it, and give its files");
         use(entry.name, unpack(entry, packed, path));
     }
