@@ -51,6 +51,7 @@ LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 # Readers and writers, which the core does without: COVOL_IO.
 READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
+ROW = re.compile(r"^\| (\d+) \| `([\w/]+)` \| .", re.M)  # of the table in docs/architecture.md
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 
 
@@ -93,6 +94,10 @@ def findings(root):
             yield f"{path}: has no layer; add it to LAYERS"
         if not path.read_text().startswith("#pragma once"):
             yield f"{path}:1: expected #pragma once"
+    shown = {folder: int(level) for level, folder in ROW.findall((root / "docs/architecture.md").read_text())}
+    for folder in sorted(LEVEL.keys() | shown.keys()):
+        if shown.get(folder) != LEVEL.get(folder):
+            yield f"docs/architecture.md: {folder}: expected level {LEVEL.get(folder)}, got {shown.get(folder)}"
     for folder in LEVEL:
         count = sum(path.is_file() for path in (root / "lib/src" / folder).glob("*"))
         if not 0 < count <= MOST_FILES:
