@@ -1,4 +1,4 @@
-# Everything covol builds on; all of it from Debian packages, listed in tests/install_packages.sh.
+# The dependencies of covol; all are Debian packages, listed in tests/install_packages.sh.
 include(CovolOpenVDB)
 find_package(OpenMesh CONFIG REQUIRED)
 find_package(CGAL 5.5 CONFIG REQUIRED)
@@ -13,7 +13,7 @@ if(COVOL_IO)
 endif()
 find_package(ZLIB REQUIRED)
 find_package(PNG REQUIRED)
-# Codecs of chunked images, and of the report page's slices; linked by name.
+# Codecs of chunked images, and of the report page's slices; linked by library name.
 foreach(codec ${COVOL_CODECS})
   find_library(COVOL_LIB_${codec} ${codec} REQUIRED)
   mark_as_advanced(COVOL_LIB_${codec})

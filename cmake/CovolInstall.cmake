@@ -1,4 +1,4 @@
-# cmake --install: the program, the library, its headers, and what find_package(covol) needs.
+# cmake --install: the program, the library, its headers, and the files for find_package(covol).
 if(COVOL_SENSITIVITY)
   install(CODE "message(FATAL_ERROR \"covol: a build with COVOL_SENSITIVITY is not for use\")")
 endif()
@@ -30,12 +30,12 @@ install(FILES
   ${CMAKE_CURRENT_LIST_DIR}/CovolOpenVDB.cmake
   DESTINATION ${COVOL_CONFIG_DIR} COMPONENT development)
 if(BUILD_SHARED_LIBS)
-  # Its paths are relative to where it lies: a package or a prefix may be anywhere.
+  # Its paths are relative to its own location, so that a package or a prefix can be moved.
   file(RELATIVE_PATH COVOL_PC_TO_PREFIX /p/${CMAKE_INSTALL_LIBDIR}/pkgconfig /p)
   configure_file(${PROJECT_SOURCE_DIR}/tools/packaging/covol.pc.in ${PROJECT_BINARY_DIR}/covol.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/covol.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endif()
-# A Debian package names the licence in its copyright file instead.
+# A Debian package has the licence in its copyright file instead.
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)
 if(PROJECT_IS_TOP_LEVEL AND BUILD_SHARED_LIBS AND COVOL_BUILD_TOOLS)
   include(CovolPackages)

@@ -1,5 +1,5 @@
-# Defines OpenVDB::openvdb. Debian's FindOpenVDB.cmake demands boost-iostreams, sets BUILD_SHARED_LIBS in the
-# caller's scope and shadows TBBConfig.cmake, hence this file; covolConfig.cmake uses it too.
+# Defines OpenVDB::openvdb. Debian's FindOpenVDB.cmake requires boost-iostreams, sets BUILD_SHARED_LIBS in the caller's
+# scope and shadows TBBConfig.cmake, and is therefore replaced by this file, which covolConfig.cmake uses, too.
 if(NOT TARGET OpenVDB::openvdb)
   find_package(TBB CONFIG REQUIRED)
   find_package(Imath CONFIG REQUIRED)

@@ -25,7 +25,7 @@ foreach(component ${COVOL_DEB_COMPONENTS})
   set(CPACK_DEBIAN_${upper}_FILE_NAME DEB-DEFAULT)
 endforeach()
 
-# What is packed is built first: a build of the program alone lacks manual pages and the module.
+# The contents of all packages are built first: a build of the program does not include manual pages and the module.
 add_custom_target(covol_packed)
 add_dependencies(covol_packed covol covol_tool covol_made)
 if(COVOL_PYTHON)

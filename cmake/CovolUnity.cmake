@@ -1,6 +1,7 @@
-# covol_unity(TARGET [PRECOMPILED HEADER...]): with COVOL_UNITY the sources of each folder are compiled as one, behind these
-# headers. Templates of OpenVDB and CLI11 are then instantiated once for a folder, not for each source. Names in unnamed
-# namespaces must differ within a folder: tests/lint/unity_test.py. Sources with options of their own stay alone.
+# covol_unity(TARGET [PRECOMPILED HEADER...]): with COVOL_UNITY the sources of each folder are compiled as one, with
+# these precompiled headers. Templates of OpenVDB and CLI11 are then instantiated once per folder instead of once per
+# source. Names in unnamed namespaces must differ within a folder: tests/lint/unity_test.py. Sources with options of
+# their own are compiled separately.
 function(covol_unity target)
   cmake_parse_arguments(ARG "" "" PRECOMPILED ${ARGN})
   if(NOT COVOL_UNITY)
@@ -13,7 +14,7 @@ function(covol_unity target)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
-  target_compile_options(${target} PRIVATE -Wno-subobject-linkage)  # it takes what is included for headers
+  target_compile_options(${target} PRIVATE -Wno-subobject-linkage)  # GCC would treat included sources as headers
   if(ARG_PRECOMPILED)
     target_precompile_headers(${target} PRIVATE ${ARG_PRECOMPILED})
   endif()

@@ -1,5 +1,5 @@
-# A text file as C++ that returns it: cmake -DFROM=FILE -DTO=FILE.cpp -DHEADER=report/viewer.h -DFUNCTION=viewer -P
-# EmbedText.cmake. A raw string costs the compiler nothing to speak of.
+# Writes a C++ file with a function that returns the content of a text file: cmake -DFROM=FILE -DTO=FILE.cpp
+# -DHEADER=report/viewer.h -DFUNCTION=viewer -P EmbedText.cmake. A raw string is compiled quickly.
 file(READ "${FROM}" text)
 string(FIND "${text}" ")covol\"" ends)
 if(NOT ends EQUAL -1)

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Installs what is needed, builds covol, segments a real image with the help of marked points, and says where the
-# results are and how good they are.
+# Installs what is needed, builds covol, segments a real image with the help of marked points, and prints where the
+# results are and how accurate they are.
 #
 #     bash houdini_free_examples/00_quickstart.sh
 #
-# The image is a C. elegans embryo with stained membranes (houdini_free_examples/data/README.md): its far side has faded, no edge is left
-# there, and the marks carry the surface across.
+# The image is a C. elegans embryo with stained membranes (houdini_free_examples/data/README.md): its far side has faded
+# and has no edge left, so that the marks alone determine the surface there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 image=houdini_free_examples/data/celegans_embryo.tif
-# Marks for the program, and others that it never sees, to measure the result with.
+# Marks for the program, and others that it does not get, with which the result is measured.
 points=houdini_free_examples/data/celegans_marks.csv
 check=houdini_free_examples/data/celegans_check.csv
 out=${COVOL_OUT:-out}/quickstart
@@ -18,7 +18,7 @@ source houdini_free_examples/build.sh
 
 echo "== segmenting"
 mkdir -p "$out"
-# Slices are 3.5 pixels apart, marks about 30: voxels of 3 pixels lose nothing that either knows, and take two seconds.
+# Slices are 3.5 pixels apart, marks about 30: voxels of 3 pixels lose no detail of either, and take two seconds.
 "$covol" segment "$image" --points "$points" --voxel-size 3 -o "$out/embryo.vdb" \
   --mesh "$out/embryo.ply" --mask "$out/embryo_mask.tif" --json "$out/report.json" \
   --report "$out/embryo.html"

@@ -3,8 +3,8 @@
 #
 #     bash houdini_free_examples/01_points_alone.sh
 #
-# The cloud is 4,000 random points on a torus. Voxel size, the distance that closes the gaps between points, and all else
-# are chosen from the cloud, and printed.
+# The cloud is 4,000 random points on a torus. The voxel size, the tag distance, which closes the gaps between points,
+# and all other options are chosen from the cloud and printed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh

@@ -3,7 +3,7 @@
 #
 #     bash houdini_free_examples/02_hole_closing.sh
 #
-# Where there is no edge, curvature closes a hole by the smallest surface, a flat disc. Points say what was really there, a
+# Without an edge, curvature closes a hole by the minimal surface, a flat disc. The points show the true shape, a
 # sphere.
 set -euo pipefail
 cd "$(dirname "$0")/.."

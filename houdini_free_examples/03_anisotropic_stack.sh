@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A microscope's stack: slices four times as far apart as pixels, noise, and a side where the edge has faded. Marks on every
-# third slice, as a person clicks them, carry the surface across.
+# A microscope's stack: slices four times as far apart as pixels, noise, and a side where the edge has faded. Marks on
+# every third slice, as a person clicks them, determine the surface on that side.
 #
 #     bash houdini_free_examples/03_anisotropic_stack.sh
 set -euo pipefail
@@ -17,7 +17,7 @@ out, pixel, step = sys.argv[1], 0.5, 2.0
 k, j, i = np.meshgrid(np.arange(24), np.arange(90), np.arange(100), indexing="ij")
 x, y, z = pixel * i, pixel * j, step * k
 center, radii, tilt = np.array((25, 22.5, 23)), np.array((17, 12, 14)), 0.5
-def inside(x, y, z):  # an ellipsoid, turned about z: 1 on its surface
+def inside(x, y, z):  # an ellipsoid, rotated about z: the value is 1 on its surface
     dx, dy, dz = x - center[0], y - center[1], z - center[2]
     a, b = np.cos(tilt) * dx + np.sin(tilt) * dy, np.cos(tilt) * dy - np.sin(tilt) * dx
     return np.sqrt((a / radii[0]) ** 2 + (b / radii[1]) ** 2 + (dz / radii[2]) ** 2)
@@ -34,7 +34,7 @@ with open(f"{out}/marks.csv", "w") as marks:
         if slice % 3 and slice not in (5, 18): continue
         for turn in np.arange(0, 2 * np.pi, 0.13):
             direction = np.array((np.cos(turn), np.sin(turn), 0))
-            low, high = 0.0, 30.0  # the surface in this direction, by bisection
+            low, high = 0.0, 30.0  # finds the surface in this direction by bisection
             for _ in range(40):
                 middle = (low + high) / 2
                 at = (center[0] + middle * direction[0], center[1] + middle * direction[1], step * slice)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One surface in the files that other programs open, and what covol check says about each.
+# One surface in the file formats of other programs, and the result of covol check for each.
 #
 #     bash houdini_free_examples/04_into_blender_and_houdini.sh
 set -euo pipefail
@@ -10,7 +10,7 @@ data=houdini_free_examples/data
 mkdir -p "$out"
 
 echo "== one run, several files"
-# The marks alone here; 00_quickstart.sh uses the image as well.
+# Here from the marks alone; 00_quickstart.sh uses the image as well.
 "$covol" reconstruct "$data/celegans_marks.csv" --voxel-size 4 -o "$out/surface.vdb" --density "$out/fog.vdb" \
   --mesh "$out/embryo.ply"
 "$covol" mesh "$out/surface.vdb" -o "$out/embryo.glb" --up y --unit-scale 0.01

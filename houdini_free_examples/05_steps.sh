@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What covol segment does, step by step; each leaves a .vdb that vdb_print, vdb_view and OpenVDB's own tools read.
+# The steps of covol segment, one by one; each writes a .vdb that vdb_print, vdb_view and OpenVDB's other tools read.
 #
 #     bash houdini_free_examples/05_steps.sh
 set -euo pipefail

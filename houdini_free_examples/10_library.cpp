@@ -2,7 +2,7 @@
 //
 //     10_library IMAGE POINTS OUT_PREFIX        writes OUT_PREFIX.vdb, OUT_PREFIX.ply and OUT_PREFIX.nrrd
 //
-// `covol segment` and covol::segment() do the same with more care; this shows what happens inside.
+// `covol segment` and covol::segment() do the same more thoroughly; this example shows the steps.
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -24,13 +24,14 @@ int main(int argc, char** argv) {
         return 2;
     }
     try {
-        // Files. Points become world positions; those outside the image are an error that says what would help.
+        // Read the files. Points become world positions; points outside of the image cause an error that suggests a
+        // remedy.
         const covol::Image image = covol::read_image(argv[1]);
         const covol::PointCloud cloud = covol::read_points(argv[2]);
         covol::check_inside(cloud, image.geometry());
         std::vector<covol::Vec3> points = covol::to_world(cloud, image.geometry());
 
-        // The domain: isotropic voxels over the image's box. Every grid below shares its transform.
+        // The domain: isotropic voxels over the image's box. All grids below use its transform.
         const auto& spacing = image.geometry().spacing;
         const double h = *std::min_element(spacing.begin(), spacing.end());
         const covol::Domain domain = covol::make_domain(image.geometry().world_box(), h);
@@ -42,12 +43,13 @@ int main(int argc, char** argv) {
         const covol::DistanceResult d = covol::compute_distance(points, domain, {D + 5 * h});
         std::printf("D = %g (%s)\n", D, choice.reason.c_str());
 
-        // 2. Tagging: what a flood from outside cannot reach is inside. u starts as a clamped signed distance.
+        // 2. Tagging: positions that a flood from outside cannot reach are inside. u starts as a clamped signed
+        // distance.
         covol::BandResult tagged = covol::tag_interior(*d.grid, {D, {}});
         if (tagged.report.leaks)
             std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
 
-        // 3. The edge detector, only where the band is.
+        // 3. The edge detector, only within the band.
         const covol::EdgeResult g = covol::detect_edges(image, *tagged.grid);
 
         // 4. The flow: points, image edges and curvature move u until it is steady.
@@ -58,7 +60,7 @@ int main(int argc, char** argv) {
         const covol::EvolveReport solved = covol::evolve(*u, fields);
         std::printf("%d steps, %s\n", solved.steps, covol::to_string(solved.stop_reason));
 
-        // 5. A true signed distance, and what comes from it.
+        // 5. A true signed distance, and the results made from it.
         const covol::FloatGridPtr surface = covol::extract_surface(*u);
         const covol::TriangleMesh mesh = covol::extract_mesh(*surface);
         const covol::MeshMeasures measures = covol::measure(mesh);

@@ -1,4 +1,4 @@
-// The whole job in one call: image and marks in; level set, mesh and label image out.
+// The whole job in one call: from an image and marks to a level set, a mesh and a label image.
 //
 //     12_whole_job IMAGE POINTS OUT_PREFIX      writes OUT_PREFIX.vdb, OUT_PREFIX.ply and OUT_PREFIX.nrrd
 #include <cstdio>
@@ -17,10 +17,10 @@ int main(int argc, char** argv) {
 
         const covol::Image image = covol::read_image(argv[1], {}, run);
         const covol::PointCloud marks = covol::read_points(argv[2]);
-        covol::check_inside(marks, image.geometry(), run);  // or an error that says what would help
+        covol::check_inside(marks, image.geometry(), run);  // or an error that suggests a remedy
 
         covol::SegmentOptions options;
-        options.voxel_size = 3 * image.geometry().spacing[0];  // all else is chosen automatically
+        options.voxel_size = 3 * image.geometry().spacing[0];  // other options are chosen automatically
         const covol::SegmentResult result =
             covol::segment(image, covol::to_world(marks, image.geometry()), options, run);
         std::printf("volume %g, marks to surface %g on the mean\n", result.report.surface.volume,

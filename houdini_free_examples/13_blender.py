@@ -1,12 +1,12 @@
-"""Imports the level set, fog volume and meshes of a covol job into Blender, checks that they lie at one place with one
-size and smooth normals, and renders mesh and volume into one picture. 13_blender.sh makes the files and calls
+"""Imports the level set, fog volume and meshes of a covol job into Blender, checks that they have the same position and size, and
+smooth normals, and renders mesh and volume into one picture. 13_blender.sh makes the files and calls
 
     blender -b --factory-startup --python houdini_free_examples/13_blender.py -- \
         OUTDIR FILE.vdb... FILE.ply FILE.glb [image=IMAGE.vdb:LOW:HIGH] [size=800x450] [checks]
 
-"checks" makes no picture. It shows the image, its grid "density" from LOW to HIGH, or else the job's own fog volume.
-Writes OUTDIR/blender.json (what was measured), blender.png and blender.blend. Exit code 0: all checks hold, 1: one does
-not, 2: files are missing. Made for Blender 3.4 (Debian 12); lengths are in the files' own unit.
+With "checks" no picture is made. The picture shows the image (its grid "density" from LOW to HIGH), or, without image=, the job's
+own fog volume. Writes OUTDIR/blender.json (what was measured), blender.png and blender.blend. Exit code 0: all checks hold, 1: one
+does not, 2: files are missing. For Blender 3.4 (Debian 12); lengths are in the files' own unit.
 """
 import json
 import pathlib
@@ -22,10 +22,10 @@ from mathutils.bvhtree import BVHTree
 if "bool" not in vars(np):
     np.bool = bool
 
-MESH_TOLERANCE = 1e-5  # of the largest side: PLY and GLB hold the same single-precision numbers
-BOX_TOLERANCE = 0.5    # voxels, a volume's surface against the mesh; that of the fog is met at a lattice line only
+MESH_TOLERANCE = 1e-5  # relative to the largest side: PLY and GLB have the same single-precision numbers
+BOX_TOLERANCE = 0.5    # voxels, between a volume's surface and the mesh; the fog's level is met only at lattice lines
 MEAN_TOLERANCE = 0.1   # voxels
-NORMAL_TOLERANCE = 1   # degree, from Blender's own means over the triangles at a vertex
+NORMAL_TOLERANCE = 1   # degrees, from Blender's own mean over the triangles at a vertex
 PICTURE = (800, 450)
 SAMPLES = 16
 GLOW = 16
@@ -60,7 +60,7 @@ def corners(obj):
 
 
 def volume_to_mesh(obj, grid, threshold):
-    """What the modifier Volume to Mesh makes of a grid, in world space, on the grid's own voxels."""
+    """The mesh that the modifier Volume to Mesh makes of a grid, in world space, with the grid's own voxels."""
     target = bpy.data.objects.new("from volume", bpy.data.meshes.new("from volume"))
     bpy.context.collection.objects.link(target)
     modifier = target.modifiers.new("from volume", "VOLUME_TO_MESH")
@@ -112,8 +112,8 @@ def check(ply, glb, volumes):
     checks("PLY: inside out", 0 if volume > 0 else 1, 0, "")
     checks("PLY and GLB: volumes differ", abs(solid_volume(glb) / volume - 1), 1e-4, "of the volume")
 
-    # Blender's importer of PLY drops normals, that of glTF takes them.
-    flat = sum(not p.use_smooth for p in glb.data.polygons)  # the importer's word where all three normals are the same
+    # Blender's PLY importer ignores normals, its glTF importer uses them.
+    flat = sum(not p.use_smooth for p in glb.data.polygons)  # flat if all three normals of a triangle are equal
     checks("GLB: flat triangles", flat / len(glb.data.polygons), 0.25, "of all")
     checks("GLB: normals of its own are missing", 0 if glb.data.has_custom_normals else 1, 0, "")
     for polygon in ply.data.polygons:
@@ -126,13 +126,13 @@ def check(ply, glb, volumes):
     for obj in volumes:
         for grid in obj.data.grids:
             h = (obj.matrix_world @ grid.matrix_object).to_scale()[0]
-            # A fog volume begins at 0 on the surface, and is 1 three voxels inside: its level is met nearly there.
+            # A fog volume is 0 on the surface and 1 three voxels inside, so that its level is met close to the surface.
             made = volume_to_mesh(obj, grid.name, 0.0 if grid.name == "surface" else 0.01)
             what = f"{obj.name}:{grid.name}"
             if len(made) == 0:
                 checks(f"{what}: has no surface", 1, 0, "")
                 continue
-            # Volume to Mesh puts values at the corners of voxels that OpenVDB has at their centres.
+            # Volume to Mesh places values at the corners of voxels, OpenVDB at their centres.
             made -= h / 2
             boxes = max(np.abs(made.min(0) - a.min(0)).max(), np.abs(made.max(0) - a.max(0)).max()) / h
             off = np.array([tree.find_nearest(Vector(v))[3] for v in made]) / h
@@ -143,7 +143,7 @@ def check(ply, glb, volumes):
 
 
 def cut(obj, at):
-    """The part of a mesh on the side x <= at of the world, smooth."""
+    """The part of a mesh with x <= at in the world, with smooth shading."""
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)
     mesh.transform(obj.matrix_world)
@@ -158,7 +158,7 @@ def cut(obj, at):
 
 
 def new_material(name, socket, kinds):
-    """A material of nodes of these kinds, the last of them at the output's `socket`."""
+    """A material with nodes of these kinds, the last of which is connected to the output's `socket`."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -177,7 +177,7 @@ def surface_material(color):
 
 
 def volume_material(color, low, high):
-    """A glow that grows from `low` to `high` of the grid "density", which is what Blender's shaders ask for."""
+    """Emission that grows from `low` to `high` of the grid "density", the name that Blender's shaders use."""
     material, links, (values, scaled, shader) = new_material("volume", "Volume", ["Attribute", "MapRange", "Emission"])
     values.attribute_name = "density"
     scaled.inputs["From Min"].default_value, scaled.inputs["From Max"].default_value = low, high
@@ -197,16 +197,16 @@ def light(place, target, power, size):
 
 
 def render(path, size, ply, volume, low, high):
-    """Half of the mesh around the volume: what does not fit together shows at the seam."""
+    """Half of the mesh around the volume: misalignment would be visible along the cut."""
     a = corners(ply)
-    least, most = a.min(0), a.max(0)
-    # The scene is two metres wide: lights, lens and clipping do not depend on the image's unit.
-    home = Matrix.Scale(2 / (most - least).max(), 4) @ Matrix.Translation(-(least + most) / 2)
-    half = cut(ply, (least + most)[0] / 2)
+    box_min, box_max = a.min(0), a.max(0)
+    # The scene is scaled to two metres: lights, lens and clipping do not depend on the image's unit.
+    home = Matrix.Scale(2 / (box_max - box_min).max(), 4) @ Matrix.Translation(-(box_min + box_max) / 2)
+    half = cut(ply, (box_min + box_max)[0] / 2)
     half.data.materials.append(surface_material((0.10, 0.36, 0.50)))
     half.matrix_world = home
     volume.matrix_world = home @ volume.matrix_world
-    volume.data.render.space = "WORLD"  # the glow is per metre, not per micrometre
+    volume.data.render.space = "WORLD"  # emission per metre, not per micrometre
     volume.data.materials.append(volume_material((1.0, 0.42, 0.12), low, high))
 
     world = bpy.data.worlds.new("world")
@@ -226,7 +226,7 @@ def render(path, size, ply, volume, low, high):
     scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", SAMPLES, 1
     scene.cycles.use_denoising = False  # Debian's Blender has no denoiser
     scene.cycles.max_bounces = 2
-    scene.cycles.volume_step_rate = 2  # voxels; the glow is smooth
+    scene.cycles.volume_step_rate = 2  # voxels; enough for smooth emission
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.filepath = str(path)
@@ -264,7 +264,7 @@ def main():
         obj.hide_render = obj is not shown
     size = [int(n) for n in given["size"].split("x")] if "size" in given else PICTURE
     render(out / "blender.png", size, ply, shown, float(low), float(high))
-    bpy.context.preferences.filepaths.save_version = 0  # no older scene beside it
+    bpy.context.preferences.filepaths.save_version = 0  # keeps no backup of an older scene
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "blender.blend"), compress=True)
     return 0 if good else 1
 
@@ -272,7 +272,7 @@ def main():
 if __name__ == "__main__":
     try:
         code = main()
-    except Exception as error:  # Blender itself ends with 0 whatever its script says
+    except Exception as error:  # Blender's exit code is 0 even if its script fails
         print(f"13_blender.py: {error}", file=sys.stderr)
         code = 1
     sys.exit(code)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# A job's files in Blender: imported without a window, checked for place, size and smoothness, and rendered by Cycles,
-# half of the surface around the stained membranes. Where Blender is not installed, covol's own picture alone.
+# A job's files in Blender: imported without a window, checked for position, size and smoothness, and rendered by
+# Cycles, with half of the surface around the stained membranes. If Blender is not installed, only covol's own picture
+# is made.
 #
 #     sudo apt-get install --no-install-recommends blender
 #     bash houdini_free_examples/13_blender.sh

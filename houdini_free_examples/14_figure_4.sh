@@ -4,8 +4,8 @@
 #
 #     bash houdini_free_examples/14_figure_4.sh
 #
-# Where the image has no edge, curvature spans a hole by the smallest surface; where no point is, curvature alone draws
-# the surface of the second column in (points pull at any distance there, as in the paper).
+# Where the image has no edge, curvature closes a hole by the minimal surface. In the second column, where there are no
+# points, curvature alone pulls the surface inwards (points attract at any distance there, as in the paper).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh
@@ -54,7 +54,7 @@ def picture(path):
 
 out = sys.argv[1]
 rows = [joined([picture(f"{out}/{holes}_{column}.png") for column in ("image", "points", "both")], 0)
-        for holes in ("slit", "square", "round")]  # VTK counts rows from the bottom
+        for holes in ("slit", "square", "round")]  # VTK's first row is the bottom one
 writer = vtkPNGWriter()
 writer.SetInputData(joined(rows, 1))
 writer.SetFileName(f"{out}/figure_4.png")

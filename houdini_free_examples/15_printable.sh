@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A structure of a stack in millimetres to a mesh that a 3D printer takes, and to a segmentation for 3D Slicer: marks on
-# some slices, a mesh three times as large, and what covol check says of both.
+# From a structure in a stack in millimetres to a mesh for a 3D printer and to a segmentation for 3D Slicer: marks on
+# some slices, a mesh three times as large, and the results of covol check for both.
 #
 #     bash houdini_free_examples/15_printable.sh
 #
-# The stack is made here, for no scan of a patient is among the sample data: a bent vessel, bright as in CT with
-# contrast, noise, slices twice as far apart as pixels.
+# The stack is synthetic, because the sample data contains no scan of a patient: a bent vessel, bright as in
+# contrast-enhanced CT, with noise and slices twice as far apart as pixels.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh
@@ -19,7 +19,7 @@ import nibabel, numpy as np
 out, size, spacing = sys.argv[1], (72, 72, 30), np.array([0.5, 0.5, 1.0])
 i, j, k = np.meshgrid(*(np.arange(n) for n in size), indexing="ij")
 x, y, z = (spacing[a] * n for a, n in enumerate((i, j, k)))
-# The middle line bends along x with z; the vessel's radius is 7 mm.
+# The vessel's centre line bends along x with z; its radius is 7 mm.
 off = np.hypot(x - 18 - 3 * np.sin(z / 8), y - 18)
 ends = np.maximum(4 - z, z - 25)
 distance = np.maximum(off - 7, ends)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# covol's files among OpenVDB's own programs: vdb_print, vdb_lod, python3-openvdb, NanoVDB, and a sequence with a USD
-# scene that refers to it. What is not installed is passed over, and named.
+# covol's files in OpenVDB's own programs: vdb_print, vdb_lod, python3-openvdb, NanoVDB, and a sequence with a USD scene
+# that refers to it. Programs that are not installed are skipped and listed.
 #
 #     bash houdini_free_examples/16_openvdb_pipeline.sh
 set -euo pipefail
@@ -36,7 +36,7 @@ points, quads = solid.convertToQuads(isovalue=0)
 print(f"surface: {solid.activeVoxelCount()} active voxels of {h:g}, {len(quads)} quadrilaterals")
 shell = solid.deepCopy()
 shell.name = "shell"
-# Within 4 units of the surface; the half width is three voxels.
+# Up to 4 units from the surface; the half width is three voxels.
 shell.mapAll(lambda d: abs(d) - 4.0)
 shell.background = solid.background - 4.0
 vdb.write(f"{out}/shell.vdb", [shell])

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The paper's figures 5 to 7, of the stack and the outlines of 06_contours.sh in place of its embryo: slices with marks and
-# outlines; the image volume rendered with both structures in it; the surfaces with their points.
+# The paper's figures 5 to 7, with the stack and the outlines of 06_contours.sh in place of the paper's embryo: slices
+# with marks and outlines; the image volume rendered with both structures in it; the surfaces with their points.
 #
 #     bash houdini_free_examples/17_figures_5_to_7.sh
 set -euo pipefail
@@ -15,7 +15,7 @@ echo "== the job"
 /usr/bin/python3 - "$contours" "$out" <<'PYTHON'
 import csv, sys
 contours, out = sys.argv[1:]
-for name in ("core", "layer"):  # from pixels of half a micrometre and slices of one
+for name in ("core", "layer"):  # pixels of half a micrometre, slices one micrometre apart
     with open(f"{contours}/{name}.csv") as table, open(f"{out}/{name}.xyz", "w") as marks:
         for row in csv.DictReader(table):
             print(0.5 * float(row["x_px"]), 0.5 * float(row["y_px"]), row["slice"], file=marks)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Two cells that touch, from one image in one run: they share an interface, no voxel belongs to both.
+# Two cells that touch, from one image in one run: they have a common interface, and no voxel belongs to both.
 #
 #     bash houdini_free_examples/20_several_structures.sh
 #

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A cell that moves and grows over eight frames: marks on the first frame alone, each other frame starts from the one
-# before.
+# A cell that moves and grows over eight frames: only the first frame has marks, and each other frame starts from the
+# one before.
 #
 #     bash houdini_free_examples/30_time_lapse.sh
 set -euo pipefail

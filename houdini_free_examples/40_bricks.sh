@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# A job in bricks: planned, solved brick by brick, joined; and compared with the same job in one piece.
+# A job that is split into bricks: planned, solved brick by brick, joined, and compared with the same job in one piece.
 #
 #     bash houdini_free_examples/40_bricks.sh
 #
-# On one machine --memory-limit does all of this by itself; on a cluster see houdini_free_examples/bricks.
+# On one machine --memory-limit does all of this automatically; for clusters see houdini_free_examples/bricks.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh

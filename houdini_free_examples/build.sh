@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What the numbered scripts begin with: installs what is needed and builds covol. Sourced from the repository's root;
-# sets $covol, and $results, the folder for what they make. With COVOL set to a built binary nothing is installed or
-# built; COVOL_OUT is another folder for the results.
+# The common beginning of the numbered scripts: installs what is needed and builds covol. Sourced from the repository's
+# root; sets $covol, and $results, the folder for their outputs. If COVOL is set to a built program, nothing is
+# installed or built; COVOL_OUT is another folder for the results.
 covol=${COVOL:-build/bin/covol}
 results=${COVOL_OUT:-out}
 

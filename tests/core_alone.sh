@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds the core where TIFF, ITK, GDCM and HDF5 cannot be found, shows that it links none of them, and runs its tests.
+# Builds the core on a system on which TIFF, ITK, GDCM and HDF5 cannot be found, checks that it links none of them, and
+# runs its tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# From nothing to the page of one's own stack: in new Debians without a compiler, from a file that people are given to the results
-# of the quickstart's job and the page of covol mark, as a user without rights. As root, with debootstrap.
+# Tests an installation from scratch: in fresh Debian systems without a compiler, from a distributed file to the results
+# of the quickstart's job and the page of covol mark, as an unprivileged user. Run it as root, with debootstrap
+# installed.
 #
 #     bash tests/in_clean_root.sh BUNDLE.tar.xz|COVOL.whl|COVOL.deb [RELEASE...]
 #
-# A bundle runs in bookworm and trixie by default, a wheel and a package in bookworm. The clock begins when the new Debian is there,
-# with Python's venv and NumPy for a wheel; what apt-get fetches for a package counts. The mirror is the one that this machine's apt
-# uses, or COVOL_MIRROR.
+# A bundle runs in bookworm and trixie by default, a wheel and a package in bookworm. The measured time begins when the
+# fresh Debian is ready, with Python's venv and NumPy for a wheel; for a package it includes the downloads of apt-get.
+# The mirror is the one that this machine's apt uses, or COVOL_MIRROR.
 set -euo pipefail
 file=$(realpath "$1")
 shift
@@ -64,7 +65,7 @@ for release in "${releases[@]}"; do
   as_person "d=houdini_free_examples/data; $covol segment \$d/celegans_embryo.tif --points \$d/celegans_marks.csv \
     --voxel-size 3 -o embryo.vdb --mesh embryo.ply --mask embryo_mask.tif --report embryo.html --quiet && \
     $covol compare embryo.vdb \$d/celegans_check.csv"
-  # The page answers its one address, and nothing else.
+  # The page answers only at the printed address.
   as_person "$covol"' mark houdini_free_examples/data/celegans_embryo.tif study --no-browser >mark.log 2>&1 & program=$!
     trap "kill -INT $program" EXIT
     for n in $(seq 100); do grep -q "http://" mark.log && break; sleep 0.1; done

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Installs the Debian packages into a new Debian 12 and runs the quickstart and the Python module there. As root, with
-# debootstrap; takes some minutes and a GB, most of it the packages that covol builds on.
+# Installs the Debian packages into a fresh Debian 12 and runs the quickstart and the Python module there. Run it as
+# root, with debootstrap installed; it takes some minutes and a GB, most of it for the packages on which covol depends.
 #
-#     bash tests/packages_in_clean_root.sh BUILD [FOLDER]      FOLDER: where the root is made, below /tmp by default
+#     bash tests/packages_in_clean_root.sh BUILD [FOLDER]      FOLDER: for the new root, below /tmp by default
 #
 # The mirror is the one that this machine's apt uses, or COVOL_MIRROR.
 set -euo pipefail

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# The unit and property tests under the thread sanitizer. Half an hour to build and as long to run, on two cores: for once
-# a week.
+# The unit and property tests under the thread sanitizer. Building and running take half an hour each on two cores:
+# meant for a weekly run.
 #
 #   bash tests/thread_sanitizer.sh [WORDS FOR CTEST ...]
 #
-# TBB synchronizes by its own atomics, which the sanitizer sees only where TBB is compiled with it: the version that is
-# installed is built from Debian's source (deb-src lists are made from the machine's own, in the build folder). What is
-# suppressed, and why, stands in tests/thread_sanitizer.supp; OpenVDB's library is not instrumented and not reported on.
+# TBB synchronizes by its own atomics, which the sanitizer sees only if TBB is compiled with it: the installed version
+# is therefore built from Debian's source (with deb-src lists made from the machine's own, in the build folder).
+# tests/thread_sanitizer.supp lists the suppressions and their reasons; OpenVDB's library is not instrumented, and its
+# races are not reported.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${COVOL_JOBS:-$(nproc)}
@@ -37,9 +38,10 @@ fi
 
 cmake --preset tsan --log-level=WARNING
 cmake --build --preset tsan --parallel "$jobs"
-# Left out: after an exception out of std::call_once() the sanitizer's own pthread_once() waits for ever.
+# Left out: after an exception from std::call_once() the sanitizer's own pthread_once() waits forever.
 left_out='chunks: NaN is an error of who asks for its chunk'
-# Without address randomization, where that can be had: where it is wide, the sanitizer finds no place for its memory.
+# Without address randomization if possible: with many random bits the sanitizer may find no address range for its
+# memory.
 fixed=(setarch --addr-no-randomize)
 "${fixed[@]}" true 2> /dev/null || fixed=()
 TSAN_OPTIONS="suppressions=$PWD/tests/thread_sanitizer.supp ignore_noninstrumented_modules=1 second_deadlock_stack=1" \

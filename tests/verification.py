@@ -1,9 +1,9 @@
-"""covol against what is known without it: closed forms, convergence orders, the paper's shapes; writes docs/verification.md.
+"""Compares covol with independent results: closed forms, convergence orders, the paper's shapes; writes docs/verification.md.
 
     /usr/bin/python3 tests/verification.py --build build [--update-docs]
 
-Five minutes on two cores. With COVOL_DATA set to the folder of the larger phantoms the embryo is among them. Needs numpy
-and pyopenvdb, and tifffile for the embryo.
+Five minutes on two cores. If COVOL_DATA is set to the folder of the larger phantoms, the embryo is included. Needs numpy and
+pyopenvdb, and tifffile for the embryo.
 """
 import argparse
 import json
@@ -22,7 +22,7 @@ sys.path.insert(0, str(HERE / "bench"))
 from quality import read_vertices, shell_errors  # noqa: E402
 from tables import markdown, provenance  # noqa: E402
 
-SIDE = 2.6  # of the phantoms' cube
+SIDE = 2.6  # of the cube of the phantoms
 R, MAJOR, MINOR, BOX = 0.8, 0.75, 0.3, np.array((0.9, 0.7, 0.5))  # half sides of the box; lib/src/analysis/phantom.cpp
 
 
@@ -49,11 +49,11 @@ class Verification:
         return json.loads(done.stdout)
 
     def orders(self):
-        """Manufactured flows: a sphere that shrinks by its curvature, planes and spheres that run at unit speed."""
+        """Manufactured flows: a sphere that shrinks by its curvature, planes and spheres that move at unit speed."""
         rows = []
         for program in ("sphere_curvature_test", "advection_test"):
-            said = subprocess.run([self.tests / program], check=True, text=True, stdout=subprocess.PIPE).stdout
-            for line in said.splitlines():
+            output = subprocess.run([self.tests / program], check=True, text=True, stdout=subprocess.PIPE).stdout
+            for line in output.splitlines():
                 match = re.match(r"(.*?): .*? = ([\d.]+) h", line)
                 if not match:
                     continue
@@ -64,7 +64,7 @@ class Verification:
         return rows
 
     def distances(self):
-        """The distance of step 1 against the nearest of all points, by a loop. Sweeping hands points on from voxel to voxel: few voxels miss the nearest."""
+        """The distance of step 1 against brute force. Sweeps propagate points from voxel to voxel, so that few voxels miss their nearest point."""
         self.run("phantom", "torus", "--size", 16, "-o", "t.nrrd", "--points", "t.xyz", "--count", 3000)
         points, rows = np.loadtxt(self.work / "t.xyz"), []
         for size in (32, 64):
@@ -99,7 +99,7 @@ class Verification:
         return rows
 
     def holes(self):
-        """The paper's figure 4: spheres with six holes of three shapes, the points in the holes."""
+        """The paper's figure 4: spheres with six holes of three shapes, and points in the holes."""
         rows, size = [], 260
         for kind in ("sphere-round", "sphere-square", "sphere-slit"):
             self.run("phantom", kind, "--size", size, "--count", 3000, "-o", "h.nrrd", "--points", "h.xyz")
@@ -111,7 +111,7 @@ class Verification:
         return rows
 
     def embryo(self):
-        """The paper's two tissues, of the embryo phantom; overlap with the truth."""
+        """The paper's two tissues in the embryo phantom; overlap with the truth."""
         import tifffile
         data, rows = pathlib.Path(os.environ["COVOL_DATA"]) / "phantoms", []
         truth = tifffile.imread(data / "embryo_labels.tif")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The bricks of a plan as plain Slurm arrays, without Snakemake: a sweep starts when the one before is done.
+# The bricks of a plan as plain Slurm arrays, without Snakemake: a sweep starts after the one before.
 #
 #     bash houdini_free_examples/bricks/slurm_array.sh plan/ surface.vdb [SWEEPS]
 set -euo pipefail

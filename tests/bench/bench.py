@@ -1,8 +1,8 @@
 """Runs covol's benchmarks; tests/bench/run.sh builds what it needs and calls it. Standard library, numpy, matplotlib.
 
-What is compared is run in turns (A B A B), the best of the repetitions counts, and CPU time (user and system, all threads)
-stands beside the wall clock, so that a busy machine does not decide. Each part writes results/PART.csv; table.md and
-speed.png are made from all the .csv files that are there.
+Programs that are compared run in turns (A B A B), the best of the repetitions counts, and CPU time (user and system, all threads)
+is given beside the wall clock time, so that a busy machine does not affect the comparison. Each part writes results/PART.csv;
+table.md and speed.png are made from all existing .csv files.
 """
 import argparse
 import csv
@@ -51,7 +51,7 @@ class Run:
         self.cpu = usage.ru_utime + usage.ru_stime
 
     def _watch_memory(self, pid):
-        """The kernel's high-water mark. Not ru_maxrss: that one begins with the size of this process."""
+        """The kernel's high-water mark. Not ru_maxrss, which starts from the size of this process."""
         try:
             while True:
                 status = pathlib.Path(f"/proc/{pid}/status").read_text()
@@ -125,7 +125,7 @@ def benchmark_row(run, bandwidth, threads):
     row = {"ns_per_voxel": 1e9 * run["per_voxel"], "cpu_ns_per_voxel": 1e9 * cpu}
     if "bytes_per_voxel" in run:
         row["bytes_per_voxel"] = run["bytes_per_voxel"]
-        row["share_of_bandwidth"] = run["bytes_per_second"] / bandwidth[threads]
+        row["fraction_of_bandwidth"] = run["bytes_per_second"] / bandwidth[threads]
     return row
 
 
@@ -138,7 +138,7 @@ def part_kernels(bench):
     runs = google_benchmark(bench, "kernel/|stream/", 2 if bench.quick else 5, 0.02 if bench.quick else 0.05)
     bandwidth = measure_bandwidth(runs)
     rows = [{"kernel": "stream triad", "set": "", "where": "memory", "threads": threads,
-             "ns_per_voxel": 12e9 / bandwidth[threads], "bytes_per_voxel": 12, "share_of_bandwidth": 1.0,
+             "ns_per_voxel": 12e9 / bandwidth[threads], "bytes_per_voxel": 12, "fraction_of_bandwidth": 1.0,
              "gigabytes_per_second": 1e-9 * bandwidth[threads]} for threads in THREADS]
     for name, run in runs.items():
         if not name.startswith("kernel/"):
@@ -146,7 +146,7 @@ def part_kernels(bench):
         _, kernel, simd, where, threads = name.split("/")
         row = benchmark_row(run, bandwidth, int(threads))
         if where == "cache":
-            row.pop("share_of_bandwidth")
+            row.pop("fraction_of_bandwidth")
         rows.append({"kernel": kernel, "set": simd, "where": where, "threads": int(threads)} | row)
     rows[len(THREADS):] = sorted(rows[len(THREADS):], key=lambda r: (r["kernel"], r["where"], r["threads"], r["set"]))
     bench.write("kernels", rows)
@@ -160,7 +160,7 @@ def part_stages(bench):
     known = {"baseline": "", "avx2": "avx2", "avx512": "avx512f"}
     for simd in [name for name, flag in known.items() if flag in flags] + [""]:
         pattern = "stage/time_step|stream/" if simd else "stage/[^t]|stage/tag|stream/"
-        # The time step takes the best of several runs itself.
+        # The time step itself takes the best of several runs.
         runs = google_benchmark(bench, pattern, 1 if simd else repetitions, 0.05, **({"COVOL_SIMD": simd} if simd else {}))
         bandwidth = measure_bandwidth(runs)
         for name in sorted((n for n in runs if n.startswith("stage/")), key=lambda n: (n.split("/")[1], n)):
@@ -206,11 +206,11 @@ def part_sphere(bench):
             errors[name] = shell_errors(run.mesh, kind, voxel)
 
     covol_round(kinds)
-    # Of the start, from which all others go on the same lattice.
+    # The value at the start, which all other programs use on the same lattice.
     k = runs["covol, one level, tau = h", 1][0].report["edge"]["edge_k"]
     common = ("--image", image, "--radius", START_RADIUS, "--edge-k", k)
 
-    # The dense solver: to its own end in one octant, a few steps in the whole for the time of a step.
+    # The dense solver: until it is steady in one octant; in the whole cube only a few steps, for the time per step.
     dense = [bench.programs / "bench_dense", *common, "--points", points]
     octant_mesh = bench.work / "octant.ply"
     octant = Run([*dense, "--octant", 1, "--mesh", octant_mesh, "--max-steps", 20 if bench.quick else 500]).json()
@@ -267,7 +267,7 @@ def part_sphere(bench):
     bench.write("sphere", [{"image": f"{size}^3"} | row for row in rows])
 
 
-# The best for the shell of what was tried on this phantom at 260^3.
+# The best parameters for the shell among those tried on this phantom at 260^3.
 ITK = {"propagation": -0.03, "curvature": 1, "advection": 1}
 
 
@@ -314,7 +314,7 @@ def write_nrrd(path, values, spacing, origin):
 
 
 def torus_image(size):
-    """The phantom command's torus, 0 to 255."""
+    """The torus of covol phantom, with values from 0 to 255."""
     h = 2.6 / size
     x = h * (np.arange(size) + 0.5) - 1.3
     k, j, i = np.meshgrid(x, x, x, indexing="ij")
@@ -373,7 +373,7 @@ def part_embryo(bench):
     for (job, threads), done in runs.items():
         run = best(done)
         voxels = run.report["grid"]["active_voxels"]
-        held = run.peak - idle - (truth.size if image in jobs[job] else 0)  # the image has a byte a voxel
+        held = run.peak - idle - (truth.size if image in jobs[job] else 0)  # the image has one byte per voxel
         rows.append({"job": job, "threads": threads, "seconds": run.wall, "cpu_seconds": run.cpu, "dice": dices[job],
                      "active_voxels": voxels, "peak_mib": run.peak / 2**20,
                      "bytes_per_active_voxel_without_image_and_libraries": held / voxels} |
@@ -418,7 +418,7 @@ def write_tables(results):
 
 
 def summary(results):
-    """What docs/benchmarks.md shows."""
+    """The tables of docs/benchmarks.md."""
     blocks = []
     if found := read_results(results, "sphere"):
         machine, rows = found
@@ -432,7 +432,7 @@ def summary(results):
         machine, rows = found
         steps = [r for r in rows if r["stage"] == "time_step"]
         columns = {"set": "instruction set", "threads": "threads", "ns_per_voxel": "ns per active voxel",
-                   "cpu_ns_per_voxel": "CPU ns", "speedup": "speedup", "share_of_bandwidth": "share of bandwidth"}
+                   "cpu_ns_per_voxel": "CPU ns", "speedup": "speedup", "fraction_of_bandwidth": "fraction of bandwidth"}
         blocks += [f"One time step at delta/h = 5, tau = h, solved to 1e-3, 7 million active voxels ({machine}):", "",
                    markdown([{new: r[old] for old, new in columns.items()} for r in steps]), ""]
     if found := read_results(results, "curvature"):
@@ -465,7 +465,7 @@ def main():
     options = parser.parse_args()
     if options.results is None:
         options.results = pathlib.Path(options.build) / "quick" if options.quick else HERE / "results"
-    provenance()  # with the load before the first part
+    provenance()  # with the machine's load before the first part
     chosen = [part for part in options.only.split(",") if part]
     for part in chosen:
         if part not in PARTS:

@@ -43,7 +43,7 @@ def make_ball(folder, size, radius):
 
 
 def row_of(runs, voxels, **facts):
-    """Of commands that follow each other."""
+    """The sum over commands that run one after the other."""
     return facts | {"seconds": sum(run.wall for run in runs), "cpu_seconds": sum(run.cpu for run in runs),
                     "peak_mib": max(run.peak for run in runs) / 2**20, "active_voxels": voxels}
 
@@ -54,7 +54,7 @@ class Jobs(Bench):
         return row_of([run], run.report["grid"]["active_voxels"], bricks=1, **facts)
 
     def plan(self, image, marks, brick_voxels):
-        """@return run, number of bricks, voxels of their band"""
+        """@return run, number of bricks, number of voxels in their band"""
         folder = self.work / "plan"
         shutil.rmtree(folder, ignore_errors=True)
         run = Run([self.covol, "brick", "plan", "segment", image, "--points", marks, "--model", "paper", "--brick-voxels",
@@ -69,7 +69,7 @@ class Jobs(Bench):
         return row_of([planned, solved, joined], voxels, bricks=count, **facts)
 
     def in_slots(self, slots):
-        """Bricks that are planned already, by Snakemake, a thread each. The peak is that of a job."""
+        """Runs bricks that are already planned by Snakemake, with one thread each. The peak is that of one job."""
         folder, joined = self.work / "run", self.work / "by_slots.vdb"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(self.work / "plan", folder)

@@ -3,8 +3,8 @@
 
 namespace covol::bench {
 
-/// per_voxel (time), and where the bytes that have to come from and go to memory are known, bytes_per_voxel and
-/// bytes_per_second. @param voxels  of one iteration
+/// per_voxel (time), and, if the memory traffic is known, bytes_per_voxel and bytes_per_second. @param voxels  in one
+/// iteration
 inline void count_voxels(benchmark::State& state, double voxels, double bytes_per_voxel = 0) {
     using benchmark::Counter;
     state.counters["voxels"] = voxels;

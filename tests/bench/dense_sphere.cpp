@@ -1,12 +1,12 @@
 // A plain dense solver of covol's scheme in double precision, one thread, on every voxel of the image: the tests'
-// reference (support/dense_reference.h), with covol's stop rule. What covol is compared with.
+// reference (support/dense_reference.h), with covol's stop rule. Benchmarks compare covol with it.
 //
 //   bench_dense --image I.nrrd --points P.xyz --radius R --edge-k K [--sigma V --delta V --tau V --range V]
 //               [--octant 1] [--steps N | --max-steps N] [--mesh OUT.ply]
 //
 // The start is the signed distance to the sphere of radius R around the origin, clamped to 3 voxels. V is in voxels.
-// --steps N makes N steps and leaves the stop rule aside. --octant 1 solves in the octant x, y, z > 0 alone, an eighth
-// of the work: the shapes are symmetric, and the domain's boundary mirrors. One line of JSON goes to stdout.
+// --steps N makes N steps without the stop rule. --octant 1 solves only in the octant x, y, z > 0, an eighth of the
+// work: the shapes are symmetric, and values are mirrored at the domain's boundary. One line of JSON goes to stdout.
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -63,21 +63,21 @@ Problem make_problem(const bench::Arguments& arguments) {
     const double sigma = h * arguments.number("sigma", 1), time = 0.5 * sigma * sigma;
     test::dense_heat(p.edge, time, std::max(1, int(std::ceil(time / (0.5 * h * h) - 1e-9))));
     p.edge = test::dense_edge(p.edge, arguments.number("edge-k"));
-    // Beyond the range the points' potential is constant, so the tube's background serves there.
+    // Beyond the range the points' potential is constant, so that the tube's background value can be used there.
     const auto points = read_points(arguments.text("points")).points;
     p.distance =
         test::to_dense(p.domain, *compute_distance(points, p.domain, {p.options.attraction_range + 2 * h}).grid);
     return p;
 }
 
-/// As covol's: the mean way of the zero crossings along voxel edges in a step, voxels; and over ten steps the voxels
-/// that changed sign, per area of the surface.
+/// The same as covol's: the mean motion of the zero crossings along voxel edges in a step, in voxels; and over ten
+/// steps the number of voxels that changed sign per area of the surface.
 class StopRule {
 public:
     explicit StopRule(double tolerance) : tolerance_(tolerance) {}
 
     bool is_steady(const DenseField& now, const DenseField& before, double tau_in_voxels) {
-        const double motion = std::min(mean_way(now, before), net_motion(now));
+        const double motion = std::min(mean_motion(now, before), net_motion(now));
         last_ = motion;
         return motion < tolerance_ * tau_in_voxels;
     }
@@ -86,7 +86,7 @@ public:
 private:
     static double crossing(double a, double b) { return a / (a - b); }
 
-    double mean_way(const DenseField& now, const DenseField& before) {
+    double mean_motion(const DenseField& now, const DenseField& before) {
         const std::ptrdiff_t steps[3] = {step_to(now, 1, 0, 0), step_to(now, 0, 1, 0), step_to(now, 0, 0, 1)};
         double way = 0;
         edges_ = 0;

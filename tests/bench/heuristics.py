@@ -12,13 +12,13 @@ FIELD = re.compile(r"((?:    ///[^\n]*\n)*)    ([\w:]+) (\w+) =\s*heuristic\(\"(
 class Heuristic:
     name: str      # step.field
     value: float
-    text: str      # the value as it stands in the header
+    text: str      # the value as written in the header
     is_count: bool
     unit: str
     meaning: str
     folder: str
-    step: str      # what the struct's comment says
-    problem: str   # with how it is written; empty: none
+    step: str      # the comment of the struct
+    problem: str   # with the declaration; empty: none
 
     def scaled(self, factor):
         return max(1, int(self.value * factor + 0.5)) if self.is_count else self.value * factor

@@ -1,10 +1,10 @@
-"""Whole jobs, files to files, by two builds of covol in turns: how many times faster, and whether the surface is the same.
+"""Whole jobs, files to files, by two builds of covol in turns: the speed-up, and whether the surface is the same.
 
     /usr/bin/python3 tests/bench/jobs.py --before OTHER/bin/covol --after BUILD/bin/covol [--data FOLDER] [--repeat 3] [--only a,b]
 
-A, B, A, B, ...: of each the repetition with the least processor time counts. Surfaces are compared as level sets where both
-are within a voxel of zero. Without --data (COVOL_DATA's layout) only the jobs that make their own input run. Standard library
-and numpy; a program of a build that was moved finds its library by `--before-library FOLDER`.
+A, B, A, B, ...: of each build the repetition with the minimum processor time counts. Surfaces are compared as level sets at voxels
+where both are within a voxel of zero. Without --data (COVOL_DATA's layout) only the jobs that make their own input run. Standard
+library and numpy; `--before-library FOLDER` is the folder of the library if that build was moved.
 """
 import argparse
 import gzip
@@ -33,7 +33,7 @@ def read_nifti_mask(path):
 
 
 def write_marks_on(mask, count, path):
-    """Marks drawn at random from the faces between a mask's voxels and others, in voxels of the image."""
+    """Random marks on the faces between a mask's voxels and others, in voxels of the image."""
     rng = np.random.default_rng(count)
     faces = []
     for axis in range(3):
@@ -46,7 +46,7 @@ def write_marks_on(mask, count, path):
 
 
 def write_noisy_torus(path, count):
-    """Points on a knotted tube, noise of 0.2 % of its size."""
+    """Points on a knotted tube, with noise of 0.2 % of its size."""
     rng = np.random.default_rng(1)
     t, s = rng.uniform(0, 2 * np.pi, (2, count))
     ring = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], 1)
@@ -63,7 +63,7 @@ def write_noisy_torus(path, count):
 
 
 def jobs(run, work, data):
-    """(name, words of the command without its output)"""
+    """(name, arguments of the command without its output)"""
     run("phantom", "sphere-round", "--size", 260, "-o", work / "holes.nrrd", "--points", work / "holes.xyz")
     holes = ["segment", work / "holes.nrrd", "--points", work / "holes.xyz", "--init", "sphere:0,0,0,0.95", "--attraction-range", "5vx"]
     yield "six-hole sphere", [*holes, "--delta", "1vx"]
@@ -92,7 +92,7 @@ class Program:
         self.environment = os.environ | ({"LD_LIBRARY_PATH": str(library.resolve())} if library else {})
 
     def run(self, *words):
-        """@return seconds of the processor, report"""
+        """@return CPU seconds, report"""
         with tempfile.NamedTemporaryFile(suffix=".json") as report:
             child = subprocess.Popen([self.path, *map(str, words), "--quiet", *(["--json", report.name] if words[0] != "phantom" else [])],
                                      env=self.environment, stdout=subprocess.DEVNULL)
@@ -105,7 +105,7 @@ class Program:
 
 
 def apart(first, second):
-    """Of two level sets' values within a voxel of zero: mean and largest difference, voxels."""
+    """Mean and largest difference of the values of two level sets within a voxel of zero, in voxels."""
     import pyopenvdb
     grids = [pyopenvdb.read(str(path), "surface") for path in (first, second)]
     h = grids[0].transform.voxelSize()[0]

@@ -1,5 +1,5 @@
 // The kernels on leaves, on every instruction set of this processor: in cache (8 leaves) and out of it (24^3 leaves, 7
-// million voxels), with the copying into padded buffers that a step does. Names are kernel/set/where/threads.
+// million voxels), including the copying into padded buffers as in a step. Names are kernel/set/where/threads.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -24,7 +24,7 @@ constexpr int kSmallSide = 2, kLargeSide = 24;  // leaves
 constexpr unsigned long long kAll = ~0ULL;
 constexpr std::array<unsigned long long, 8> kEveryVoxel = {kAll, kAll, kAll, kAll, kAll, kAll, kAll, kAll};
 
-/// A cube of leaves with every field of a step: u is a distance with ripples.
+/// A cube of leaves with all fields of a step: u is a distance with ripples.
 struct Cube {
     LeafBand band;
     HaloField u, phi, edge;
@@ -65,7 +65,7 @@ struct Cube {
     [[nodiscard]] Fraction* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
 };
 
-/// Made once: what a kernel takes does not depend on the values that others left.
+/// Created once: the time of a kernel does not depend on the values left by previous kernels.
 Cube& cube_of(int side) {
     static Cube small(kSmallSide), large(kLargeSide);
     return side == kSmallSide ? small : large;
@@ -92,7 +92,7 @@ void assemble(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
 
 template <int inner>
 void relax(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
-    // also returns the residual that the first sweep saw
+    // also returns the residual at the first sweep
     benchmark::DoNotOptimize(kernels.relax(star_of(cube.u, leaf), cube.previous.leaf(leaf), cube.rows_of(leaf),
                                            kEveryVoxel.data(), 1.5F, inner, {}));
 }
@@ -114,7 +114,7 @@ void motion(const SchemeKernels&, Cube& cube, std::size_t leaf) {
 struct Kernel {
     const char* name;
     void (*run)(const SchemeKernels&, Cube&, std::size_t leaf);
-    double bytes;  // read and written for a voxel, once each
+    double bytes;  // read and written per voxel, each of them once
 };
 
 constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Fraction);
@@ -125,7 +125,7 @@ constexpr Kernel kKernels[] = {
     {"mean_gradient", mean_gradient, 2 * kFloat},        {"motion", motion, 2 * kFloat},
 };
 
-/// Two colours as in a step, so that no leaf reads what another thread writes.
+/// Two colours, as in a step, so that no leaf reads what another thread writes.
 void run_on(benchmark::State& state, const Kernel& kernel, const SchemeKernels& set, int side, int threads) {
     Cube& cube = cube_of(side);
     tbb::task_arena arena(threads);

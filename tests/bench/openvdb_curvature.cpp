@@ -77,7 +77,7 @@ nlohmann::json to_json(const Outcome& outcome, double start, int steps, double s
             {"active_voxels", outcome.voxels},
             {"radius_error", outcome.radius - exact},
             {"radius_moved", start - exact},
-            // to shrink r² by 4 h², what one step of covol does
+            // to shrink r² by 4 h², as one step of covol does
             {"seconds_per_unit", 1e-9 * outcome.ns * outcome.voxels * 4 / shrinkage}};
 }
 

@@ -1,7 +1,7 @@
-"""How far a mesh of the sphere with six holes lies from the truth, in voxels of the image.
+"""The error of a mesh of the sphere with six holes, in voxels of the image.
 
-Between the holes the truth is the shell's outer edge, in them the sphere that the points are on. Vertices close to the rims,
-where neither holds, are left out. Geometry: lib/src/analysis/phantom.cpp.
+Between the holes the truth is the shell's outer edge, in the holes the sphere of the points. Vertices close to the rims, where
+neither applies, are left out. Geometry: lib/src/analysis/phantom.cpp.
 """
 import numpy as np
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Builds covol with its benchmarks, runs them, and writes tables (.csv, table.md) and speed.png into tests/bench/results.
+# Builds covol with its benchmarks, runs them, and writes tables (.csv, table.md) and speed.png into
+# tests/bench/results.
 #
 #   bash tests/bench/run.sh [--quick] [--only PART,PART...] [--update-docs] ...     (--help lists the parts)
 #
-# The whole of it takes about a quarter of an hour on two idle cores; --quick about three minutes, for a look at the
-# machinery. Set COVOL_DATA to also run the jobs on larger data.
+# Everything takes about a quarter of an hour on two idle cores; --quick, a test of the scripts, about three minutes.
+# Set COVOL_DATA to also run the jobs on larger data.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -1,9 +1,9 @@
-"""Whether two builds of covol give the same bits: every job runs with both, and every file that it writes is compared.
+"""Whether two builds of covol give identical results: every job runs with both, and every file that it writes is compared.
 
     /usr/bin/python3 tests/bench/same_bits.py BEFORE/bin/covol AFTER/bin/covol [--only PART] [--work FOLDER]
 
-In a .vdb the random UUID of its header does not count, in a report the times, the memory and the program's version. What a job
-prints counts without its times. Exit code 1: something differs.
+Ignored are the random UUID in the header of a .vdb, and times, memory and the program's version in a report. The printed output is
+compared without its times. Exit code 1: something differs.
 """
 import argparse
 import json
@@ -21,7 +21,7 @@ import tifffile
 SIZE, H = 48, 0.5
 ORIGIN = -H * (SIZE - 1) / 2
 
-# Files are made by make_inputs(); each job runs in a folder of its own, beside theirs. A job may use what jobs before it wrote.
+# Files are made by make_inputs(); each job runs in a folder of its own, next to theirs. A job may use the outputs of previous jobs.
 JOBS = """
 phantom_torus      phantom torus --size 48 -o i.nrrd --points p.xyz --labels t.nrrd
 phantom_round      phantom sphere-round --size 64 -o i.nii.gz --points p.ply
@@ -183,9 +183,9 @@ def content(path):
 
 
 def run(covol, folder, arguments):
-    """{file: what counts of it}, with what was printed and the exit code."""
+    """{file: its content as far as it is compared}, with the printed output and the exit code."""
     folder.mkdir(parents=True)
-    own = os.environ | {"LD_LIBRARY_PATH": str(covol.parent.parent / "lib")}  # a copied build finds its own library
+    own = os.environ | {"LD_LIBRARY_PATH": str(covol.parent.parent / "lib")}  # a build that was copied finds its own library
     done = subprocess.run([covol, *shlex.split(arguments), "--threads", "2"], cwd=folder, capture_output=True, text=True, env=own)
     printed = re.sub(r"[\d.]+ (s|GB|MB|GiB|MiB)\b", "", done.stdout + done.stderr)
     found = {path.name: content(path) for path in sorted(folder.iterdir())}
@@ -201,7 +201,7 @@ def main():
     options = parser.parse_args()
     jobs = dict(line.split(None, 1) for line in JOBS.strip().splitlines())
     chosen = [name for name in jobs if options.only in name]
-    for name in chosen:  # grows
+    for name in chosen:  # grows meanwhile
         chosen += [need for need in re.findall(r"\.\./(\w+)/", jobs[name]) if need in jobs and need not in chosen]
     work = pathlib.Path(options.work or tempfile.mkdtemp(prefix="covol_bits_")).resolve()
     differ, failed = [], []

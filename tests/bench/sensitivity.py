@@ -1,11 +1,11 @@
-"""What happens at half and at twice each heuristic constant: docs/heuristics.md.
+"""Measures the effect of halving and doubling each heuristic constant: docs/heuristics.md.
 
     cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
     cmake --build build-sensitivity
     nice /usr/bin/python3 tests/bench/sensitivity.py build-sensitivity/bin/covol [--only STEP ...] [--minutes N]
 
-Each constant is scaled (COVOL_SCALE="step.name=0.5") in the jobs that exercise its step (sensitivity_jobs.py). Rows go to the CSV
-as they are made, and what is there is not run again. `--table` runs nothing: it writes the page from the CSV.
+Each constant is scaled (COVOL_SCALE="step.name=0.5") in the jobs that exercise its step (sensitivity_jobs.py). Rows are appended
+to the CSV at once, and rows that are there are not computed again. `--table` runs no jobs: it writes the page from the CSV.
 """
 import argparse
 import collections
@@ -27,9 +27,9 @@ from heuristics import SOURCE, read_heuristics
 
 CSV, PAGE = SOURCE / "tests/bench/results/heuristics.csv", SOURCE / "docs/heuristics.md"
 COLUMNS = ["name", "value", "factor", "job", "state", "error", "seconds"]
-MOST_SECONDS = 20  # of processor time
+MAX_SECONDS = 20  # of processor time
 CHECK = "local_fit.first_spacings=2"  # changes every cloud
-ABOVE, POINTS, FAIL = 0.1, 0.1, 3  # sensitive: an error that grows by a tenth of itself, and by so many points; fails: threefold, and by 1
+ABOVE, POINTS, FAIL = 0.1, 0.1, 3  # sensitive: an error that grows by a tenth of itself, and by POINTS percentage points; fails: threefold, and by 1
 
 
 # ---- running --------------------------------------------------------------------------------------------------------------
@@ -44,13 +44,13 @@ class Runner:
         jobs.make_inputs(work / "in", self.covol)
 
     def run(self, job, scale):
-        """(state, error, seconds, digest); what is the same as without a scale is not measured again."""
+        """(state, error, seconds, digest); a result that is identical to the one without scaling is not measured again."""
         out = pathlib.Path(tempfile.mkdtemp(dir=self.work))
         begin = time.monotonic()
         try:
             done = subprocess.run([self.covol, *jobs.arguments_of(job), "--threads", "1", "--quiet"], cwd=out, capture_output=True, text=True,
-                                  timeout=10 * MOST_SECONDS, env=self.environment | {"COVOL_SCALE": scale},
-                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS)))
+                                  timeout=10 * MAX_SECONDS, env=self.environment | {"COVOL_SCALE": scale},
+                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS)))
             code = done.returncode
         except subprocess.TimeoutExpired:
             code = -9
@@ -67,7 +67,7 @@ class Runner:
         finally:
             shutil.rmtree(out)
 
-    def learn(self, job):
+    def baseline(self, job):
         if job not in self.known:
             self.known[job] = self.run(job, "")
         return self.known[job]
@@ -76,7 +76,7 @@ class Runner:
 def measure(options):
     work = pathlib.Path(tempfile.mkdtemp(prefix="covol_sensitivity_"))
     runner = Runner(options.covol, work)
-    if runner.learn("torus")[3] == runner.run("torus", CHECK)[3]:
+    if runner.baseline("torus")[3] == runner.run("torus", CHECK)[3]:
         raise SystemExit(f"{options.covol}: COVOL_SCALE changes nothing; expected a build with -DCOVOL_SENSITIVITY=ON")
     there = {(row["name"], float(row["factor"]), row["job"]) for row in read_rows(options.csv)}
     heuristics = collections.defaultdict(list)
@@ -84,7 +84,7 @@ def measure(options):
         heuristics[h.name.split(".")[0]].append(h)
     for step in set(options.only or []) - set(jobs.PLAN):
         raise SystemExit(f"--only {step}: expected one of {', '.join(jobs.PLAN)}")
-    tasks = []  # the first job of every constant, then the second ones: what time allows is spread over all
+    tasks = []  # first job of every constant, then the second ones, so that limited time is spread over all
     for turn in range(max(len(names) for names in jobs.PLAN.values())):
         for step, names in jobs.PLAN.items():
             if turn < len(names) and (not options.only or step in options.only):
@@ -103,7 +103,7 @@ def measure(options):
             name, text, factor, job = task
             if time.monotonic() > end:
                 return None
-            as_is = runner.learn(job)
+            as_is = runner.baseline(job)
             state, error, seconds, _ = as_is if not name else runner.run(job, f"{name}={factor}")
             return [name, text, factor, job, state, "" if error is None else f"{error:.4f}", f"{seconds:.2f}"]
 
@@ -127,12 +127,12 @@ def number(error):
 
 
 class Measured:
-    """Of one constant: {factor: {job: error, None where it failed}}, and without it."""
+    """Of one constant: {factor: {job: error, None if it failed}}, and the errors without scaling."""
     def __init__(self, rows, as_is, constant):
         self.constant, self.same = constant, True
         self.errors = collections.defaultdict(dict)
         for row in rows:
-            if row["job"] in as_is:  # a job that fails as it is tells nothing
+            if row["job"] in as_is:  # without a baseline there is nothing to compare
                 self.errors[float(row["factor"])][row["job"]] = float(row["error"]) if row["error"] else None
                 self.same &= row["state"] == "same"
         self.as_is = {job: as_is[job] for found in self.errors.values() for job in found}
@@ -142,12 +142,12 @@ class Measured:
         return number(statistics.median([float("inf") if e is None else e for e in found.values()])).replace("inf", "fails") if found else "="
 
     def worst(self):
-        """(growth in points, job, factor, error)"""
+        """(growth in percentage points, job, factor, error)"""
         grown = [(float("inf") if error is None else error - self.as_is[job], job, factor, error)
                  for factor, found in self.errors.items() for job, error in found.items()]
         return max(grown, key=lambda g: g[0]) if grown else None
 
-    def word(self):
+    def rating(self):
         if not self.errors:
             return "not run"
         if self.same:
@@ -165,7 +165,7 @@ class Measured:
     def row(self):
         h, worst = self.constant, self.worst()
         where = "" if self.same or not worst or worst[0] < 0.005 else f"{worst[1]}, {'half' if worst[2] < 1 else 'twice'}: {number(self.as_is[worst[1]])} → {number(worst[3])}"
-        cells = [f"`{h.name}`", h.text, h.unit, h.meaning, str(len(self.as_is) or "")] + ([self.median(1), self.median(0.5), self.median(2)] if self.errors else ["", "", ""]) + [where, self.word()]
+        cells = [f"`{h.name}`", h.text, h.unit, h.meaning, str(len(self.as_is) or "")] + ([self.median(1), self.median(0.5), self.median(2)] if self.errors else ["", "", ""]) + [where, self.rating()]
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -175,11 +175,11 @@ def write_page(path, rows):
     for row in rows:
         by_name[row["name"]].append(row)
     found = [Measured([row for row in by_name[h.name] if row["value"] == h.text], as_is, h) for h in read_heuristics()]
-    words = collections.Counter(m.word().strip("*") for m in found)
-    told = ", ".join(f"{words[word]} {word}" for word in ("fails", "sensitive", "flat", "no effect", "not run") if words[word])
+    ratings = collections.Counter(m.rating().strip("*") for m in found)
+    summary = ", ".join(f"{ratings[rating]} {rating}" for rating in ("fails", "sensitive", "flat", "no effect", "not run") if ratings[rating])
     text = f"""# Heuristic constants
 
-Thresholds, factors and counts that were chosen by judgement or measurement and change results. Each stands in `heuristics.h` of its folder of `lib/src`, one struct for each step, with unit and meaning; this page is written from there and from measurements, by [`tests/bench/sensitivity.py`](../tests/bench/sensitivity.py):
+Thresholds, factors and counts that were chosen by judgement or measurement and that affect results. Each constant is defined in the `heuristics.h` of its folder of `lib/src`, in one struct for each step, with its unit and meaning. This page is generated from these files and from measurements by [`tests/bench/sensitivity.py`](../tests/bench/sensitivity.py):
 
 ```
 cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
@@ -187,13 +187,13 @@ cmake --build build-sensitivity
 nice /usr/bin/python3 tests/bench/sensitivity.py build-sensitivity/bin/covol
 ```
 
-Such a build multiplies each constant by what the environment says, `COVOL_SCALE="stray.far=2"`. Every constant is halved and doubled in the jobs that exercise its step ([`sensitivity_jobs.py`](../tests/bench/sensitivity_jobs.py)): clouds of 3,000 points of a ball with spikes, a torus, a thin plate and two balls close to each other, with noise, outliers and holes, scans of one side, and phantoms of 44³ voxels with marks. The error of a cloud is the mean distance between surface and truth, both ways, in % of the shape's half length; of a phantom 1 − Dice in %. The columns are the number of jobs and medians over them, as it is, at half and at twice; `=` where a count stays what it is. Then the job whose error grows most, and a word:
+Such a build multiplies constants by the factors in the environment variable `COVOL_SCALE`, for example `COVOL_SCALE="stray.far=2"`. Every constant is halved and doubled in the jobs that exercise its step ([`sensitivity_jobs.py`](../tests/bench/sensitivity_jobs.py)): clouds of 3,000 points of a ball with spikes, a torus, a thin plate and two balls close to each other, with noise, outliers and holes; scans from one side; and phantoms of 44³ voxels with marks. The error of a cloud is the mean distance between surface and truth, in both directions, in % of the shape's half length; the error of a phantom is 1 − Dice in %. The columns give the number of jobs and the median errors with the constant as it is, halved and doubled; `=` means that a count does not change. They are followed by the job whose error grows most, and by a rating:
 
-- **fails**: a job ends with an error or takes more than {MOST_SECONDS} s of processor time, or its error is more than threefold and grows by more than a point;
-- **sensitive**: an error grows by more than a tenth of itself, and by more than {POINTS} points;
-- flat: none does; no effect: all meshes of clouds and masks of phantoms keep their bits, on the jobs that were run; not run: run the command again, it goes on where it ended.
+- **fails**: a job ends with an error or takes more than {MAX_SECONDS} s of processor time, or its error grows to more than three times its value and by more than one percentage point;
+- **sensitive**: an error grows by more than a tenth of its value, and by more than {POINTS} percentage points;
+- flat: none of these; no effect: all meshes of clouds and masks of phantoms are identical, bit by bit, in the jobs that were run; not run: run the command again, which continues where it ended.
 
-{len(found)} constants: {told}. A cosine or a share that is doubled past 1 says never or always. Sizes, formats, and tolerances of solvers are no heuristics and stand where they are used.
+{len(found)} constants: {summary}. A cosine or a fraction that is doubled to more than 1 makes its condition hold always or never. Sizes, formats and tolerances of solvers are not heuristics and are defined where they are used.
 """
     folder = step = None
     for m in found:
@@ -205,8 +205,8 @@ Such a build multiplies each constant by what the environment says, `COVOL_SCALE
             text += f"\n{step}\n\n| constant | value | unit | meaning | jobs | as is | half | twice | worst | |\n|---|---|---|---|---|---|---|---|---|---|\n"
         text += m.row() + "\n"
     path.write_text(text)
-    for word in ("**fails**", "**sensitive**", "no effect"):
-        print(word.strip("*") + ":", ", ".join(m.constant.name for m in found if m.word() == word))
+    for rating in ("**fails**", "**sensitive**", "no effect"):
+        print(rating.strip("*") + ":", ", ".join(m.constant.name for m in found if m.rating() == rating))
 
 
 def main():

@@ -1,4 +1,4 @@
-"""What sensitivity.py runs: clouds and phantoms of known truth, each job of about a second, and the error of its result."""
+"""The jobs of sensitivity.py: clouds and phantoms with known truth, each of about a second, and the error of their results."""
 import os
 import pathlib
 import shlex
@@ -59,7 +59,7 @@ def normals_at(f, p, step=1e-4):
 
 
 def on_surface(f, count, random):
-    """Points uniform by area, and their spacing: places in a thin shell, moved onto f = 0."""
+    """Points uniform by area, and their spacing: random positions in a thin shell, projected onto f = 0."""
     p = random.uniform(-1.6, 1.6, (600_000, 3))
     width = 0.03
     p = p[np.abs(f(p)) < width]
@@ -137,7 +137,7 @@ def cloud_error(folder, out, shape, part=None):
     """Mean distance of the mesh from the shape, and of the shape from the mesh beyond 0.05, in % of the shape's half length."""
     vertices = mesh_vertices(out / "s.ply")
     truth = np.load(folder / f"{shape}.npy")
-    if part is not None:  # of an open surface: what the points show
+    if part is not None:  # of an open surface, only the part with points
         truth = truth[cKDTree(part).query(truth)[0] < 0.05]
         vertices = vertices[cKDTree(part).query(vertices)[0] < 0.2]
     missing = np.maximum(0, cKDTree(vertices).query(truth)[0] - 0.05)
@@ -187,7 +187,7 @@ def mask_error(folder, out, name):
 
 # ---- structures of real images: with COVOL_DATA ----------------------------------------------------------------------------
 
-# Those of the second row gave no constant its value; the draws of marks are others than those that did.
+# The structures of the second row were not used to choose constants; the draws of marks differ from those that were.
 REAL = ("spinal cord", "ventricle", "left atrium", "hippocampus", "worm nucleus 59", "embryo nucleus 2",
         "caudate, right", "vertebra", "hippocampus, posterior", "mouse nucleus 395", "hippocampus 2", "thalamus")
 REAL_COUNTS = (60, 20)
@@ -199,7 +199,7 @@ def real_name(structure, count):
 
 
 def make_real(folder):
-    """Marks and truths; what a job needs of the image is added to JOBS."""
+    """Marks and truths; options that a job needs for its image are added to JOBS."""
     import annotator
     import truth
     data = os.environ["COVOL_DATA"]
@@ -278,7 +278,7 @@ REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] i
 TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere"]
 GUESSED = ["m round", "m torus", "m two"]
 FLOWS = ["m paper", "m init", "m grow"]
-PLAN = {  # step: the jobs that exercise it, the most telling first
+PLAN = {  # step: the jobs that exercise it, the most informative one first
     "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "filled": CLOUDS, "indicator": CLOUDS, "winding_field": CLOUDS,
     "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "iteration": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
     "tagging": TAGGED, "closing": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],

@@ -68,9 +68,9 @@ struct Scene {
     }
 };
 
-/// All leaves stay awake: nothing counts as at rest. Two runs that differ in their number of steps leave out what comes
-/// before and after; of both the fastest of several counts, for a slow one among the short runs would make steps cheap.
-/// @param solved_to  residual, relative to that of u before
+/// All leaves stay active, since the tolerance is 0. The difference of two runs with different numbers of steps
+/// excludes setup and output; of each the fastest of several repetitions counts, because a slow short run would make
+/// steps appear cheap. @param solved_to  residual, relative to that of the u before
 void time_step(benchmark::State& state, double solved_to) {
     const Scene& scene = Scene::get();
     EvolveOptions options;
@@ -109,11 +109,12 @@ void time_step(benchmark::State& state, double solved_to) {
     constexpr int kSteps = kManySteps - kFewSteps;
     const double voxels = double(many.active_voxels), leaf_voxels = 512.0 * double(many.leaf_count);
     const double visits = double(many.leaf_visits - few.leaf_visits) / double(many.leaf_count) / kSteps;
-    // Each once: assembly reads u, u before, phi and edge and writes the guess and six rows; a visit reads u, u before
-    // and the rows and writes u; the motion reads u and u before.
+    // Each value once: assembly reads u, u before, phi and edge and writes the first estimate and six rows; a visit
+    // reads u, u before and the rows and writes u; measuring the motion reads u and u before.
     const double bytes = (4 * 4 + 4 + 12) + visits * (4 + 4 + 12 + 4) + 4 * 2;
     count_voxels(state, voxels * kSteps, bytes * leaf_voxels / voxels);
-    state.counters["cpu_per_voxel"] = cpu / voxels / kSteps;  // the benchmark's own would count both runs whole
+    state.counters["cpu_per_voxel"] =
+        cpu / voxels / kSteps;  // the benchmark library's own counter would include both runs completely
     state.counters["visits"] = visits;
     state.counters["leaf_fill"] = voxels / leaf_voxels;
     state.counters["ns_assembly"] = 1e9 * (many.seconds_assembly - few.seconds_assembly) / voxels / kSteps;

@@ -5,7 +5,7 @@
 
 namespace covol::bench {
 
-/// Seconds since it was made, by the wall's clock and of user and system time of all threads.
+/// Seconds since construction: wall clock, and user and system time of all threads.
 class Stopwatch {
 public:
     [[nodiscard]] double wall() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }

@@ -3,8 +3,8 @@
 
 namespace covol::bench {
 
-/// The machine's memory bandwidth on that many threads: a = b + s c on arrays far larger than the caches (STREAM's
-/// triad, 12 bytes for each float; what a store reads before it writes is not counted, there nor in the kernels).
+/// The machine's memory bandwidth with that many threads: a = b + s c on arrays much larger than the caches (STREAM's
+/// triad, 12 bytes for each float; reads caused by write-allocation are not counted, neither here nor in the kernels).
 void triad(benchmark::State& state, int threads);
 
 }  // namespace covol::bench

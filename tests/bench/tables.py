@@ -1,4 +1,4 @@
-"""Tables in Markdown, and the line above them that says when, where and of which covol they are."""
+"""Tables in Markdown, and the line above them that states when, where and with which covol they were made."""
 import datetime
 import functools
 import os

@@ -1,5 +1,5 @@
-"""Level set, mesh and label image of one run lie on each other, and on the truth, in the world of a rotated image with
-anisotropic voxels; other programs read the level set.
+"""Level set, mesh and label image of one run coincide, also with the truth, in the world of a rotated image with anisotropic
+voxels; other programs read the level set.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/alignment_test.py
 """
@@ -30,7 +30,7 @@ H = min(SPACING)
 
 
 def rotation():
-    """Turned about z by 25 degrees, then about x by -40: no axis stays."""
+    """Rotated about z by 25 degrees, then about x by -40, so that every axis changes."""
     a, b = math.radians(25), math.radians(-40)
     about_z = np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
     about_x = np.array([[1, 0, 0], [0, math.cos(b), -math.sin(b)], [0, math.sin(b), math.cos(b)]])
@@ -59,7 +59,7 @@ def read_vertices(path):
 
 
 def sample(grid, positions):
-    """The grid's values at world positions, trilinear."""
+    """Values of the grid at world positions, by trilinear interpolation."""
     values, accessor = [], grid.getConstAccessor()
     for position in positions:
         index = np.array(grid.transform.worldToIndex(tuple(position)))
@@ -136,9 +136,9 @@ class Alignment(unittest.TestCase):
     def test_vdb_print(self):
         if not shutil.which("vdb_print"):
             self.skipTest("SKIPPED: there is no vdb_print; see tests/install_packages.sh")
-        said = subprocess.run(["vdb_print", "-l", "s.vdb"], check=True, capture_output=True, text=True, cwd=self.out).stdout
+        output = subprocess.run(["vdb_print", "-l", "s.vdb"], check=True, capture_output=True, text=True, cwd=self.out).stdout
         for word in ("surface", "level set", "covol_version", "voxel size: 0.4"):
-            self.assertIn(word, said)
+            self.assertIn(word, output)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""axe-core on a page in a browser: `npm ci` in tools/viewer brings it; without it such tests are skipped."""
+"""Runs axe-core on a page in a browser: `npm ci` in tools/viewer installs it; without it these tests are skipped."""
 import pathlib
 
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "tools" / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
@@ -6,7 +6,7 @@ MISSING = None if SCRIPT.exists() else "SKIPPED: axe-core is not there: npm ci i
 
 
 def serious_faults(driver):
-    """What axe-core calls serious or critical: its rule and the elements."""
+    """The violations that axe-core rates as serious or critical: rule and elements."""
     driver.execute_script(SCRIPT.read_text())
     return driver.execute_async_script("""
         const done = arguments[arguments.length - 1];

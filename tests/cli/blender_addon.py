@@ -1,9 +1,9 @@
-"""Runs inside Blender: installs the add-on from its zip, segments from an empty's children and from a mesh's vertices, and again;
-then a time-lapse.
+"""Runs inside Blender: installs the add-on from its zip, segments with the children of an empty as marks and with the vertices of
+a mesh, repeats it, then segments a time-lapse.
 
     blender -b --factory-startup --python tests/cli/blender_addon.py -- ADDON.zip IMAGE POINTS.xyz MOVIE FOLDER
 
-Writes FOLDER/addon.json: {what: whether it holds}, and facts.
+Writes FOLDER/addon.json: {what: whether it holds}, and further facts.
 """
 import json
 import pathlib
@@ -29,7 +29,7 @@ def corners(obj):
 
 
 def volume_box(obj, threshold=0.01):
-    """The box of the volume's surface, in the world, by Blender's own modifier; it moves a surface by half a voxel."""
+    """The bounding box of the volume's surface in the world, by Blender's own modifier, which shifts a surface by half a voxel."""
     target = bpy.data.objects.new("of volume", bpy.data.meshes.new("of volume"))
     bpy.context.collection.objects.link(target)
     modifier = target.modifiers.new("of volume", "VOLUME_TO_MESH")
@@ -43,12 +43,12 @@ def volume_box(obj, threshold=0.01):
 def error(call, *words, **keywords):
     try:
         call(*words, **keywords)
-    except RuntimeError as found:  # as Blender gives an operator's error to a script
+    except RuntimeError as found:  # the form in which scripts get an operator's error
         return str(found)
     return ""
 
 
-# Marks as children of an empty, which is not where the image is. A first run makes the space.
+# Marks are children of an empty, which is not at the image's position. A first run creates the image's space.
 holder = bpy.data.objects.new("holder", None)
 bpy.context.scene.collection.objects.link(holder)
 holder.matrix_world = Matrix.Translation((7, 8, 9)) @ Matrix.Rotation(0.3, 4, "X")
@@ -76,7 +76,7 @@ checks["figures"] = surface["covol_genus"] == 0 and surface["covol_volume"] > 0 
 first = {path.name for path in folder.iterdir()}
 checks["files"] = sum(name.endswith((".vdb", ".ply", ".json")) for name in first) == 3
 
-# A person moves the space and gives the surface a material; marks of half the size, by a mesh's vertices, update it in place.
+# The user moves the space and gives the surface a material; marks of a body of half the size, the vertices of a mesh, update the surface in place.
 surface.data.materials.append(bpy.data.materials.new("glass"))
 space.matrix_world = Matrix.Translation((100, 0, 0)) @ Matrix.Rotation(0.5, 4, "Z") @ Matrix.Scale(2, 4)
 cloud = bpy.data.meshes.new("cloud")
@@ -99,7 +99,7 @@ second = {path.name for path in folder.iterdir()}
 checks["files of the last result are gone"] = len([n for n in second if n.endswith(".vdb")]) == 1 and not first & second & {pathlib.Path(
     bpy.path.abspath(volume.data.filepath)).name}
 
-# A time-lapse: three frames from frame 5 on, each a unit of the image further along x.
+# A time-lapse: three frames from frame 5 on, each shifted by one unit of the image along x.
 cloud.clear_geometry()
 cloud.from_pydata(places.tolist(), [], [])
 settings.image, settings.is_lapse = str(movie), True
@@ -114,7 +114,7 @@ def local_middle(obj):
 
 
 def at(frame):
-    """Where the surface and the volume are in a frame of Blender, in the space's units."""
+    """Positions of surface and volume in a frame of Blender, in units of the space."""
     scene.frame_set(frame)
     bpy.context.view_layer.update()
     box = np.mean(volume_box(volume), 0)
@@ -144,7 +144,7 @@ settings.image, settings.is_lapse = "", True
 checks["a time-lapse of no image"] = "choose one" in error(bpy.ops.covol.segment)
 settings.is_lapse = False
 
-# Mistakes are said, and change nothing.
+# Errors are reported and change nothing.
 settings.options = "--no-such-option"
 checks["an option that is none"] = "--no-such-option" in error(bpy.ops.covol.segment)
 settings.options = "--model 'paper"

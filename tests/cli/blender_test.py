@@ -1,4 +1,4 @@
-"""Blender imports what a job writes, at one place, one size, smooth; skipped where Blender is not installed.
+"""Blender imports all files of a job at the same position, with the same size, and smooth; skipped if Blender is not installed.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/blender_test.py
 """
@@ -67,13 +67,13 @@ class Blender(Folder):
 @unittest.skipIf(MISSING, MISSING)
 @unittest.skipUnless(BLENDER, "SKIPPED: Blender is not installed (apt-get install --no-install-recommends blender)")
 class Addon(Folder):
-    """tools/blender, installed into a Blender that has nothing else."""
+    """Tests tools/blender, installed into a Blender without other add-ons."""
 
     def test_marks_become_objects(self):
         root = Path(__file__).resolve().parents[2]
         subprocess.run([sys.executable, root / "tools/plugins/pack.py", "blender", "--output", self.out], check=True, capture_output=True)
         [archive] = self.out.glob("covol_blender-*.zip")
-        # The ball, a unit further along x in each frame.
+        # The ball moves by one unit along x in each frame.
         write_um_tiff(self.out / "movie.tif", np.stack([np.uint8(20 + 200 * ball(np.array(CENTRE) + (n, 0, 0))) for n in range(3)]))
         folder = self.out / "addon"
         folder.mkdir()
@@ -87,7 +87,7 @@ class Addon(Folder):
         self.assertGreater(len(checks), 30)
 
     def test_the_manifest_of_an_extension(self):
-        """By the rules of Blender 4.2's manual; Debian's Blender knows no extensions."""
+        """By the rules of Blender 4.2's manual; Debian's Blender does not support extensions."""
         root = Path(__file__).resolve().parents[2]
         manifest = tomllib.loads((root / "tools/blender/covol_blender/blender_manifest.toml").read_text())
         for name in ("schema_version", "id", "version", "name", "tagline", "maintainer", "type", "blender_version_min", "license"):

@@ -1,4 +1,4 @@
-"""covol brick: plan, run, join; and the same behind --memory-limit.
+"""Tests covol brick plan, run and join, and --memory-limit, which does the same.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/brick_test.py
 """
@@ -91,15 +91,15 @@ class Bricks(Case):
         for brick in range(planned["bricks"]):
             self.run_covol("brick", "run", "plan", str(brick))
         before = {path: path.stat().st_mtime_ns for path in (self.out / "plan/sweep-01").iterdir()}
-        self.run_covol("brick", "run", "plan", "0", "1")  # done: not done again
+        self.run_covol("brick", "run", "plan", "0", "1")  # a brick that is done is not solved again
         self.assertEqual(before, {path: path.stat().st_mtime_ns for path in before})
         self.run_covol("brick", "join", "plan", "-o", "s.vdb")
 
     def test_not_steady(self):
         planned = self.plan("plan", "--max-steps", "2", "--tolerance", "0")
         self.run_covol("brick", "run", "plan")
-        said = self.run_covol("brick", "join", "plan", "-o", "s.vdb", "--json", "s.json", "--strict", code=5).stderr
-        self.assertRegex(said, f"not steady after [0-9]+ steps: [0-9]+ of {planned['bricks']} bricks")
+        output = self.run_covol("brick", "join", "plan", "-o", "s.vdb", "--json", "s.json", "--strict", code=5).stderr
+        self.assertRegex(output, f"not steady after [0-9]+ steps: [0-9]+ of {planned['bricks']} bricks")
         self.assertEqual(json.loads((self.out / "s.json").read_text())["solve"]["stop_reason"], "max_steps")
 
     def test_the_surface_has_the_same_bits_whatever_else_is_made(self):

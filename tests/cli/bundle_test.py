@@ -1,8 +1,8 @@
-"""The bundle that tools/packaging/bundle.py makes: nothing of this machine is used but the C library, and every licence is there.
+"""The bundle of tools/packaging/bundle.py: it uses nothing of this machine but the C library, and contains every licence.
 
     COVOL_BUILD=build python3 -m unittest tests/cli/bundle_test.py
 
-tests/in_clean_root.sh runs it in new Debians without a compiler, which takes minutes.
+tests/in_clean_root.sh runs it in fresh Debian systems without a compiler, which takes minutes.
 """
 import os
 import pathlib
@@ -28,14 +28,14 @@ class Bundle(unittest.TestCase):
         cls.work = pathlib.Path(tempfile.mkdtemp(prefix="covol-bundle-"))
         cls.addClassCleanup(shutil.rmtree, cls.work)
         run("cmake", "--build", BUILD, "--target", "covol_packed")
-        cls.said = run("/usr/bin/python3", ROOT / "tools/packaging/bundle.py", BUILD, "--output", cls.work, "--level", "0")
+        cls.printed = run("/usr/bin/python3", ROOT / "tools/packaging/bundle.py", BUILD, "--output", cls.work, "--level", "0")
         [packed] = cls.work.glob("*.tar.xz")
         with tarfile.open(packed) as tar:
             cls.entries = tar.getmembers()
         run("tar", "xf", packed, "-C", cls.work)
         cls.root = cls.work / packed.name.removesuffix(".tar.xz")
         cls.elf = [path for path in cls.root.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
-        # A library of another version in LD_LIBRARY_PATH, as ROS, conda or a cluster's module has it.
+        # A library of another version in LD_LIBRARY_PATH, as ROS, conda or a module of a cluster may set it.
         poison = cls.work / "poison"
         poison.mkdir()
         for path in (cls.root / "lib").glob("*.so*"):
@@ -54,24 +54,24 @@ class Bundle(unittest.TestCase):
     def test_a_job_runs(self):
         def covol(*words):
             return run(self.root / "bin/covol", *words, env=self.environment, cwd=self.work)
-        covol("phantom", "sphere", "--size", "32", "-o", "p.nii.gz", "--points", "p.csv")  # which ITK reads, in a module of its own
-        said = covol("segment", "p.nii.gz", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--report", "s.html")
-        self.assertIn("closed, genus 0", said)
+        covol("phantom", "sphere", "--size", "32", "-o", "p.nii.gz", "--points", "p.csv")  # which ITK reads, by a module of its own
+        printed = covol("segment", "p.nii.gz", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--report", "s.html")
+        self.assertIn("closed, genus 0", printed)
         self.assertGreater((self.work / "s.html").stat().st_size, 100_000)
 
     def test_the_builds_results_to_the_bit(self):
-        """Of images, a cloud and a format of ITK; all jobs take minutes (docs/install.md)."""
+        """On images, a cloud and a format of ITK; running all jobs takes minutes (docs/install.md)."""
         for part in ("image", "cloud_few", "phantom_box"):
-            said = run(sys.executable, ROOT / "tests/bench/same_bits.py", BUILD / "bin/covol", self.root / "bin/covol", "--only", part, "--work",
+            printed = run(sys.executable, ROOT / "tests/bench/same_bits.py", BUILD / "bin/covol", self.root / "bin/covol", "--only", part, "--work",
                        self.work / f"bits_{part}")
-            self.assertRegex(said, r"\d+ jobs: 0 differ \[\]; 0 end with an error")
+            self.assertRegex(printed, r"\d+ jobs: 0 differ \[\]; 0 end with an error")
 
     def test_the_doctor_finds_its_own_parts(self):
         root = self.work / "damaged"
         shutil.copytree(self.root, root, symlinks=True)
         environment = {**self.environment, "LD_LIBRARY_PATH": ""}
-        said = run(root / "bin/covol", "doctor", "--strict", env=environment)
-        self.assertIn(f"in {root}/lib\n", said)
+        printed = run(root / "bin/covol", "doctor", "--strict", env=environment)
+        self.assertIn(f"in {root}/lib\n", printed)
         next(root.glob("lib/covol-*/gdcm.so")).unlink()
         done = subprocess.run([root / "bin/covol", "doctor", "--strict"], capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 5, done.stdout + done.stderr)

@@ -1,4 +1,4 @@
-"""What the tests of odd inputs share: the real binary, and a body that each small input holds."""
+"""Common to the tests of unusual inputs: the real program, and a body that each small input contains."""
 import subprocess
 import unittest
 
@@ -16,7 +16,7 @@ SIZE = (14, 12, 10)  # voxels along x, y, z
 
 
 def body(size=SIZE, spacing=(1, 1, 1)):
-    """[z, y, x] of bytes: a bright ellipsoid off the middle, and a ramp that tells every voxel from its neighbours."""
+    """[z, y, x] of bytes: a bright ellipsoid, not centred, and a ramp so that neighbouring voxels differ."""
     z, y, x = np.meshgrid(*(np.arange(n) * s for n, s in zip(size[::-1], spacing[::-1])), indexing="ij")
     inside = ((x - 6) / 4.2) ** 2 + ((y - 5.5) / 3.4) ** 2 + ((z - 4) / 3.1) ** 2 < 1
     return (np.where(inside, 180, 20) + x + 2 * y + 3 * z).astype(np.uint8)
@@ -40,13 +40,13 @@ class Case(cli_test.Case):
         return self.report("info", *args)["image"]
 
     def refused(self, *args):
-        """The message of what must not be read."""
+        """The error message for a file that must not be read."""
         done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
         self.assertIn(done.returncode, (2, 3), done.stderr)
         return done.stderr
 
     def voxels(self, *args):
-        """[z, y, x] of an image whose voxels are cubes along the world's axes."""
+        """[z, y, x] of an image with cubic voxels along the axes of the world."""
         self.run_covol("convert", args[0], "voxels.vdb", *args[1:], "--quiet")
         grid = pyopenvdb.readAll(str(self.folder / "voxels.vdb"))[0][0]
         low, high = grid.evalActiveVoxelBoundingBox()

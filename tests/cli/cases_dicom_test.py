@@ -1,4 +1,4 @@
-"""DICOM files that say in unusual places where their planes lie.
+"""DICOM files that state the positions of their planes in unusual places.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cases_dicom_test.py
 """
@@ -30,7 +30,7 @@ def item(**elements):
 
 
 def dicom(path, data, kind=CT, implicit=False, **elements):
-    """One file with all planes of `data` as its frames."""
+    """One file that has all planes of `data` as its frames."""
     meta = FileMetaDataset()
     meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID = kind, "1.2.3"
     meta.TransferSyntaxUID = pydicom.uid.ImplicitVRLittleEndian if implicit else pydicom.uid.ExplicitVRLittleEndian

@@ -1,4 +1,4 @@
-"""Images whose headers say in unusual ways where their voxels lie: NIfTI, NRRD, TIFF, Imaris.
+"""Images whose headers state the positions of their voxels in unusual ways: NIfTI, NRRD, TIFF, Imaris.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cases_images_test.py
 """
@@ -21,7 +21,7 @@ TURNED = ((0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0))  # exact: 7, 2
 
 
 def affine(steps, origin):
-    """Voxels to RAS; the steps are columns."""
+    """The affine from voxels to RAS; its columns are the steps along the axes."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.asarray(steps).T
     matrix[:3, 3] = origin
@@ -37,7 +37,7 @@ def nifti(path, sform=None, qform=None, codes=(0, 0), pixdim=None):
         image.set_sform(sform, code=1)
     plain = path.with_suffix("") if path.suffix == ".gz" else path
     nibabel.save(image, str(plain))
-    raw = bytearray(plain.read_bytes())  # nibabel has codes of its own
+    raw = bytearray(plain.read_bytes())  # nibabel would write its own codes
     raw[252:256] = np.array(codes, "<i2").tobytes()
     if pixdim is not None:
         raw[80:92] = np.array(pixdim, "<f4").tobytes()
@@ -46,7 +46,7 @@ def nifti(path, sform=None, qform=None, codes=(0, 0), pixdim=None):
 
 
 def affine_of(image):
-    """What covol says, as voxels to RAS."""
+    """covol's geometry as an affine from voxels to RAS."""
     matrix = np.eye(4)
     matrix[:3, :3] = LPS @ (np.asarray(image["direction"]) * np.asarray(image["spacing"]))
     matrix[:3, 3] = LPS @ np.asarray(image["origin"])
@@ -68,7 +68,7 @@ class Nifti(Case):
                     used = "sform" if codes[1] else "qform" if codes[0] else "pixdim"
                     self.assertIn(used, image["fields"]["place of the voxels"])
 
-    def test_forms_that_differ_are_told(self):
+    def test_forms_that_differ_are_reported(self):
         s = affine(self.PLAIN, (5, 6, 7))
         for shift, loud in ((0.2, False), (0.6, True), (40, True)):
             with self.subTest(shift=shift):
@@ -245,7 +245,7 @@ class Tiff(Case):
 @unittest.skipIf(MISSING, MISSING)
 class Imaris(Case):
     def write(self, whole=None, own=None, level=None):
-        """An array that is padded to whole chunks of 16."""
+        """An array padded to whole chunks of 16."""
         data = np.zeros((16, 16, 16), np.uint8)
         data[:SIZE[2], :SIZE[1], :SIZE[0]] = body()
         text = lambda value: np.array([c.encode() for c in str(value)], "S1")  # noqa: E731

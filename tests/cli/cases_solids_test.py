@@ -1,4 +1,4 @@
-"""Meshes, grids and segmentations that are read as something else, or not at all, by careless readers.
+"""Meshes, grids and segmentations that careless readers misread or cannot read.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cases_solids_test.py
 """
@@ -18,7 +18,7 @@ L_SHAPE = ((0, 3), (0, 0), (4, 0), (4, 1), (2, 1), (2, 3))  # area 8, of a prism
 
 
 def prism(outline, height, first=1):
-    """OBJ of the body above a polygon, whose top and bottom are one face each."""
+    """OBJ of a prism over a polygon, whose top and bottom are one face each."""
     n = len(outline)
     lines = [f"v {x} {y} {z}" for z in (0, height) for x, y in outline]
     lines.append("f " + " ".join(str(first + k) for k in reversed(range(n))))
@@ -28,7 +28,7 @@ def prism(outline, height, first=1):
 
 
 def sphere(radius, count=24, inward=False, centre=(6, 5.5, 4), gap=0):
-    """Vertices and triangles; `gap` leaves so many rings out at the pole."""
+    """Vertices and triangles of a sphere; `gap`: number of rings that are left out at the pole."""
     vertices, triangles = [], []
     for i in range(count + 1):
         for j in range(2 * count):
@@ -39,7 +39,7 @@ def sphere(radius, count=24, inward=False, centre=(6, 5.5, 4), gap=0):
             k = (j + 1) % (2 * count)
             a, b, c, d = i * 2 * count + j, (i + 1) * 2 * count + j, (i + 1) * 2 * count + k, i * 2 * count + k
             triangles += ([(a, b, c)] if i < count - 1 else []) + ([(a, c, d)] if i > 0 else [])
-    # One vertex at each pole.
+    # A single vertex at each pole.
     vertices = np.array(vertices)
     ring = 2 * count
     pole = lambda v: 0 if v < ring else (count * ring if v >= count * ring else v)  # noqa: E731
@@ -93,7 +93,7 @@ class Meshes(Case):
                 self.assertAlmostEqual(found["volume"], 16, 3)
 
     def test_a_face_with_a_hole(self):
-        """As an outline that runs to the hole and back on one edge."""
+        """As an outline that runs along one edge to the hole and back."""
         outer, inner = [(0, 0), (6, 0), (6, 6), (0, 6)], [(2, 2), (2, 4), (4, 4), (4, 2)]
         lines = ["v %g %g %g" % (x, y, z) for z in (0, 1) for x, y in outer + inner]
         top, bottom = [9, 10, 11, 12, 9, 13, 14, 15, 16, 13], [1, 5, 8, 7, 6, 5, 1, 4, 3, 2]
@@ -120,7 +120,7 @@ class Meshes(Case):
 
 @unittest.skipIf(MISSING, MISSING)
 class Starts(Case):
-    """Meshes as a guess and as a start."""
+    """Meshes as guesses and as starts."""
 
     def setUp(self):
         super().setUp()
@@ -146,7 +146,7 @@ class Starts(Case):
         found, _ = self.surface("--guess", "two.obj")
         self.assertAlmostEqual(found["volume"] / (8 / 3 * np.pi * 1.6 ** 3), 1, delta=0.04)
 
-    def test_holes_are_closed_and_told(self):
+    def test_holes_are_closed_and_reported(self):
         for gap in (1, 3):
             with self.subTest(gap=gap):
                 write_obj(self.folder / "open.obj", sphere(3, gap=gap))
@@ -208,7 +208,7 @@ class Grids(Case):
 
 @unittest.skipIf(MISSING, MISSING)
 class Segments(Case):
-    """3D Slicer's segmentations: segments that overlap lie in layers."""
+    """Segmentations of 3D Slicer: segments that overlap are stored in layers."""
 
     def setUp(self):
         super().setUp()

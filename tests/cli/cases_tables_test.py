@@ -1,4 +1,4 @@
-"""Tables of marks as programs and people write them.
+"""Tables of marks as programs write them, or people.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cases_tables_test.py
 """
@@ -25,7 +25,7 @@ class TablesCase(Case):
         self.points = on_body(40)
 
     def read(self, name, text, points=None, encoding="utf-8"):
-        """What covol converts it to is what is meant."""
+        """Checks that covol's conversion has the intended marks."""
         (self.folder / name).write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
         self.run_covol("convert", name, "out.xyz", "--quiet")
         out = np.loadtxt(self.folder / "out.xyz", ndmin=2)
@@ -98,7 +98,7 @@ class Programs(TablesCase):
         self.read("c.txt", "Results of the day\n\nx y z\n" + rows(self.points, " "))
 
     def test_ptx(self):
-        move = "0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n"  # rows are multiplied from the left
+        move = "0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n"  # rows: vectors are multiplied from the left
         header = "{}\n{}\n10 20 30\n0 1 0\n-1 0 0\n0 0 1\n" + move
         scan = "".join(f"{y - 20:.5f} {10 - x:.5f} {z - 30:.5f} 0.5\n" for x, y, z in self.points)
         empty = "0 0 0 0.5\n" * 8

@@ -1,4 +1,4 @@
-"""covol check FILE --for PROGRAM: each rule on a file that it is about, and on one that it is not about.
+"""covol check FILE --for PROGRAM: each rule on a file to which it applies, and on one to which it does not.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/check_test.py
 """
@@ -24,7 +24,7 @@ class Programs(Folder):
             cls.run_covol("mask", "s.vdb", "--like", cls.image, "-o", f"x.{end}", "--quiet")
 
     def found(self, name, program):
-        """[(severity, text and what mends it)] of the rules alone, which have a cure."""
+        """[(severity, text and remedy)] of those findings that have a remedy, which come from the rules."""
         done = self.run_covol("check", name, "--for", program, "--json", "-", "--quiet",
                               code=self.code(name, program))
         report = json.loads(done.stdout)
@@ -36,7 +36,7 @@ class Programs(Folder):
         self.assertIn(code, (0, 3))
         return code
 
-    def says(self, name, program, severity, *words):
+    def expect_finding(self, name, program, severity, *words):
         found = self.found(name, program)
         self.assertTrue(any(s == severity and all(word in text for word in words) for s, text in found),
                         (name, program, words, found))
@@ -45,82 +45,82 @@ class Programs(Folder):
         self.assertFalse([text for _, text in self.found(name, program) if word in text], (name, program, word))
 
     def test_blender(self):
-        self.says("s.vdb", "blender", "problem", "not drawn", "--density")
+        self.expect_finding("s.vdb", "blender", "problem", "not drawn", "--density")
         self.silent("both.vdb", "blender", "not drawn")
-        self.says("s.vdb", "blender", "remark", "half a voxel along each axis, 0.25", "--mesh")
-        self.says("s.vdb", "blender", "remark", "Blosc", "--compression none")
+        self.expect_finding("s.vdb", "blender", "remark", "half a voxel along each axis, 0.25", "--mesh")
+        self.expect_finding("s.vdb", "blender", "remark", "Blosc", "--compression none")
         self.silent("both.vdb", "blender", "Blosc")
-        self.says("m.ply", "blender", "remark", "drops normals", "Shade Smooth")
-        self.says("m.glb", "blender", "remark", "numpy")
-        self.says("m.off", "blender", "problem", "no importer")
-        self.says(self.image, "blender", "problem", "covol convert")
+        self.expect_finding("m.ply", "blender", "remark", "drops normals", "Shade Smooth")
+        self.expect_finding("m.glb", "blender", "remark", "numpy")
+        self.expect_finding("m.off", "blender", "problem", "no importer")
+        self.expect_finding(self.image, "blender", "problem", "covol convert")
         for scale, word in ("1000", "clips"), ("0.001", "a dot"):
             self.run_covol("mesh", "s.vdb", "-o", "scaled.ply", "--unit-scale", scale, "--quiet")
-            self.says("scaled.ply", "blender", "remark", word, "--unit-scale")
+            self.expect_finding("scaled.ply", "blender", "remark", word, "--unit-scale")
             self.silent("m.ply", "blender", word)
 
     def test_houdini(self):
-        self.says("s.vdb", "houdini", "remark", "Blosc", "--compression none")
+        self.expect_finding("s.vdb", "houdini", "remark", "Blosc", "--compression none")
         self.silent("both.vdb", "houdini", "Blosc")
-        self.says("s.vdb", "houdini", "remark", "on its back")
-        self.says("m.ply", "houdini", "remark", "--up y")
+        self.expect_finding("s.vdb", "houdini", "remark", "on its back")
+        self.expect_finding("m.ply", "houdini", "remark", "--up y")
         self.silent("m.glb", "houdini", "--up y")
-        self.says(self.image, "houdini", "problem", "covol convert")
+        self.expect_finding(self.image, "houdini", "problem", "covol convert")
 
     def test_slicer(self):
-        self.says("s.vdb", "slicer", "problem", ".seg.nrrd")
-        self.says("m.glb", "slicer", "problem", ".glb")
-        self.says("m.stl", "slicer", "remark", "LPS")
-        self.says("m.ply", "slicer", "problem", "in um", "--unit-scale 0.001")
-        self.silent("m.stl", "slicer", "--unit-scale")  # which states no unit
-        self.says("x.nrrd", "slicer", "remark", "in um")
+        self.expect_finding("s.vdb", "slicer", "problem", ".seg.nrrd")
+        self.expect_finding("m.glb", "slicer", "problem", ".glb")
+        self.expect_finding("m.stl", "slicer", "remark", "LPS")
+        self.expect_finding("m.ply", "slicer", "problem", "in um", "--unit-scale 0.001")
+        self.silent("m.stl", "slicer", "--unit-scale")  # STL states no unit
+        self.expect_finding("x.nrrd", "slicer", "remark", "in um")
         self.silent("x.seg.nrrd", "slicer", "Segment0_ID")
         (self.out / "bare.seg.nrrd").write_bytes((self.out / "x.nrrd").read_bytes())
-        self.says("bare.seg.nrrd", "slicer", "problem", "Segment0_ID")
-        self.says("x.tif", "slicer", "problem", "spacing nor origin")
-        self.says("x.npy", "slicer", "problem", ".npy")
+        self.expect_finding("bare.seg.nrrd", "slicer", "problem", "Segment0_ID")
+        self.expect_finding("x.tif", "slicer", "problem", "spacing nor origin")
+        self.expect_finding("x.npy", "slicer", "problem", ".npy")
 
     def test_fiji(self):
-        self.says("s.vdb", "fiji", "problem", "covol mask")
-        self.says("m.ply", "fiji", "problem", ".obj or .stl")
+        self.expect_finding("s.vdb", "fiji", "problem", "covol mask")
+        self.expect_finding("m.ply", "fiji", "problem", ".obj or .stl")
         self.silent("m.stl", "fiji", ".obj or .stl")
         self.silent("x.tif", "fiji", "black")
         tifffile.imwrite(self.out / "black.tif", np.uint8(ball() > 0.5), imagej=True, metadata={"axes": "ZYX"})
-        self.says("black.tif", "fiji", "problem", "min and max")
-        self.says("black.tif", "fiji", "remark", "no unit")
+        self.expect_finding("black.tif", "fiji", "problem", "min and max")
+        self.expect_finding("black.tif", "fiji", "remark", "no unit")
         self.silent(self.image, "fiji", "no unit")
         self.silent(self.image, "fiji", "min and max")
-        self.says("x.ome.tif", "fiji", "remark", "Bio-Formats")
+        self.expect_finding("x.ome.tif", "fiji", "remark", "Bio-Formats")
         tifffile.imwrite(self.out / "big.tif", np.uint8(200 * ball()), bigtiff=True)
-        self.says("big.tif", "fiji", "remark", "BigTIFF")
+        self.expect_finding("big.tif", "fiji", "remark", "BigTIFF")
         self.silent("x.tif", "fiji", "BigTIFF")
-        self.says("x.npy", "fiji", "problem", ".npy")
+        self.expect_finding("x.npy", "fiji", "problem", ".npy")
         turned = "\n".join(["NRRD0004", "type: uint8", "dimension: 3", "sizes: 8 8 8", "encoding: raw",
                             "space: left-posterior-superior", "space origin: (0,0,0)",
                             "space directions: (0.8,0.6,0) (-0.6,0.8,0) (0,0,1)", "", ""])
         (self.out / "turned.nrrd").write_bytes(turned.encode() + bytes(range(256)) * 2)
-        self.says("turned.nrrd", "fiji", "remark", "rotated", "--points-space index")
+        self.expect_finding("turned.nrrd", "fiji", "remark", "rotated", "--points-space index")
         self.silent("x.nrrd", "fiji", "rotated")
 
     def test_print(self):
-        self.says("s.vdb", "print", "problem", "covol mesh")
-        self.says("m.ply", "print", "problem", "in um", "--unit-scale 0.001")
-        self.says("m.stl", "print", "remark", "no unit")
+        self.expect_finding("s.vdb", "print", "problem", "covol mesh")
+        self.expect_finding("m.ply", "print", "problem", "in um", "--unit-scale 0.001")
+        self.expect_finding("m.stl", "print", "remark", "no unit")
         self.silent("m.stl", "print", "open")
         self.silent("m.stl", "print", "thin")
         vertices, faces = self.mesh_of(sphere(400, (0, 0, 0), 10))
         self.write_off("open.off", vertices, faces[:-5])
-        self.says("open.off", "print", "problem", "open", "--repair")
+        self.expect_finding("open.off", "print", "problem", "open", "--repair")
         self.write_off("crossing.off", np.r_[vertices, vertices + (5, 0, 0)], np.r_[faces, faces + len(vertices)])
-        self.says("crossing.off", "print", "problem", "cut each other", "--repair")
-        # A shell of 0.2 mm: the inner sphere is turned inside out.
+        self.expect_finding("crossing.off", "print", "problem", "cut each other", "--repair")
+        # A shell 0.2 mm thick: the inner sphere's triangles are reversed.
         shell = np.r_[vertices, 0.98 * vertices], np.r_[faces, faces[:, ::-1] + len(vertices)]
         self.write_off("shell.off", *shell)
-        self.says("shell.off", "print", "remark", "mm thin in places", "--isovalue")
+        self.expect_finding("shell.off", "print", "remark", "mm thin in places", "--isovalue")
         self.write_off("thick.off", np.r_[vertices, 0.9 * vertices], shell[1])
         self.silent("thick.off", "print", "thin")
         self.write_off("huge.off", 100 * vertices, faces)
-        self.says("huge.off", "print", "remark", "mm wide", "--unit-scale 0.05")
+        self.expect_finding("huge.off", "print", "remark", "mm wide", "--unit-scale 0.05")
         self.silent("thick.off", "print", "mm wide")
 
     def mesh_of(self, points):

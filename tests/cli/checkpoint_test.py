@@ -1,4 +1,5 @@
-"""States of long flows: runs that are killed, signalled or cut off go on to the bits of undisturbed ones.
+"""Checkpoints of long flows: runs that are killed, signalled or stopped are resumed and give exactly the result of an
+uninterrupted run.
 
     COVOL=build/bin/covol COVOL_KILL_AT=build/tests/libcovol_kill_at.so python3 -m unittest tests/cli/checkpoint_test.py
 """
@@ -18,7 +19,8 @@ class Checkpoints(Case):
         shutil.copy(self.points, self.out / "marks.xyz")
 
     def jobs(self):
-        """With the call at which each run is killed, more than its results take to be put in place: a band that follows, through two flows and new edges; a fixed one; the coarse level first; two structures; one step."""
+        """Jobs, each with the number of the call before which its runs are killed, which is larger than publishing the results
+        takes: a tracked band, through two flows and new edges; a fixed one; the coarse level first; two structures."""
         write_xyz(self.out / "dense.xyz", sphere_points(4000))
         marks = "marks.xyz"
         yield "tracked", 37, ["segment", "ball.nrrd", "--points", marks, "--init", "sphere:3,-2,1,4", "--model", "paper", "--max-steps", "40"]
@@ -30,7 +32,8 @@ class Checkpoints(Case):
         return {path.name: path.read_bytes() for path in self.out.iterdir() if path.name.startswith("s") and path.is_file()}
 
     def run_until_done(self, words, *more, calls):
-        """Killed at its so-many-th call that puts files in place, and gone on with, until it ends by itself."""
+        """Runs the job, killed before its calls-th call that puts files in place, and resumes it until it ends by itself. @return
+        how often it was killed"""
         environment = {**os.environ, "LD_PRELOAD": os.environ["COVOL_KILL_AT"], "KILL_AT": str(calls)}
         killed = 0
         while True:
@@ -58,7 +61,7 @@ class Checkpoints(Case):
                     (self.out / file).unlink()
 
     def interrupt(self, words, *more, awaited=None):
-        """Ended by a signal, after a file is there: its states lie in `states`, and none is half put in place."""
+        """Ends a run by a signal, once a file exists: its checkpoints are in `states`, and none is incomplete."""
         run = subprocess.Popen([COVOL, *words, *more, "--checkpoint", "states"], cwd=self.out, stderr=subprocess.PIPE, text=True)
         try:
             while not run.stderr.readline().startswith("covol: tag_distance"):

@@ -1,4 +1,4 @@
-"""Drives the real binary: exit codes, JSON, files. Standard library only.
+"""Runs the real program: exit codes, JSON, files. Standard library only.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cli_test.py
 """
@@ -18,7 +18,7 @@ COVOL = os.environ.get("COVOL", "build/bin/covol")
 COMMANDS = ["mark", "segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
             "info", "check", "convert", "render", "report", "phantom", "plan", "brick", "rerun", "demo", "doctor"]
 
-# The shape of all tests: a bright ball in a dark box.
+# The image of all tests: a bright ball on a dark background.
 SIZE = 40          # voxels along each axis
 H = 0.5            # spacing
 CENTER = (3.0, -2.0, 1.0)
@@ -53,7 +53,7 @@ def ball_bytes():
 
 
 def sphere_points(count):
-    """A Fibonacci lattice on the ball's surface."""
+    """A Fibonacci lattice on the surface of the ball."""
     golden = math.pi * (3 - math.sqrt(5))
     points = []
     for n in range(count):
@@ -73,7 +73,7 @@ def write_xyz(path, points):
 
 
 class Case(unittest.TestCase):
-    """Inputs made once, an empty folder for each test."""
+    """Inputs that are made once, and an empty folder for each test."""
 
     @classmethod
     def setUpClass(cls):
@@ -102,13 +102,13 @@ class Case(unittest.TestCase):
     def files(self):
         return sorted(p.name for p in self.out.iterdir())
 
-    def refuse(self, *args, code, says=""):
-        """One clear line, the exit code, and no file."""
+    def refuse(self, *args, code, expected_text=""):
+        """Checks for one clear line, the exit code, and no file."""
         done = self.run_covol(*args, "--quiet", code=code)
         lines = done.stderr.strip().splitlines()
         self.assertEqual(len(lines), 1, done.stderr)
         self.assertTrue(lines[0].startswith("covol: error: "), lines[0])
-        self.assertIn(says, lines[0])
+        self.assertIn(expected_text, lines[0])
         self.assertEqual(done.stdout, "")
         self.assertEqual(self.files(), [])
         return lines[0]
@@ -127,38 +127,38 @@ class Usage(Case):
     def test_wrong_command_lines(self):
         self.refuse(code=2)
         self.refuse("melt", code=2)
-        self.refuse("segment", self.image, code=2, says="--output")
-        self.refuse("segment", self.image, "-o", "s.vdb", "--no-such-flag", code=2, says="--no-such-flag")
+        self.refuse("segment", self.image, code=2, expected_text="--output")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--no-such-flag", code=2, expected_text="--no-such-flag")
 
     def test_text_instead_of_numbers(self):
         for flag in ("--theta", "--tau", "--tag-distance", "--exterior-seed", "--roi", "--max-steps"):
-            line = self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "many", code=2, says=flag)
+            line = self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "many", code=2, expected_text=flag)
             self.assertIn("many", line)
-        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "cube:1,2,3", code=2, says="sphere:x,y,z,r")
-        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "sphere:1,2,3", code=2, says="sphere:x,y,z,r")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "cube:1,2,3", code=2, expected_text="sphere:x,y,z,r")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "sphere:1,2,3", code=2, expected_text="sphere:x,y,z,r")
 
 
 class BadInput(Case):
     def test_missing_files(self):
-        self.refuse("segment", "none.nrrd", "--points", self.points, "-o", "s.vdb", code=4, says="none.nrrd")
-        self.refuse("segment", self.image, "--points", "none.xyz", "-o", "s.vdb", code=4, says="none.xyz")
-        self.refuse("reconstruct", "none.ply", "-o", "s.vdb", code=4, says="none.ply")
+        self.refuse("segment", "none.nrrd", "--points", self.points, "-o", "s.vdb", code=4, expected_text="none.nrrd")
+        self.refuse("segment", self.image, "--points", "none.xyz", "-o", "s.vdb", code=4, expected_text="none.xyz")
+        self.refuse("reconstruct", "none.ply", "-o", "s.vdb", code=4, expected_text="none.ply")
         for command in ("surface", "mesh"):
-            self.refuse(command, "none.vdb", "-o", "s.vdb" if command == "surface" else "s.ply", code=4, says="none.vdb")
+            self.refuse(command, "none.vdb", "-o", "s.vdb" if command == "surface" else "s.ply", code=4, expected_text="none.vdb")
 
     def test_bad_points(self):
         bad = self.inputs / "bad.xyz"
         bad.write_text("1 2 3\n1 two 3\n")
-        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz:2")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, expected_text="bad.xyz:2")
         bad.write_text("1 2 3\n1 nan 3\n")
-        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz:2")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, expected_text="bad.xyz:2")
         bad.write_text("")
-        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, expected_text="bad.xyz")
 
     def test_points_outside_the_image(self):
         far = self.inputs / "far.xyz"
         write_xyz(far, [(1000, 0, 0), CENTER])
-        self.refuse("segment", self.image, "--points", far, "-o", "s.vdb", code=3, says="1 of 2")
+        self.refuse("segment", self.image, "--points", far, "-o", "s.vdb", code=3, expected_text="1 of 2")
 
     def test_bad_images(self):
         bad = self.inputs / "bad.nrrd"
@@ -167,9 +167,9 @@ class BadInput(Case):
         write_nrrd(bad, (8, 0, 8), b"")
         self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3)
         bad.write_bytes(self.image.read_bytes()[:1000])
-        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3, says="bad.nrrd")
+        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3, expected_text="bad.nrrd")
         bad.write_bytes(b"")
-        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3, says="bad.nrrd")
+        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3, expected_text="bad.nrrd")
         write_nrrd(bad, (8, 8, 8), struct.pack("<512f", *([float("nan")] * 512)), kind="float")
         self.refuse("segment", bad, "--init", "sphere:3,-2,1,2", "-o", "s.vdb", code=3)
 
@@ -184,8 +184,8 @@ class BadInput(Case):
     def test_empty_values(self):
         for flag in ("--theta", "--rho", "--delta", "--tolerance", "--guess-weight", "--mask", "--init"):
             with self.subTest(flag=flag):
-                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "", code=2, says=flag)
-        self.refuse("segment", self.image, "--points", self.points, "-o", "", code=2, says="--output")
+                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "", code=2, expected_text=flag)
+        self.refuse("segment", self.image, "--points", self.points, "-o", "", code=2, expected_text="--output")
 
     def test_numbers_far_out_of_range(self):
         for flag, value, code in [("--image-yields", "-1", 3), ("--guess-weight", "-1", 3), ("--threads", "100000", 3),
@@ -214,21 +214,21 @@ class BadInput(Case):
                      ("surface", level_set, "-o", level_set),
                      ("convert", points, points)]:
             with self.subTest(args=args):
-                self.refuse(*args, code=3, says="is an input of this run")
+                self.refuse(*args, code=3, expected_text="is an input of this run")
         for path, data in before.items():
             self.assertEqual(path.read_bytes(), data)
 
     def test_outputs_that_are_no_files(self):
         pipe = self.inputs / "pipe.vdb"
         os.mkfifo(pipe)
-        self.refuse("segment", self.image, "--points", self.points, "-o", pipe, code=4, says="not a regular file")
-        # Reports go to devices and pipes as they are.
+        self.refuse("segment", self.image, "--points", self.points, "-o", pipe, code=4, expected_text="not a regular file")
+        # Reports can be written to devices and pipes directly.
         done = self.segment("--quiet", "--json", "/dev/stdout")
         self.assertEqual(json.loads(done.stdout)["command"], "segment")
         (self.out / "s.vdb").unlink()
         if os.path.exists("/dev/full"):
             self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--json", "/dev/full", code=4,
-                        says="/dev/full")
+                        expected_text="/dev/full")
 
     def test_files_that_are_not_what_they_should_be(self):
         folder, empty = self.inputs / "folder.nrrd", self.inputs / "empty.vdb"
@@ -247,7 +247,7 @@ class BadInput(Case):
                     self.assertIn(self.refused(*args), (3, 4))
 
     def refused(self, *args):
-        """The exit code of a run that has to fail with one line and no file."""
+        """The exit code of a run that must fail with one line and no file."""
         done = subprocess.run([COVOL, *map(str, args), "--quiet"], capture_output=True, text=True, cwd=self.out, timeout=60)
         self.assertRegex(done.stderr, r"^covol: error: [^\n]+\n$")
         self.assertEqual(self.files(), [])
@@ -259,14 +259,14 @@ class BadInput(Case):
         self.run_covol("segment", self.image, "--points", self.points, "-o", solid, "--density", fog)
         for args in [("mesh", fog, "-o", "m.ply"), ("mask", fog, "--like", self.image, "-o", "m.nrrd"),
                      ("render", fog, "-o", "p.png")]:
-            self.refuse(*args, code=3, says="got a fog volume")
-        self.refuse("mesh", solid, "-o", "m.ply", "--min-component", "1000vx", code=3, says="use a smaller --min-component")
+            self.refuse(*args, code=3, expected_text="got a fog volume")
+        self.refuse("mesh", solid, "-o", "m.ply", "--min-component", "1000vx", code=3, expected_text="use a smaller --min-component")
 
     def test_tag_start_without_points(self):
-        self.refuse("segment", self.image, "-o", "s.vdb", code=3, says="points")
+        self.refuse("segment", self.image, "-o", "s.vdb", code=3, expected_text="points")
 
     def test_outputs_are_checked_first(self):
-        # The image does not exist either: outputs come first.
+        # The image does not exist either: outputs are checked first.
         for flags, code in [(["-o", "s.abc"], 3), (["-o", "no/folder/s.vdb"], 4),
                             (["-o", "s.vdb", "--mask", "m.jpg"], 3), (["-o", "s.vdb", "--mesh", "m.xyz"], 3),
                             (["-o", "s.vdb", "--json", "no/folder/r.json"], 4),
@@ -278,7 +278,7 @@ class BadInput(Case):
     def test_output_that_is_a_folder(self):
         folder = self.inputs / "folder.vdb"
         folder.mkdir()
-        self.refuse("segment", self.image, "--points", self.points, "-o", folder, code=4, says="folder")
+        self.refuse("segment", self.image, "--points", self.points, "-o", folder, code=4, expected_text="folder")
 
 
 class Segment(Case):
@@ -306,7 +306,7 @@ class Segment(Case):
         self.assertIn("1500 marks", report["automatic"]["guess"])
         self.assertTrue(report["guidance"]["used"], report["guidance"])
         self.assertEqual(report["fit"]["marks_off"]["count"], 0)
-        # The three files are one solid.
+        # The three files contain the same solid.
         for other in ("m.nrrd", "m.ply"):
             alike = self.report("compare", "s.vdb", other)["compare"]
             self.assertGreater(alike["dice"], 0.97)
@@ -358,7 +358,7 @@ class Segment(Case):
         self.segment("--init", "tag", "--max-steps", "1", "--tolerance", "0", "--strict", code=5)
         self.assertEqual(self.files(), ["s.vdb"])
 
-    def test_strict_tells_of_every_warning(self):
+    def test_strict_reports_of_every_warning(self):
         self.segment("--strict", "--quiet")
         shifted = self.inputs / "shifted.xyz"
         write_xyz(shifted, [(x + 0.5 * RADIUS, y, z) for x, y, z in sphere_points(300)])
@@ -367,31 +367,31 @@ class Segment(Case):
         self.assertEqual(self.files(), ["s.vdb"])
 
     def test_memory_limit(self):
-        for _ in range(40):  # said by the guard or by the reader, whichever is first, and once
+        for _ in range(40):  # reported once, by the memory guard or by the reader, whichever comes first
             self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "20k", code=3,
-                        says="--memory-limit 20k")
+                        expected_text="--memory-limit 20k")
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "1M",
-                    "--max-steps", "1000000", "--tolerance", "0", code=3, says="--memory-limit 1M")
+                    "--max-steps", "1000000", "--tolerance", "0", code=3, expected_text="--memory-limit 1M")
         self.segment("--memory-limit", "8G")
 
     def test_too_fine_a_voxel_size(self):
         for more in (["--voxel-size", "2e-5"], ["--voxel-size", "0.03", "--memory-limit", "200M"],
                      ["--voxel-size", "0.02", "--memory-limit", "200M", "--init", "sphere:3,-2,1,7"]):
             with self.subTest(more):
-                line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, says="GiB of memory")
+                line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, expected_text="GiB of memory")
                 fits = re.search(r"such as ([0-9.e-]+) ", line).group(1)
-        # The last of them, with the size that it was told.
+        # The last of them again, with the size that the message proposed.
         report = self.report("reconstruct", self.points, "-o", "s.vdb", "--voxel-size", fits, *more[2:])
         self.assertTrue(report["surface"]["closed"])
         self.refuse_distance()
 
     def refuse_distance(self):
         (self.out / "s.vdb").unlink()
-        self.refuse("distance", self.points, "-o", "d.vdb", "--voxel-size", "0.001", "--max-distance", "2", code=3, says="such as")
+        self.refuse("distance", self.points, "-o", "d.vdb", "--voxel-size", "0.001", "--max-distance", "2", code=3, expected_text="such as")
 
     def test_one_output_that_fails_takes_the_others_with_it(self):
-        name = "m" * 252 + ".ply"  # one more than a name may have
-        self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name, code=4, says="too long")
+        name = "m" * 252 + ".ply"  # one character more than file names may have
+        self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name, code=4, expected_text="too long")
         self.run_covol("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name[1:])
         self.assertEqual(self.files(), [name[1:], "s.vdb"])
 
@@ -400,7 +400,7 @@ class Segment(Case):
                                     "r.json", "--max-steps", "100000000", "--tolerance", "0"], cwd=self.out,
                                    stderr=subprocess.PIPE, text=True)
         try:
-            # It says this once the run has begun; it would go on for hours.
+            # This line appears once the run has begun; it would continue for hours.
             while not process.stderr.readline().startswith("covol: tag_distance"):
                 self.assertIsNone(process.poll(), "ended before the signal")
             process.send_signal(signal.SIGINT)
@@ -432,8 +432,8 @@ class Configuration(Case):
     def test_unknown_key_and_missing_file(self):
         config = self.inputs / "c.toml"
         config.write_text("thta = 0.5\n")
-        self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2, says="thta")
-        self.refuse("segment", self.image, "-o", "s.vdb", "--config", "none.toml", code=2, says="none.toml")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2, expected_text="thta")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--config", "none.toml", code=2, expected_text="none.toml")
 
     def test_saved_options_give_the_same_run(self):
         first = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--theta", "0.5", "--delta",
@@ -453,15 +453,15 @@ class Reconstruct(Case):
         self.assertEqual(self.files(), ["m.stl", "s.vdb"])
 
     def test_no_mask_without_an_image(self):
-        self.refuse("reconstruct", self.points, "-o", "s.vdb", "--mask", "m.nrrd", code=2, says="--mask")
+        self.refuse("reconstruct", self.points, "-o", "s.vdb", "--mask", "m.nrrd", code=2, expected_text="--mask")
 
 
 class Steps(Case):
     def test_single_steps_are_segment(self):
         whole = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", "s.ply", "--tag-distance", "3vx",
                             "--delta", "1vx", "--rho", "0")
-        # segment() with image and points runs evolve twice, the points alone first.
-        # segment() merges close points first; these are apart.
+        # segment() with image and points calls evolve twice, first with the points alone. segment() merges close points first; these points are not
+        # close.
         self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb", "--max-distance", "8vx")
         self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "3vx")
         self.run_covol("edge", self.image, "--band", "b.vdb", "-o", "g.vdb")
@@ -558,7 +558,7 @@ class Tools(Case):
         self.run_covol("convert", self.points, "p.vdb", code=3)
 
     def test_options_that_would_do_nothing(self):
-        """What is about a file that the run neither reads nor writes is refused."""
+        """Options for a file that the run neither reads nor writes are refused."""
         self.run_covol("convert", self.image, "i.vdb")
         for options in (("--unit-scale", 2), ("--up", "y"), ("--simplify", 1), ("--remove-outliers",)):
             with self.subTest(options=options):

@@ -1,4 +1,4 @@
-"""Clouds of few points, and clouds that enclose nothing: what comes out, and whether the advice in the error works.
+"""Clouds of few points, and clouds that enclose nothing: the results, and whether the advice in error messages works.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/clouds_test.py
 """
@@ -33,7 +33,7 @@ class Clouds(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.out)
 
     def reconstruct(self, points, *more):
-        """@param points  or a file of them"""
+        """@param points  the points, or a file of them"""
         path = points if isinstance(points, pathlib.Path) else self.out / "cloud.xyz"
         if path is not points:
             write_xyz(path, points)
@@ -47,23 +47,23 @@ class Clouds(unittest.TestCase):
         self.assertTrue(surface["closed"])
         return surface
 
-    def advice(self, points, says, *more):
+    def advice(self, points, expected_text, *more):
         done = self.reconstruct(points, *more)
         self.assertEqual(done.returncode, 3, done.stderr)
-        self.assertIn(says, done.stderr)
+        self.assertIn(expected_text, done.stderr)
         return done.stderr
 
 
 class Few(Clouds):
     def test_spheres(self):
-        # The surface that bends least through exact points of a sphere is the sphere.
+        # For exact points of a sphere, the surface of minimum bending energy is the sphere.
         for count, within in ((50, 0.03), (100, 0.01), (200, 0.01), (300, 0.01)):
             for seed in range(3):
                 with self.subTest(count=count, seed=seed):
                     surface = self.surface(random_sphere(count, seed))
                     self.assertEqual((surface["components"], surface["genus"]), (1, 0))
-                    share = surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
-                    self.assertAlmostEqual(share, 1, delta=within)
+                    fraction = surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
+                    self.assertAlmostEqual(fraction, 1, delta=within)
 
     def test_normals_of_few_points_are_not_believed(self):
         points = random_sphere(200, 1)
@@ -79,11 +79,11 @@ class Few(Clouds):
                 self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.01)
 
     def test_voxels_are_finer_than_few_points_lie_apart(self):
-        points, said = random_sphere(1000, 1), []
+        points, output = random_sphere(1000, 1), []
         for more in ((), ("--model", "paper")):
             automatic = json.loads(self.reconstruct(points, *more).stdout)["automatic"]["voxel_size"]
-            said.append(re.fullmatch(r"([0-9.]+) \((.*)\)", automatic).groups())
-        (finer, why_finer), (spacing, why) = said
+            output.append(re.fullmatch(r"([0-9.]+) \((.*)\)", automatic).groups())
+        (finer, why_finer), (spacing, why) = output
         self.assertAlmostEqual(float(spacing) / float(finer), 2, places=4)
         self.assertTrue(why_finer.startswith("finer than the median distance"))
         self.assertEqual(why, "the median distance between neighbouring points")
@@ -95,7 +95,7 @@ class Few(Clouds):
             self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.15)
 
     def test_so_few_that_the_tag_distance_has_to_be_given(self):
-        for seed in (3, 5, 6):  # others hold as they are
+        for seed in (3, 5, 6):  # with other seeds the points enclose a body anyhow
             points = random_sphere(24, seed)
             advice = re.search(r"try (--tag-distance) ([0-9.]+)",
                                self.advice(points, "the points enclose nothing", "--model", "paper"))
@@ -103,12 +103,12 @@ class Few(Clouds):
             self.assertEqual((surface["components"], surface["genus"]), (1, 0))
 
 
-def shell_share(surface):
+def shell_fraction(surface):
     return surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
 
 
 def random_knot(count, tube, noise, seed):
-    """Points on a trefoil's tube, off it by `noise`. @return them, and the tube's volume"""
+    """Points on the tube of a trefoil knot, moved by `noise`. @return points, and the tube's volume"""
     draw = random.Random(seed)
     at = lambda t: (math.sin(t) + 2 * math.sin(2 * t), math.cos(t) - 2 * math.cos(2 * t), -math.sin(3 * t))
     along = lambda t: (math.cos(t) + 4 * math.cos(2 * t), -math.sin(t) + 4 * math.sin(2 * t), -3 * math.cos(3 * t))
@@ -120,8 +120,8 @@ def random_knot(count, tube, noise, seed):
             continue  # evenly along the knot
         unit = [x / math.hypot(*tangent) for x in tangent]
         across = [draw.gauss(0, 1) for _ in range(3)]
-        share = sum(a * b for a, b in zip(across, unit))
-        across = [a - share * b for a, b in zip(across, unit)]
+        fraction = sum(a * b for a, b in zip(across, unit))
+        across = [a - fraction * b for a, b in zip(across, unit)]
         radius = (tube + noise * draw.gauss(0, 1)) / math.hypot(*across)
         points.append(tuple(c + radius * a for c, a in zip(at(t), across)))
     places = [at(2 * math.pi * n / 3000) for n in range(3001)]
@@ -129,7 +129,7 @@ def random_knot(count, tube, noise, seed):
 
 
 def random_bowl(count, thickness, noise, seed):
-    """Points on half a hollow ball of radius 1, its rim included, off it by `noise`. @return them, and its volume"""
+    """Points on half of a hollow ball of radius 1, including its rim, moved by `noise`. @return points, and its volume"""
     draw, inner = random.Random(seed), 1 - thickness
     areas = (2 * math.pi, 2 * math.pi * inner ** 2, math.pi * (1 - inner ** 2))
     points = []
@@ -146,7 +146,7 @@ def random_bowl(count, thickness, noise, seed):
 
 
 class Thin(Clouds):
-    """A few hundred points on bodies that bend more than their points lie apart: none of it is taken for noise."""
+    """A few hundred points on bodies that bend strongly compared with the spacing of the points: none of the bending is taken for noise."""
 
     def check(self, made, genus, within):
         points, volume = made
@@ -171,8 +171,8 @@ class Thin(Clouds):
         done = self.reconstruct(points)
         self.assertIn("handles", " ".join(json.loads(done.stdout).get("warnings", [])))
 
-    def test_noise_is_told_from_shape(self):
-        # The mean distance of the surface to the ball is less than half of what the points are off.
+    def test_noise_is_distinguished_from_shape(self):
+        # The mean distance of the surface from the ball is less than half of that of the points.
         points = [tuple(x * (1 + 0.03 * random.Random(n).gauss(0, 1)) for x in p) for n, p in enumerate(random_sphere(1500, 2))]
         self.assertEqual(self.reconstruct(points, "--mesh", "s.ply").returncode, 0)
         write_xyz(self.out / "ball.xyz", random_sphere(5000, 3))
@@ -182,7 +182,7 @@ class Thin(Clouds):
 
 
 def random_folds(count, waves, depth, seed):
-    """Points, evenly by area, on the unit sphere with folds along its normals."""
+    """Points, uniform by area, on the unit sphere with folds along its normals."""
     draw = random.Random(seed)
     unit = lambda v: [x / math.hypot(*v) for x in v]
     cross = lambda a, b: (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
@@ -198,7 +198,7 @@ def random_folds(count, waves, depth, seed):
 
 
 def fold_normals(points, waves, depth):
-    """Outward, of random_folds()."""
+    """Outward normals of random_folds()."""
     def height(p):
         length = math.hypot(*p)
         return length - 1 - depth * math.prod(math.cos(waves * x / length) for x in p)
@@ -211,7 +211,7 @@ def fold_normals(points, waves, depth):
 
 
 def random_scan_from_the_air(count, seed):
-    """Points on hills with houses, as from above: roofs, and nothing of the walls. A square with edge 100."""
+    """Points on hills with houses, scanned from the air: roofs, and nothing of the walls. A square with edge 100."""
     draw = random.Random(seed)
     ground = lambda x, y: 3 * math.sin(x / 23) * math.cos(y / 31) + 0.02 * x
     houses = [(draw.uniform(10, 90), draw.uniform(10, 90), draw.uniform(4, 12), draw.uniform(4, 12), draw.uniform(4, 15),
@@ -230,7 +230,7 @@ def random_scan_from_the_air(count, seed):
 
 
 class Many(Clouds):
-    """Enough points for a surface of their own."""
+    """Clouds with enough points for the surface to be computed from the cloud itself."""
 
     def report(self, points, *more):
         done = self.reconstruct(points, *more)
@@ -247,7 +247,7 @@ class Many(Clouds):
         self.assertTrue(report["cloud"]["encloses"])
         self.assertAlmostEqual(report["cloud"]["noise"], 0.01 * RADIUS, delta=0.003 * RADIUS)
         self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
-        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.005)
+        self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.005)
 
     def test_stray_points_are_left_out(self):
         draw = random.Random(4)
@@ -256,7 +256,7 @@ class Many(Clouds):
         self.assertGreater(report["cloud"]["stray_points"], 150)
         self.assertLess(report["cloud"]["stray_points"], 220)
         self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
-        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+        self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
 
     def test_one_side_is_closed_and_doubted(self):
         half = [p for p in random_sphere(12000, 5) if p[2] < 0]
@@ -267,31 +267,32 @@ class Many(Clouds):
         self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
 
     def test_from_the_air(self):
-        # What closes it is larger than the scan, leaves the domain, and would turn roofs as a whole.
+        # The closing surface is larger than the scan and leaves the domain; it must not turn whole roofs over.
         for seed in 1, 3:
             report = self.report(random_scan_from_the_air(5000, seed))
             self.assertIn("from every point", " ".join(report["warnings"]))
             self.assertTrue(report["surface"]["closed"])
             self.assertLessEqual(report["surface"]["components"], 1 + 9)  # roofs without walls may be parts of their own
-            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # that, and as much below it, and walls
+            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # the scan, the same area below it, and walls
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.25 * report["resolved"]["voxel_size"])
             self.assertLess(report["fit"]["marks_off"]["count"], 0.02 * 5000)
 
     def test_folds_are_no_views(self):
-        # Deep folds with their bottom open: normals waver in them, and what can be seen from outside is a ball.
+        # Deep folds, open at the bottom: normals vary strongly in them, and from outside only a ball is visible.
         points = [p for p in random_folds(14000, 16, 0.3, 2) if p[2] > -0.6]
         report = json.loads(self.reconstruct(points).stdout)
         self.assertTrue(report["cloud"]["encloses"])
         self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.8 * report["resolved"]["voxel_size"])
 
     def test_folds_are_no_noise(self):
-        # Walls less than three points apart are smoothed away; noise as thick as that, and what is met, is not told of.
-        told = "lie on sheets"
+        # Folds whose walls are less than three spacings apart are smoothed away, with a warning. There is none for noise of that thickness, or for
+        # folds that are resolved.
+        reported = "lie on sheets"
         folds = self.reconstruct(random_folds(10000, 30, 0.2, 1))
-        self.assertIn(told, folds.stderr)
+        self.assertIn(reported, folds.stderr)
         report = json.loads(folds.stdout)
         self.assertGreater(report["fit"]["points_to_surface"]["mean"], report["resolved"]["voxel_size"])
-        self.assertNotIn(told, self.reconstruct(random_folds(10000, 12, 0.3, 1)).stderr)
+        self.assertNotIn(reported, self.reconstruct(random_folds(10000, 12, 0.3, 1)).stderr)
         draw = random.Random(7)
         for noise in 0.03, 0.1:
             ball = [tuple(factor * x for x in p)
@@ -300,10 +301,10 @@ class Many(Clouds):
             self.assertEqual(done.returncode, 0, done.stderr)
             cloud = json.loads(done.stdout)["cloud"]
             self.assertGreater(cloud["noise"], cloud["nearest"])
-            self.assertNotIn(told, done.stderr)
+            self.assertNotIn(reported, done.stderr)
 
     def test_points_that_fill_a_solid(self):
-        # 2,000 as well: as marks on a surface they would be folded.
+        # Also with 2,000 points: as marks on a surface these would give a folded one.
         for count in 10000, 2000:
             draw = random.Random(count)
             filled = [tuple(x * f for x in p) for p in random_sphere(count, 8) for f in [draw.random() ** (1 / 3)]]
@@ -311,20 +312,20 @@ class Many(Clouds):
             self.assertTrue(report["cloud"]["fills"])
             self.assertIn("fill a solid", " ".join(report["warnings"]))
             self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
-            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.06)
+            self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.06)
         self.assertFalse(self.report(random_sphere(6000, 8))["cloud"]["fills"])
 
     def test_folds_are_met(self):
-        # On cells that are too fine their walls run into each other, and a quadric through two of them lies between.
+        # If the cells are too fine, neighbouring walls merge, and a quadric through two of them lies between them.
         for seed in 1, 2:
             report = self.report(random_folds(8000, 16, 0.3, seed))
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
             self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
 
-    def test_few_points_when_asked(self):
+    def test_few_points_if_requested(self):
         report = self.report(random_sphere(800, 6), "--init", "cloud")
         self.assertTrue(report["automatic"]["start"].startswith("cloud"))
-        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.03)
+        self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.03)
 
     def test_with_an_image_there_is_no_cloud(self):
         write_nrrd(self.out / "i.nrrd", (8, 8, 8), bytes(512), spacing=1, origin=(0, 0, 0))
@@ -337,7 +338,7 @@ class Many(Clouds):
 
 
 class Edges(Clouds):
-    """Solids with edges: these stay where they are."""
+    """Solids with edges, which must keep their positions."""
 
     def check_edges(self, points, edges, spacing, volume, within=0.05):
         done = self.reconstruct(points, "--mesh", "m.obj")
@@ -355,7 +356,7 @@ class Edges(Clouds):
             if words[:1] == ["f"]:
                 corners = [int(corner.split("/")[0]) - 1 for corner in words[1:]]
                 used |= {tuple(sorted((corners[n], corners[n - 1]))) for n in range(3)}
-        # To the mesh's edges near them, of which a sharp crease consists.
+        # Distance to those mesh edges of which a sharp crease consists.
         by_cell = {}
         for a, b in used:
             for v in (a, b):
@@ -380,7 +381,7 @@ class Edges(Clouds):
         return [tuple(x + n / count * (y - x) for x, y in zip(a, b)) for n in range(count + 1)]
 
     def test_box(self):
-        # Of edges 12, 10, 8, turned: about 0.35 apart.
+        # A rotated block with edges of length 12, 10, 8: points are about 0.35 apart.
         draw, turned = random.Random(7), lambda p: (0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2])
         sides, points = (12, 10, 8), []
         for axis in range(3):
@@ -429,7 +430,7 @@ class Edges(Clouds):
 
 
 class Scenes(Clouds):
-    """Seen from one side: the mesh ends where the points do, without being asked for."""
+    """Scenes scanned from one side: by default the mesh ends where the points end."""
 
     @staticmethod
     def on_rectangle(draw, count, corner, u, v):
@@ -450,7 +451,7 @@ class Scenes(Clouds):
         self.assertLess(report["fit"]["marks_off"]["count"], 0.002 * len(points))
 
     def test_front_of_a_house(self):
-        # Windows are set back by 0.3; a winding number alone makes hundreds of pieces of it.
+        # Windows are set back by 0.3; the winding number alone gives hundreds of pieces.
         draw = random.Random(4)
         density, depth, points, area = 120, 0.3, [], 12 * 6.0
 
@@ -470,7 +471,7 @@ class Scenes(Clouds):
         self.check_open(points, area, 1, 1)
 
     def test_ground_roofs_and_crowns(self):
-        # Parts that hang in the air above each other, each open below.
+        # Parts above each other in the air, each open below.
         draw = random.Random(5)
         points = [(x, y, math.sin(0.2 * x)) for x, y in ((draw.uniform(0, 40), draw.uniform(0, 40)) for _ in range(12000))]
         for x in (6, 24):
@@ -484,7 +485,7 @@ class Scenes(Clouds):
         ground = 40 * sum(math.hypot(1, 0.2 * math.cos(0.2 * (n + 0.5) / 100)) / 100 for n in range(4000))
         area = ground + 4 * 12 * math.hypot(4, 2.5) + 2 * 2 * math.pi * 9
         self.check_open(points, area, 5, 5)
-        # All look at the sky, from where they were seen: the roofs hide no ground from below.
+        # All triangles face the sky, from where they were scanned: no part of the ground is closed by a roof above it.
         lines = [line.split() for line in (self.out / "m.obj").read_text().splitlines()]
         places = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
         triangles = [[places[int(corner.split("/")[0]) - 1] for corner in words[1:]] for words in lines if words[:1] == ["f"]]
@@ -501,7 +502,7 @@ class Scenes(Clouds):
 
 
 class Holes(Clouds):
-    """What becomes of the surface where no points are."""
+    """Treatment of the surface where there are no points."""
 
     def bowl(self, *more, mesh=("--mesh", "m.ply")):
         half = [p for p in random_sphere(16000, 11) if p[2] < 0]
@@ -514,8 +515,8 @@ class Holes(Clouds):
         self.assertEqual(done.returncode, 0, done.stderr)
         return json.loads(done.stdout)["surface"]
 
-    def test_share_without_a_mesh(self):
-        """Where no output needs the relaxed mesh the plain surface is measured, a layer at a time."""
+    def test_fraction_without_a_mesh(self):
+        """If no output needs the relaxed mesh, the plain surface is measured layer by layer."""
         whole, plain = self.bowl(), self.bowl(mesh=())
         self.assertEqual(list(plain["mesh"]), ["triangles"])
         self.assertAlmostEqual(plain["holes"]["surface_without_points"], whole["holes"]["surface_without_points"], delta=0.005)
@@ -547,7 +548,7 @@ class Holes(Clouds):
         for surface in (report["surface"], self.level_set()):
             self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
             self.assertAlmostEqual(surface["area"] / (3 * math.pi * RADIUS ** 2), 1, delta=0.02)
-            self.assertAlmostEqual(shell_share(surface), 0.5, delta=0.01)
+            self.assertAlmostEqual(shell_fraction(surface), 0.5, delta=0.01)
         self.assertEqual(len(report["holes"]["loops"]), 1)
 
     def test_the_distance_is_the_users(self):
@@ -556,17 +557,17 @@ class Holes(Clouds):
         self.assertEqual(report["holes"]["distance"], 3 * RADIUS)
         self.assertTrue(report["surface"]["closed"])
 
-    def test_what_is_wrong_is_said(self):
+    def test_what_is_wrong_is_reported(self):
         points = random_sphere(100, 1)
-        for more, says in ((["--holes", "half"], "--holes"), (["--hole-distance", "0"], "--hole-distance: expected > 0")):
+        for more, expected_text in ((["--holes", "half"], "--holes"), (["--hole-distance", "0"], "--hole-distance: expected > 0")):
             done = self.reconstruct(points, *more)
             self.assertIn(done.returncode, (2, 3))
-            self.assertIn(says, done.stderr)
+            self.assertIn(expected_text, done.stderr)
             self.assertFalse((self.out / "s.vdb").exists())
 
 
 class Normals(Clouds):
-    """What files say of normals and sensors is checked, and told."""
+    """Normals and sensors in files are verified, and the outcome is reported."""
 
     def report(self, name, text, *more):
         (self.out / name).write_text(text)
@@ -587,34 +588,34 @@ class Normals(Clouds):
             found = report["cloud"]["normals"]
             self.assertEqual((found["given"], found["used"], found["inward"], found["from_sensor"]), (6000, True, inward, False))
             self.assertGreater(found["agree"], 0.99)
-            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+            self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
         noise = [tuple(draw.choice((-1, 1)) * x for x in n) for n in outward]
-        report, said = self.report("p.xyz", self.rows(points, noise))
+        report, output = self.report("p.xyz", self.rows(points, noise))
         self.assertFalse(report["cloud"]["normals"]["used"])
         self.assertAlmostEqual(report["cloud"]["normals"]["agree"], 0.5, delta=0.05)
-        self.assertIn("file not used: half of them", said)
-        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+        self.assertIn("file not used: half of them", output)
+        self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
 
     def test_normals_of_narrow_folds(self):
-        # The sides that the points tell by themselves are wrong here, and are against a twentieth of these.
+        # The orientation found from the points alone is wrong here, and differs from a twentieth of these normals.
         points = random_folds(10000, 20, 0.3, 1)
-        report, said = self.report("p.xyz", self.rows(points, fold_normals(points, 20, 0.3)))
+        report, output = self.report("p.xyz", self.rows(points, fold_normals(points, 20, 0.3)))
         self.assertTrue(report["cloud"]["normals"]["used"])
-        self.assertNotIn("file not used", said)
+        self.assertNotIn("file not used", output)
         self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
         self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
 
     def test_normals_stay_with_their_points_where_a_cloud_is_thinned(self):
         points = random_sphere(12000, 23)
         text = self.rows(points, [tuple(x / RADIUS for x in p) for p in points])
-        for most, used in ((6000, 6000), (0, 12000), (20000, 12000)):
-            report, _ = self.report("p.xyz", text, "--most-points", str(most))
-            told = report["input"]["points"]
-            self.assertEqual((told["count"], told.get("thinned_to", 12000)), (12000, used))
+        for maximum, used in ((6000, 6000), (0, 12000), (20000, 12000)):
+            report, _ = self.report("p.xyz", text, "--most-points", str(maximum))
+            reported = report["input"]["points"]
+            self.assertEqual((reported["count"], reported.get("thinned_to", 12000)), (12000, used))
             found = report["cloud"]["normals"]
             self.assertEqual((found["given"], found["used"]), (used, True))
             self.assertGreater(found["agree"], 0.99)
-            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+            self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
 
     def test_sensor_of_a_pcd(self):
         sensor = (0, 0, 8 * RADIUS)
@@ -628,7 +629,7 @@ class Normals(Clouds):
 
 
 class Far(Clouds):
-    """Clouds in a national grid, millions of voxels from 0."""
+    """Clouds in a national grid, millions of voxels from the origin."""
     ORIGIN = (500000.0, 5400000.0, -3000.0)
 
     def run_covol(self, *words, code=0):
@@ -654,7 +655,7 @@ class Far(Clouds):
         self.assertGreater(alike["dice"], 0.99)
         self.assertLess(alike["hausdorff"], 0.2)
         self.assertEqual(self.run_covol("check", "far.ply")[0]["problems"], 0)
-        # what follows takes the files on
+        # the other commands accept these files
         for end in ("obj", "glb"):
             self.run_covol("mesh", "far.vdb", "-o", f"again.{end}")
             self.assertGreater(self.run_covol("compare", f"again.{end}", "far.ply")[0]["compare"]["dice"], 0.999)
@@ -669,8 +670,8 @@ class Far(Clouds):
 
 
 class Open(Clouds):
-    def check_layer(self, points, says, *more):
-        advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, says, *more))
+    def check_layer(self, points, expected_text, *more):
+        advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, expected_text, *more))
         surface = self.surface(points, *more, *" ".join(advice.groups()).split())
         self.assertEqual((surface["components"], surface["genus"]), (1, 0))
 
@@ -682,16 +683,16 @@ class Open(Clouds):
         self.check_layer([(0.02 * n, 0.0, 0.0) for n in range(500)], "lie on a line")
 
     def test_what_holds_no_surface_is_refused_at_once(self):
-        # Tagging and a flow would find it out in half a minute.
+        # Tagging and a flow would need half a minute to detect it.
         draw = random.Random(2)
         line = [(0.002 * n, 0.001 * n, 0.0) for n in range(6000)]
         plane = [(draw.uniform(0, 10), draw.uniform(0, 10), 3.0) for _ in range(6000)]
-        for points, says in ((line[:2], "on a line"), (line, "on a line"), (plane[:3], "in a plane"), (plane, "in a plane")):
+        for points, expected_text in ((line[:2], "on a line"), (line, "on a line"), (plane[:3], "in a plane"), (plane, "in a plane")):
             for more in (), ("--model", "paper"):
-                self.assertNotIn("vanished after", self.advice(points, says, *more))  # no step was made
+                self.assertNotIn("vanished after", self.advice(points, expected_text, *more))  # no step was made
 
     def test_points_on_a_curve(self):
-        # The closer they lie the finer the voxels would be, whatever they tell of the surface.
+        # Closer points would give finer voxels, although they contain no more information about the surface.
         turns = [2 * math.pi * n / 1500 for n in range(1500)]
         report = json.loads(self.reconstruct([(3 * math.sin(t) + 6 * math.sin(2 * t), 3 * math.cos(t) - 6 * math.cos(2 * t),
                                                -3 * math.sin(3 * t)) for t in turns], "--mesh", "s.ply").stdout)
@@ -700,7 +701,7 @@ class Open(Clouds):
     def test_half_a_sphere(self):
         half = [p for p in random_sphere(400, 1) if p[2] > 0]
         self.check_layer(half, "enclose nothing", "--model", "paper")
-        done = self.reconstruct(half)  # what bends least closes it, and says that nothing is known of the rest
+        done = self.reconstruct(half)  # the surface of minimum bending energy closes it, with a warning that it has no support there
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("farther than", done.stderr)
         self.assertAlmostEqual(json.loads(done.stdout)["surface"]["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.2)
@@ -710,7 +711,7 @@ class Open(Clouds):
         self.advice([tuple(draw.gauss(0, 1) for _ in range(3)) for _ in range(500)], "enclose nothing", "--model", "paper")
 
     def test_structure_cut_off_by_both_ends_of_the_image(self):
-        # A bright tube along z, with rings of marks: its ends are open.
+        # A bright tube along z with rings of marks, and open ends.
         n, radius, slices = 40, 8, 20
         tube = bytes(200 if math.hypot(i - 19.5, j - 19.5) < radius else 20
                      for _ in range(slices) for j in range(n) for i in range(n))
@@ -730,7 +731,7 @@ class Open(Clouds):
                 self.assertAlmostEqual(json.loads(done.stdout)["surface"]["volume"] / truth, 1, delta=within)
 
 
-del Clouds  # has no tests
+del Clouds  # a base class without tests
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,4 +1,4 @@
-"""Bricks by Snakemake on this machine, and through a Slurm that is started for the test.
+"""Bricks by Snakemake on this machine, and through a Slurm cluster that is started for the test.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cluster_test.py
 """
@@ -30,7 +30,7 @@ def missing(*programs):
 
 
 class Workflow(Case):
-    """A torus in bricks, once without a scheduler; what Snakemake makes of it has to be the same."""
+    """A torus in bricks, computed once without a scheduler; Snakemake's result has to be the same."""
 
     @classmethod
     def setUpClass(cls):
@@ -59,11 +59,11 @@ class Workflow(Case):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
 
     def check(self, run):
-        said = run.communicate(timeout=600)[0]
-        self.assertEqual(run.returncode, 0, said)
+        output = run.communicate(timeout=600)[0]
+        self.assertEqual(run.returncode, 0, output)
         self.assertEqual((self.out / "joined.ply").read_bytes().split(b"end_header")[1],
                          (self.inputs / "calm.ply").read_bytes().split(b"end_header")[1])
-        return said
+        return output
 
 
 @unittest.skipIf(missing("snakemake"), "snakemake is not installed")
@@ -84,7 +84,7 @@ class Snakemake(Workflow):
 
 @unittest.skipIf(missing("snakemake"), "snakemake is not installed")
 class ManyImages(Case):
-    """Each image, or frame, is what covol segment makes of it by itself."""
+    """Each image, or frame, has the same result as with covol segment alone."""
 
     def run_workflow(self, *config):
         done = subprocess.run(["snakemake", "-s", str(EXAMPLES / "many/Snakefile"), "-j", "2", "--config", *map(str, config),
@@ -103,8 +103,8 @@ class ManyImages(Case):
         for shape in ("sphere", "torus", "two-spheres"):
             self.run_covol("phantom", shape, "--size", "40", "--count", "2000", "-o", f"{shape} a.nrrd", "--points", f"{shape} a.xyz")
         (self.out / "torus a.xyz").unlink()
-        said, rows = self.run_workflow("images={name}.nrrd", "marks={name}.xyz")
-        self.assertIn("torus a: no torus a.xyz, left out", said)
+        output, rows = self.run_workflow("images={name}.nrrd", "marks={name}.xyz")
+        self.assertIn("torus a: no torus a.xyz, left out", output)
         self.assertEqual([row["name"] for row in rows], ["sphere a", "two-spheres a"])
         self.assertTrue(all(float(row["volume"]) > 0 for row in rows))
         self.compare("sphere a", "sphere a.nrrd", "--points", "sphere a.xyz")
@@ -156,7 +156,7 @@ PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
 @unittest.skipIf(os.geteuid() != 0, "a Slurm of one's own needs root")
 class Slurm(Workflow):
     def start_slurm(self):
-        """@return the environment of its clients; None where this machine does not let it run"""
+        """@return the environment for Slurm's clients; None if Slurm cannot be run on this machine"""
         folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-slurm-"))
         for name in ("munge", "state", "spool"):
             (folder / name).mkdir(mode=0o700)

@@ -19,7 +19,7 @@ from cli_test import COVOL, Case
 from points_test import roi
 from structures_test import rows_of
 
-# Axes, voxels and place all differ.
+# Axes, voxel sizes and origin all differ.
 SIZES = (80, 70, 24)
 SPACING = (0.5, 0.4, 1.5)
 ORIGIN = (12.0, 31.0, 207.0)
@@ -28,13 +28,13 @@ DATA = os.environ.get("COVOL_DATA")
 
 
 def outline(radius, k, count=48, centre=CENTRE):
-    """A circle of a world radius on slice k, voxels."""
+    """A circle of a world radius on slice k, in voxels."""
     turns = 2 * np.pi * np.arange(count) / count
     return [(centre[0] + radius * math.cos(t) / SPACING[0], centre[1] + radius * math.sin(t) / SPACING[1], k) for t in turns]
 
 
 def radius_at(k, whole=11.0, half=12.0):
-    """Of an ellipsoid of revolution, `half` along z, world units."""
+    """Radius of an ellipsoid of revolution, with semi-axis `half` along z, on slice k, in world units."""
     w = (k - CENTRE[2]) * SPACING[2] / half
     return whole * math.sqrt(max(0.0, 1 - w * w))
 
@@ -43,7 +43,7 @@ ELLIPSOID = 4 / 3 * math.pi * 11 * 11 * 12
 
 
 def ellipsoid(step=1):
-    """Closed outlines on every step-th slice that the ellipsoid meets by more than a voxel."""
+    """Closed outlines on every step-th slice that cuts the ellipsoid by more than a voxel."""
     return [outline(radius_at(k), k) for k in range(4, 19, step)]
 
 
@@ -98,11 +98,11 @@ class Bodies(ContoursCase):
     def test_every_slice(self):
         report = self.report("segment", self.solid, "--contours", self.table("all.csv", ellipsoid()), "-o", "s.vdb", "--rho", 0,
                              "--mask", "m.nrrd")
-        told = report["input"]["contours"]
-        self.assertEqual((told["closed"], told["open"], told["slices"]), (15, 0, 15))
-        self.assertAlmostEqual(told["slice_distance"], SPACING[2])
+        reported = report["input"]["contours"]
+        self.assertEqual((reported["closed"], reported["open"], reported["slices"]), (15, 0, 15))
+        self.assertAlmostEqual(reported["slice_distance"], SPACING[2])
         self.assertEqual(report["input"]["points"]["count"], 15 * 48)
-        self.assertEqual(report["input"]["points"]["densified"], told["along"] + told["between"])
+        self.assertEqual(report["input"]["points"]["densified"], reported["along"] + reported["between"])
         self.assertTrue(report["automatic"]["start"].startswith("contours"))
         self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
         self.assertEqual(report["solve"]["stop_reason"], "steady")
@@ -110,13 +110,13 @@ class Bodies(ContoursCase):
         self.assertLess(report["fit"]["points_to_surface"]["p95"], 0.4)
 
     def test_a_small_body_in_the_corner_is_not_inside_out(self):
-        # Two outlines, the second one far larger than the first and beside the image's last slice.
+        # Two outlines; the second one is far larger than the first and close to the image's last slice.
         k, radius = SIZES[2] - 3, 4.0
         corner = (SIZES[0] - 1 - 0.7 * radius / SPACING[0], SIZES[1] - 1 - 0.7 * radius / SPACING[1])
         lines = [outline(r, at, centre=corner) for r, at in ((0.9, k - 2), (radius, k))]
         lines = [[(min(x, SIZES[0] - 0.5), min(y, SIZES[1] - 0.5), at) for x, y, at in line] for line in lines]
         report = self.report("segment", self.solid, "--contours", self.table("corner.csv", lines), "-o", "s.vdb", "--rho", 0)
-        # 45 degrees over two slices and a half at most, beyond a disc of that radius.
+        # Beyond a disc of that radius, at most 45 degrees over two and a half slices.
         self.assertLess(report["surface"]["volume"], math.pi * (radius + 2.5 * SPACING[2]) ** 2 * 5 * SPACING[2])
         self.assertEqual(report["surface"]["components"], 1)
 
@@ -124,11 +124,11 @@ class Bodies(ContoursCase):
         for step in (2, 4, 7):
             with self.subTest(step=step):
                 volume = self.volume(self.solid, "--contours", self.table(f"every_{step}.csv", ellipsoid(step)), "--rho", 0)
-                # Of three slices the radius between is a cubic with no slope at the equator: 8.9 halfway for 9.9.
+                # With only three slices the radius in between is a cubic with zero slope at the equator: 8.9 instead of 9.9 halfway.
                 self.assertLess(abs(volume / ELLIPSOID - 1), 0.03 if step < 7 else 0.08)
 
     def test_the_image_helps_between_slices(self):
-        # The marks know nothing of the waist between two slices; the image shows it, 2.5 voxels inside the guess.
+        # The marks contain no information about the waist between two slices; the image shows it, 2.5 voxels inside the guess.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         waist = 9 - 0.5 * np.cos(np.pi * z / 6)
         image = self.inputs / "hourglass.nrrd"
@@ -159,7 +159,7 @@ class Bodies(ContoursCase):
         path = self.table("few.csv", few)
         lines = self.volume(self.solid, "--contours", path, "--rho", 0, "--contour-curve", "lines")
         spline = self.volume(self.solid, "--contours", path, "--rho", 0)
-        octagon = 8 * math.sin(math.pi / 4) / (2 * math.pi)  # its share of the circle
+        octagon = 8 * math.sin(math.pi / 4) / (2 * math.pi)  # its fraction of the circle's area
         self.assertAlmostEqual(lines / ELLIPSOID, octagon, delta=0.02)
         self.assertAlmostEqual(spline / ELLIPSOID, 1, delta=0.03)
 
@@ -184,15 +184,15 @@ class Bodies(ContoursCase):
         volume = json.loads((self.out / "r.json").read_text())["surface"]["volume"]
         self.assertLess(abs(volume / ELLIPSOID - 1), 0.03)
 
-    def test_a_single_slice_asks_for_a_thickness(self):
+    def test_a_single_slice_requires_for_a_thickness(self):
         one = self.table("one.csv", [outline(11, 11)])
-        self.refuse("segment", self.solid, "--contours", one, "-o", "s.vdb", "--rho", 0, code=3, says="mark a second slice")
+        self.refuse("segment", self.solid, "--contours", one, "-o", "s.vdb", "--rho", 0, code=3, expected_text="mark a second slice")
         height = 9.0
         volume = self.volume(self.solid, "--contours", one, "--rho", 0, "--contour-thickness", height)
-        self.assertLess(abs(volume / (math.pi * 121 * height / 2) - 1), 0.05)  # two paraboloids: half of the cylinder
+        self.assertLess(abs(volume / (math.pi * 121 * height / 2) - 1), 0.05)  # two paraboloids: half of the cylinder's volume
 
     def test_points_move_the_body(self):
-        # The domes reach three voxels too far; the marks at the poles know better.
+        # The domes reach three voxels too far; the marks at the poles correct them.
         path = self.table("middle.csv", [outline(radius_at(k), k) for k in (6, 11, 16)])
         poles = self.inputs / "poles.csv"
         poles.write_text("x,y,z\n%f,%f,%f\n%f,%f,%f\n" % (*CENTRE[:2], CENTRE[2] + 8, *CENTRE[:2], CENTRE[2] - 8))
@@ -203,7 +203,7 @@ class Bodies(ContoursCase):
         self.assertLess(report["fit"]["points_to_surface"]["max"], 1)
 
     def test_a_thin_bright_body_is_no_line(self):
-        # As wide as the sides of its marks are apart: the other wall is not the other side of a line.
+        # The rod is as wide as its opposite marks are apart: the other wall must not be taken for the other side of a line.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         image = self.inputs / "rod.nrrd"
         write_nrrd(image, 30 + 180 * np.clip((1 - np.hypot(x, y) / 2.2) * 2.2 / 0.5 + 0.5, 0, 1))
@@ -221,12 +221,12 @@ class Bodies(ContoursCase):
 
     def test_an_exterior_seed_in_the_body_tags_instead(self):
         seed = ",".join(map(str, CENTRE_WORLD))
-        inner = [outline(5, k, 36) for k in range(8, 15)]  # closed below and above by nothing but the seed
+        inner = [outline(5, k, 36) for k in range(8, 15)]  # bounded below and above by nothing but the seed
         report = self.report("segment", self.solid, "--contours", self.table("whole.csv", ellipsoid()), "-o", "s.vdb", "--rho", 0)
         whole = report["surface"]["volume"]
         cavity = self.report("segment", self.solid, "--contours", self.table("cavity.csv", ellipsoid() + inner), "-o", "c.vdb",
                              "--rho", 0, "--exterior-seed", seed)
-        self.assertTrue(cavity["automatic"]["start"].startswith("contours"))  # the seed is outside already
+        self.assertTrue(cavity["automatic"]["start"].startswith("contours"))  # the seed is already outside
         self.assertGreater(whole - cavity["surface"]["volume"], math.pi * 25 * 6 * SPACING[2])
         shell = self.report("segment", self.solid, "--contours", self.table("whole.csv", ellipsoid()), "-o", "t.vdb", "--rho", 0,
                             "--exterior-seed", seed, "--max-steps", 1)
@@ -245,7 +245,7 @@ class Bodies(ContoursCase):
         head, body = raw.split(b"\n\n", 1)
         dark.write_bytes(head + b"\n\n" + (240 - np.frombuffer(body, np.uint8)).tobytes())
         self.assertEqual(self.report("segment", dark, "--contours", path, "-o", "s.vdb")["resolved"]["edge_feature"], "dark-line")
-        # Marks that run 0.7 beside the membrane on slices 4 apart: the middle of it is found between them.
+        # Marks 0.7 beside the membrane on slices 4 apart: the surface is to find the middle of the membrane between them.
         beside = self.table("beside.csv", [outline(radius_at(k) - 0.7, k) for k in range(5, 18, 4)])
         volumes = {feature: self.volume(self.shell, "--contours", beside, "--edge-feature", feature)
                    for feature in ("bright-line", "slope")}
@@ -254,7 +254,7 @@ class Bodies(ContoursCase):
         self.assertGreater(volumes["bright-line"], volumes["slope"])
 
     def test_evidence_on_membranes(self):
-        # The membrane of the lower half has faded: nothing holds the surface there, far from the only marks.
+        # The membrane of the lower half has faded: nothing supports the surface there, far from the only marks.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         r = np.sqrt((x / 11) ** 2 + (y / 11) ** 2 + (z / 12) ** 2)
         image = self.inputs / "faded.nrrd"
@@ -274,11 +274,11 @@ class Bodies(ContoursCase):
         report = self.report("reconstruct", "--contours", world, "-o", "s.vdb", "--voxel-size", 0.5)
         self.assertLess(abs(report["surface"]["volume"] / ELLIPSOID - 1), 0.02)
         (self.out / "s.vdb").unlink()
-        self.refuse("reconstruct", "--contours", f"a={world}", "-o", "s.vdb", code=2, says="several structures need an image")
+        self.refuse("reconstruct", "--contours", f"a={world}", "-o", "s.vdb", code=2, expected_text="several structures need an image")
 
 
 class Formats(ContoursCase):
-    """The same outlines from each program: the same surface."""
+    """The same outlines as each program writes them give the same surface."""
 
     def same(self, path, *more):
         path_of_table = self.table("table.csv", ellipsoid(2))
@@ -286,7 +286,7 @@ class Formats(ContoursCase):
         self.run_covol("segment", self.solid, "--contours", path, "-o", "b.vdb", "--rho", 0, *more)
         alike = self.report("compare", "a.vdb", "b.vdb")["compare"]
         self.assertGreater(alike["dice"], 0.9999)
-        # A tenth of a voxel: points that differ in the sixth digit fall into other cells when close ones are merged.
+        # A tenth of a voxel: points that differ in the sixth digit may fall into different cells when close points are merged.
         self.assertLess(alike["hausdorff"], 0.1 * min(SPACING))
 
     def test_fiji_roi_manager(self):
@@ -325,13 +325,13 @@ class Formats(ContoursCase):
 
     def test_hostile_files(self):
         bad = self.inputs / "bad.csv"
-        for text, says in [("slice,contour,x_px,y_px\n", "bad.csv"), ("slice,contour,x_px,y_px\n3,0,5\n", "bad.csv"),
+        for text, expected_text in [("slice,contour,x_px,y_px\n", "bad.csv"), ("slice,contour,x_px,y_px\n3,0,5\n", "bad.csv"),
                            ("slice,contour,x_px,y_px\n3,0,nan,5\n", "bad.csv"), ("x,y,z\n20,40,220\n21,41,221\n", "loose points"),
                            ("slice,contour,x_px,y_px\n3,0,10,10\n3,0,900,10\n3,0,10,20\n", "outside"),
                            ("contour,x,y,z\n0,20,40,210\n0,30,41,222\n0,25,50,230\n", "one slice")]:
             bad.write_text(text)
-            self.refuse("segment", self.solid, "--contours", bad, "-o", "s.vdb", "--rho", 0, code=3, says=says)
-        self.refuse("segment", self.solid, "--contours", "none.csv", "-o", "s.vdb", code=4, says="none.csv")
+            self.refuse("segment", self.solid, "--contours", bad, "-o", "s.vdb", "--rho", 0, code=3, expected_text=expected_text)
+        self.refuse("segment", self.solid, "--contours", "none.csv", "-o", "s.vdb", code=4, expected_text="none.csv")
 
 
 class Several(ContoursCase):
@@ -354,7 +354,7 @@ class Several(ContoursCase):
         self.assertEqual(core["input"]["contours"]["slices"], 9)
         self.assertEqual(core["input"]["points"]["count"], 9 * 36)
         self.assertEqual(core["input"]["points"]["densified"], core["input"]["contours"]["along"] + core["input"]["contours"]["between"])
-        # The core's caps are two paraboloids of one slice's height, whose rims curvature rounds.
+        # The caps of the core are two paraboloids one slice high, whose rims are rounded by curvature.
         self.assertAlmostEqual(core["surface"]["volume"] / (math.pi * 25 * 9 * SPACING[2]), 1, delta=0.08)
         both = layer["surface"]["volume"] + core["surface"]["volume"]
         self.assertAlmostEqual(both / ELLIPSOID, 1, delta=0.03)
@@ -370,22 +370,22 @@ class Several(ContoursCase):
         dirty.write_text(points.read_text() + "".join("%f %f %f\n" % (ORIGIN[0] + n, ORIGIN[1] + 2 * n, ORIGIN[2]) for n in range(4)))
         report = self.report("segment", self.solid, "--points", f"core={dirty}", "--contours", f"whole={self.table('all.csv', ellipsoid())}",
                              "-o", "s.vdb", "--rho", 0, "--remove-outliers")
-        core, whole = report["structures"]  # those of --points come first
+        core, whole = report["structures"]  # structures of --points come first
         self.assertEqual((core["name"], whole["name"]), ("core", "whole"))
         self.assertEqual(core["input"]["points"]["cleanup"]["outliers"], 4)
         self.assertNotIn("contours", core["input"])
         self.assertLess(abs(core["surface"]["volume"] / (4 / 3 * math.pi * 125) - 1), 0.05)
         self.assertEqual(report["overlaps"][0]["inner"], "core")
-        # One structure may have both.
+        # One structure may have points and contours.
         both = self.report("segment", self.solid, "--points", f"core={points}", "--contours", f"core={self.core}", "-o", "t.vdb",
                            "--rho", 0)["structures"]
         self.assertEqual([s["name"] for s in both], ["core"])
         self.assertEqual(both[0]["input"]["points"]["count"], 3000 + 9 * 36)
 
     def test_names(self):
-        self.refuse("segment", self.solid, "--contours", f"a={self.core}", self.layer, "-o", "s.vdb", code=2, says="name")
-        self.refuse("segment", self.solid, "--contours", self.core, "--points", f"a={self.layer}", "-o", "s.vdb", code=2, says="name")
-        self.refuse("segment", self.solid, "--contours", f"a={self.core}", "b=none.csv", "-o", "s.vdb", code=4, says="none.csv")
+        self.refuse("segment", self.solid, "--contours", f"a={self.core}", self.layer, "-o", "s.vdb", code=2, expected_text="name")
+        self.refuse("segment", self.solid, "--contours", self.core, "--points", f"a={self.layer}", "-o", "s.vdb", code=2, expected_text="name")
+        self.refuse("segment", self.solid, "--contours", f"a={self.core}", "b=none.csv", "-o", "s.vdb", code=4, expected_text="none.csv")
 
     def test_a_grid_by_its_name(self):
         self.run_covol("segment", self.solid, "--contours", f"layer={self.layer}", f"core={self.core}", "-o", "s.vdb", "--rho", 0,
@@ -394,7 +394,7 @@ class Several(ContoursCase):
                         ("render", "{}", "-o", "p.png"), ("compare", "{}", "s.vdb:core")):
             with self.subTest(command[0]):
                 done = self.run_covol(*[str(a).format("s.vdb") for a in command])
-                if command[0] != "render":  # which draws them all
+                if command[0] != "render":  # which draws all of them
                     self.assertIn("'layer' is taken of the level sets layer, core", done.stderr)
                 done = self.run_covol(*[str(a).format("s.vdb:core") for a in command])
                 self.assertNotIn("warning", done.stderr)
@@ -403,7 +403,7 @@ class Several(ContoursCase):
         self.assertAlmostEqual(volume / (math.pi * 25 * 9 * SPACING[2]), 1, delta=0.08)
         self.assertGreater(self.report("compare", "s.vdb:core", "m.nrrd", "--label-b", 2)["compare"]["dice"], 0.98)
         self.assertLess(self.report("compare", "s.vdb:layer", "s.vdb:core")["compare"]["dice"], 0.01)
-        # What was separated from the layer goes back to its own marks.
+        # Without the separation from the layer, the core fits its own marks again.
         alone = self.report("segment", self.solid, "--contours", self.core, "-o", "alone.vdb", "--rho", 0)["surface"]["volume"]
         again = self.report("segment", self.solid, "--contours", self.core, "-o", "again.vdb", "--rho", 0, "--init", "vdb:s.vdb:core")
         self.assertIn("near its marks", again["automatic"]["start"])
@@ -429,7 +429,7 @@ class Several(ContoursCase):
 
 @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
 class Embryo(Case):
-    """Two tissues among membranes that all look alike, 512 x 512 x 58, marked on every slice or on every fifth."""
+    """Two tissues among membranes that look alike, 512 x 512 x 58, marked on every slice or on every fifth."""
 
     @classmethod
     def setUpClass(cls):
@@ -443,7 +443,7 @@ class Embryo(Case):
         return 2 * (mask & truth).sum() / (mask.sum() + truth.sum())
 
     def both(self, ve, exe, *more):
-        """Dice of VE and ExE from one run, and its report."""
+        """Dice coefficients of VE and ExE from one run, and its report."""
         report = self.report("segment", self.folder / "embryo.tif", "--contours", f"ve={ve}", f"exe={exe}", "--exterior-seed",
                              "ve:89.6,89.6,28.5", "-o", "e.vdb", "--mask", "e.tif", *more)
         return self.dice("e.tif", 1, 1), self.dice("e.tif", 2, 2), report

@@ -1,4 +1,4 @@
-"""Files that guided fuzzing found worth keeping: none crashes its reader, hangs it or makes it take memory."""
+"""Files from guided fuzzing: none of them crashes its reader, hangs it or makes it allocate too much memory."""
 import os
 import pathlib
 import shutil
@@ -15,12 +15,12 @@ class Corpus(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="covol-corpus-") as folder:
             with tarfile.open(FUZZ / "corpus.tar.xz") as archive:
                 archive.extractall(folder)
-            for path in (FUZZ / "regressions/pixels").iterdir():  # damaged behind their headers
+            for path in (FUZZ / "regressions/pixels").iterdir():  # these are damaged after their headers
                 shutil.copy(path, pathlib.Path(folder) / path.suffix[1:])
             formats = sorted(pathlib.Path(folder).iterdir())
             self.assertGreaterEqual(len(formats), 20)
             done = subprocess.run([os.environ["COVOL_READ_CORPUS"], folder], capture_output=True, text=True, errors="replace", timeout=600)
-            lines = [line for line in done.stdout.splitlines() if folder in line]  # OpenVDB warns among them
+            lines = [line for line in done.stdout.splitlines() if folder in line]  # OpenVDB's own warnings appear among the lines
             self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr[-2000:])
             self.assertEqual(len(lines), sum(len(list(one.iterdir())) for one in formats))
 

@@ -1,4 +1,4 @@
-"""Results for hospitals' programs: DICOM segmentations and RT structure sets, judged by pydicom; structure sets as marks.
+"""Results for clinical programs: DICOM segmentations and RT structure sets, checked with pydicom; structure sets as marks.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/dicom_results_test.py
 """
@@ -20,7 +20,7 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-SIZE, SPACING = (29, 25, 14), (0.5, 0.8, 1.5)  # 725 pixels of a slice: no whole bytes
+SIZE, SPACING = (29, 25, 14), (0.5, 0.8, 1.5)  # 725 pixels in a slice: no whole number of bytes
 LEFT, RIGHT, HALF = (8, 12, 6.2), (20, 13, 7), (4.6, 6.3, 4.1)  # voxels
 SEG, RTSTRUCT = "1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.481.3"
 ENHANCED_CT = "1.2.840.10008.5.1.4.1.1.2.1"
@@ -28,7 +28,7 @@ EPOCH = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
 
 
 def turned(tilt=0.0):
-    """The lattice as a matrix: rotated, and with slices that lean, as those of a tilted gantry."""
+    """The lattice as a matrix: rotated, and with sheared slices, as with a tilted gantry."""
     a, b = np.radians(20), np.radians(-35)
     x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     z = np.array([[np.cos(b), -np.sin(b), 0], [np.sin(b), np.cos(b), 0], [0, 0, 1]])
@@ -54,7 +54,7 @@ def on_body(at, affine, count=220):
 
 
 def series(folder, affine, **more):
-    """Slices whose names and numbers are in another order than their places."""
+    """Slices whose file names and instance numbers are not in spatial order."""
     folder.mkdir()
     data = np.where(inside(LEFT) | inside(RIGHT), 900, 100).astype(np.uint16)
     axes = affine[:3, :3] / np.linalg.norm(affine[:3, :3], axis=0)
@@ -72,7 +72,7 @@ def series(folder, affine, **more):
 
 
 def places(ds):
-    """File of each instance of a folder, by its UID."""
+    """The files of a folder by the UID of their instance."""
     return {one.SOPInstanceUID: one for one in ds}
 
 
@@ -93,7 +93,7 @@ class DicomCase(Case):
                 "-o", "s.vdb", *more)
 
     def faults(self, ds, kind, filled, there=()):
-        """Attributes that have to be there: with a value (type 1), and at all (type 2). PS3.3."""
+        """Attributes that must be present: with a value (type 1), and possibly empty (type 2). PS3.3."""
         found = []
         for name in ("SOPClassUID", "SOPInstanceUID", "StudyInstanceUID", "SeriesInstanceUID", "Modality", "FrameOfReferenceUID",
                      *filled):
@@ -118,7 +118,7 @@ class DicomCase(Case):
         return found
 
     def check_seg(self, ds):
-        """What highdicom's Segmentation class and PS3.3 A.51 ask for."""
+        """The requirements of highdicom's Segmentation class and of PS3.3 A.51."""
         faults = self.faults(ds, SEG, (
             "ImageType", "InstanceNumber", "ContentDate", "ContentTime", "ContentLabel", "SegmentationType", "SegmentSequence",
             "ManufacturerModelName", "DeviceSerialNumber", "SoftwareVersions", "LossyImageCompression", "SamplesPerPixel",
@@ -149,7 +149,7 @@ class DicomCase(Case):
             self.assertEqual(frame.SegmentIdentificationSequence[0].ReferencedSegmentNumber, segment)
 
     def labels_of(self, ds, affine):
-        """[z, y, x] on the lattice, each frame where its position says."""
+        """[z, y, x] on the lattice, with each frame at its stated position."""
         labels = np.zeros(SIZE[::-1], int)
         shared = ds.SharedFunctionalGroupsSequence[0]
         np.testing.assert_allclose(shared.PixelMeasuresSequence[0].PixelSpacing, [SPACING[1], SPACING[0]])
@@ -237,7 +237,7 @@ class Segmentations(DicomCase):
                                places=5)
 
     def test_an_image_that_is_no_dicom(self):
-        """In mm, whatever its unit; a study and a frame of reference of its own."""
+        """In mm, whatever the image's unit; with a study and a frame of reference of its own."""
         data = np.where(inside(LEFT), 200, 20).astype(np.uint8)
         header = ("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 29 25 14\nspace directions: (500,0,0) "
                   "(0,800,0) (0,0,1500)\nencoding: raw\nspace origin: (100,200,300)\n")
@@ -253,8 +253,8 @@ class Segmentations(DicomCase):
         contours = pydicom.dcmread(str(self.out / "r.dcm"))
         self.assertEqual((contours.FrameOfReferenceUID, contours.StudyInstanceUID), (ds.FrameOfReferenceUID, ds.StudyInstanceUID))
         (self.out / "u.nrrd").write_bytes(header.encode() + b"\n" + data.tobytes())
-        said = self.run_covol("mask", "s.vdb", "--like", "u.nrrd", "-o", "u.dcm").stderr
-        self.assertIn("taken as mm", said)
+        output = self.run_covol("mask", "s.vdb", "--like", "u.nrrd", "-o", "u.dcm").stderr
+        self.assertIn("taken as mm", output)
 
     def test_what_lies_beside_a_series_is_no_slice_of_it(self):
         series(self.out / "scan", self.affine)
@@ -275,7 +275,7 @@ class Segmentations(DicomCase):
 
 
 def loops(contour):
-    """Points of a contour, and twice the signed area in its plane's own axes."""
+    """Points of a contour, and twice its signed area in the axes of its plane."""
     return np.array(contour.ContourData, float).reshape(-1, 3)
 
 
@@ -333,7 +333,7 @@ class StructureSets(DicomCase):
             self.assertAlmostEqual(volume / report["structures"][number - 1]["surface"]["volume"], 1, delta=0.04)
 
     def shell(self):
-        """A ball with a hole, and another ball within that: [z, y, x] at 1 mm."""
+        """A ball with a cavity, and another ball within the cavity: [z, y, x] at 1 mm."""
         z, y, x = np.meshgrid(*(np.arange(41) - 20.0,) * 3, indexing="ij")
         r = np.sqrt(x * x + y * y + z * z)
         return (np.clip(np.minimum(16 - r, np.maximum(r - 10, 4 - r)), -1, 1) * 100 + 100).astype(np.uint8)
@@ -351,7 +351,7 @@ class StructureSets(DicomCase):
         ds = self.shell_contours()
         self.check_structures(ds)
         middle = [loops(c) for c in self.contours(ds) if abs(float(c.ContourData[2]) - 20) < 1e-6]
-        self.assertEqual(len(middle), 2)  # the shell with its hole, and the ball within
+        self.assertEqual(len(middle), 2)  # the shell with its cavity, and the ball within
         areas = sorted(area(points, np.eye(3)[:, :2]) for points in middle)
         slice_ = self.shell()[20] > 100
         ball = np.hypot(*(np.argwhere(slice_) - 20).T) < 7
@@ -375,10 +375,10 @@ class StructureSets(DicomCase):
         for number, (name, at) in enumerate((("Niere rechts", RIGHT), ("left", LEFT)), 4):
             contours = []
             for i in range(int(at[0]) - 4, int(at[0]) + 5):
-                share = 1 - ((i - at[0]) / HALF[0]) ** 2
+                fraction = 1 - ((i - at[0]) / HALF[0]) ** 2
                 turn = np.linspace(0, 2 * np.pi, 60, endpoint=False)
-                voxels = np.stack([np.full(60, float(i)), at[1] + HALF[1] * share ** 0.5 * np.cos(turn),
-                                   at[2] + HALF[2] * share ** 0.5 * np.sin(turn)], 1)
+                voxels = np.stack([np.full(60, float(i)), at[1] + HALF[1] * fraction ** 0.5 * np.cos(turn),
+                                   at[2] + HALF[2] * fraction ** 0.5 * np.sin(turn)], 1)
                 points = voxels @ self.affine[:3, :3].T + self.affine[:3, 3]
                 one = item(ContourGeometricType=kind, ContourData=[f"{c:.6f}" for c in points.ravel()])
                 if counts:
@@ -400,7 +400,7 @@ class StructureSets(DicomCase):
         return path
 
     def test_structures_of_other_programs(self):
-        """ROI names are structures, whatever the planes; implicit and explicit VR."""
+        """ROI names become structures, in planes of any direction; implicit and explicit VR."""
         for implicit, kind, counts in ((False, "CLOSED_PLANAR", True), (True, "CLOSEDPLANAR_XOR", False)):
             self.foreign(implicit, kind, counts)
             report = self.report("segment", self.scan, "--contours", "foreign.dcm", "-o", "s.vdb", "--mask", "m.nii.gz")
@@ -412,9 +412,9 @@ class StructureSets(DicomCase):
 
     def test_a_name_for_a_file_with_several(self):
         self.foreign()
-        said = self.refused("segment", self.scan, "--contours", "organ=foreign.dcm", "-o", "s.vdb")
-        self.assertIn("'Niere rechts', 'left'", said)
-        self.assertIn("--structure-column roi", said)
+        output = self.refused("segment", self.scan, "--contours", "organ=foreign.dcm", "-o", "s.vdb")
+        self.assertIn("'Niere rechts', 'left'", output)
+        self.assertIn("--structure-column roi", output)
         self.assertIn("expected a table with a column 'cell'",
                       self.refused("segment", self.scan, "--contours", "foreign.dcm", "--structure-column", "cell", "-o", "s.vdb"))
 
@@ -423,7 +423,7 @@ class StructureSets(DicomCase):
         self.assertIn("expected contours of one structure", self.refused("convert", "foreign.dcm", "p.csv"))
 
     def test_damaged_files(self):
-        """An error that says so, never a crash, wherever the file ends and whatever its lengths say."""
+        """A clear error and never a crash, wherever the file is truncated and whatever lengths it claims."""
         path = self.foreign()
         whole = path.read_bytes()
         for end in (*range(100, 1400, 37), len(whole) // 2, len(whole) - 1):
@@ -439,12 +439,12 @@ class StructureSets(DicomCase):
 
     def test_wrong_contents(self):
         one = lambda **more: Sequence([item(ReferencedROINumber=4, ContourSequence=Sequence([item(**more)]))])  # noqa: E731
-        for contours, says in ((one(ContourGeometricType="CLOSED_PLANAR", ContourData=["1", "2"]), "three numbers"),
+        for contours, expected_text in ((one(ContourGeometricType="CLOSED_PLANAR", ContourData=["1", "2"]), "three numbers"),
                                (one(ContourGeometricType="CLOSED_PLANAR", ContourData=["1"] * 9, NumberOfContourPoints=2), "'2' points"),
                                (one(ContourGeometricType="BLOB", ContourData=["1"] * 9), "'BLOB'"),
                                (Sequence([]), "at least one point")):
             self.foreign(ROIContourSequence=contours)
-            self.assertIn(says, self.refused("segment", self.scan, "--contours", "left=foreign.dcm", "-o", "s.vdb"))
+            self.assertIn(expected_text, self.refused("segment", self.scan, "--contours", "left=foreign.dcm", "-o", "s.vdb"))
         slice_ = next(self.scan.iterdir())
         self.assertIn("got a DICOM file of modality 'CT'", self.refused("segment", self.scan, "--contours", slice_, "-o", "s.vdb"))
 

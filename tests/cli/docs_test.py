@@ -1,10 +1,11 @@
-"""The commands in README.md and docs run as they are printed, and the names of options in them exist. Standard library only.
+"""The commands in README.md and docs work as printed, and all options that they name exist. Standard library only.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/docs_test.py
 
-Blocks that begin with ```bash are run, those of a page one after the other, in a folder that holds the sample data and an empty
-folder out; the program is found as covol. Those that begin with ```sh need data of COVOL_DATA, and are run where it is set. Other
-blocks are only read. They make the pictures that the page shows: with COVOL_PICTURES set to a folder, these are put there.
+Blocks that begin with ```bash are run, those of a page one after the other, in a folder that contains the sample data and an empty
+folder `out`; the program is on the path as covol. Blocks that begin with ```sh need the data of COVOL_DATA and are run if it is
+set. Other blocks are only checked. The commands make the pictures of the pages: if COVOL_PICTURES is set to a folder, the pictures
+are stored there.
 """
 import json
 import os
@@ -26,7 +27,7 @@ def blocks(page, *languages):
 
 
 def without_data(text):
-    """A page without its blocks of COVOL_DATA, and their pictures."""
+    """A page without the blocks that need COVOL_DATA, and without their pictures."""
     return re.sub(r"^```sh\n.*?^```\n\n!\[.*?\n", "", text, flags=re.M | re.S)
 
 
@@ -68,13 +69,13 @@ class Pages(unittest.TestCase):
             for block in blocks(page):
                 for line in re.sub(r"\\\n", " ", block).splitlines():
                     if command := re.match(r"\s*covol (?:brick )?(?:plan )?([a-z]\w*)", line):
-                        # run and join of bricks go on with the planned command.
+                        # The options of brick run and join include those of the planned command.
                         known = options["segment" if command[1] in ("run", "join") else command[1]]
                         for flag in re.findall(r"(?<=\s)--?[a-z][\w-]*", line.split("#")[0]):
                             self.assertIn(flag, known, f"{page.relative_to(ROOT)}: {line}")
             prose = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
             for flag in re.findall(r"(?<=`)--[a-z][\w-]*", prose):
-                if page.name not in ("benchmarks.md", "CONTRIBUTING.md"):  # which name options of other programs, too
+                if page.name not in ("benchmarks.md", "CONTRIBUTING.md"):  # these pages also name options of other programs
                     self.assertIn(flag, every, f"{page.relative_to(ROOT)}")
 
     def test_links_lead_somewhere(self):

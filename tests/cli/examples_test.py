@@ -1,4 +1,4 @@
-"""Every numbered example runs as it stands, makes what it says, and is listed in the README. Standard library only.
+"""Every numbered example runs unchanged, makes the files that it names, and is listed in the README. Standard library only.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/examples_test.py
 """
@@ -24,9 +24,9 @@ class Examples(unittest.TestCase):
                               env={**os.environ, "COVOL": str(COVOL), "COVOL_OUT": str(out)})
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertNotIn("warning", done.stderr)
-        said = done.stdout.split("== results", 1)
-        self.assertEqual(len(said), 2, done.stdout)
-        named = {pathlib.Path(path) for path in re.findall(rf"{re.escape(str(out))}/[\w/.-]*\w", said[1])}
+        output = done.stdout.split("== results", 1)
+        self.assertEqual(len(output), 2, done.stdout)
+        named = {pathlib.Path(path) for path in re.findall(rf"{re.escape(str(out))}/[\w/.-]*\w", output[1])}
         self.assertTrue(named, "no file is named")
         for path in named:
             self.assertTrue(path.is_file() and path.stat().st_size > 0, f"{path} is named, but not there")
@@ -36,7 +36,7 @@ class Examples(unittest.TestCase):
             data = picture.read_bytes()
             self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
             width, height = struct.unpack(">II", data[16:24])
-            # A picture of one colour packs to almost nothing.
+            # A picture of a single colour compresses to almost nothing.
             self.assertGreater(len(data), width * height / 100, f"{picture} is empty")
 
     def test_readme_lists_each(self):

@@ -1,4 +1,5 @@
-"""Files around a run: what is cleared, what is waited for, where outputs go, and which files none may replace.
+"""Files around a run: which leftovers are removed, what is waited for, where outputs are written, and which files must not be
+replaced.
 
     COVOL=build/bin/covol COVOL_KILL_AT=build/tests/libcovol_kill_at.so python3 -m unittest tests/cli/files_test.py
 """
@@ -39,10 +40,10 @@ class Files(Case):
     def start(self, *args, **how):
         return subprocess.Popen([PROGRAM, *map(str, args)], cwd=self.out, stderr=subprocess.PIPE, text=True, **how)
 
-    def fails(self, *args, code, says, **how):
+    def fails(self, *args, code, expected_text, **how):
         done = subprocess.run([PROGRAM, *map(str, args), "--quiet"], cwd=self.out, capture_output=True, text=True, timeout=120, **how)
         self.assertEqual(done.returncode, code, done.stderr)
-        self.assertIn(says, done.stderr.strip().splitlines()[-1])
+        self.assertIn(expected_text, done.stderr.strip().splitlines()[-1])
         return done
 
 
@@ -79,7 +80,7 @@ class TwoFolders(Files):
                 *(word for flag, name in self.OUTPUTS.items() for word in (flag, name))]
 
     def state(self):
-        """Digests of all files by the folder that they are in."""
+        """Digests of the outputs, one for each folder."""
         states = []
         for name in self.OUTPUTS.values():
             path = self.out / name
@@ -106,7 +107,7 @@ class TwoFolders(Files):
             if code == 0:
                 break
             self.assertEqual(code, -signal.SIGKILL)
-            # The next run comes to one of the folders alone; that completes the set, or leaves all of it.
+            # The next run uses only one of the folders; it completes the whole set, or discards all of it.
             self.run_covol(*PHANTOM, "-o", "abc"[call % 3] + "/next.nrrd")
             self.assertIn(self.state(), sets, f"killed before call {call}")
             new += sets.index(self.state()) != last
@@ -121,7 +122,7 @@ class TwoFolders(Files):
 
 
 class Waits(Files):
-    """Nothing is waited for without an end, or so that the first signal does not end it."""
+    """No wait is endless, and the first signal ends each wait."""
 
     def interrupted(self, run):
         begin = time.monotonic()
@@ -135,14 +136,14 @@ class Waits(Files):
         folder = os.open(self.out, os.O_RDONLY)
         self.addCleanup(os.close, folder)
         fcntl.flock(folder, fcntl.LOCK_EX)
-        # It is told who has it, before the work begins, and the first signal ends the waiting.
+        # The message names the process that holds the lock, before the work begins, and the first signal ends the wait.
         run = self.start(*PHANTOM, "-o", "x.nrrd")
         line = run.stderr.readline()
         self.assertIn(f"waiting for process {os.getpid()} (", line)
         self.interrupted(run)
         self.assertEqual(run.returncode, 130)
         self.assertEqual(self.text("x.nrrd"), "old")
-        # Once it is free the run goes on.
+        # Once the lock is released the run continues.
         run = self.start(*PHANTOM, "-o", "x.nrrd")
         self.assertIn("waiting for process", run.stderr.readline())
         fcntl.flock(folder, fcntl.LOCK_UN)
@@ -167,7 +168,7 @@ class Waits(Files):
         self.assertEqual(self.hidden(), [])
 
     def test_pipes_in_the_place_of_files(self):
-        """Named pipes that nobody writes to: each kind of input, and what headers name."""
+        """Named pipes without a writer: as each kind of input, and as files named in headers."""
         nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 {}\nencoding: {}\n"
         meta = "NDims = 3\nDimSize = 16 16 {}\nElementSpacing = 1 1 1\nElementType = MET_UCHAR\n"
         headers = {
@@ -188,8 +189,8 @@ class Waits(Files):
         for name, text in headers.items():
             (self.out / name).write_text(text)
             with self.subTest(name):
-                self.fails("info", name, code=4, says="pipe")
-                self.fails("convert", name, "o.vdb", code=4, says="pipe")
+                self.fails("info", name, code=4, expected_text="pipe")
+                self.fails("convert", name, "o.vdb", code=4, expected_text="pipe")
         self.run_covol(*PHANTOM, "-o", "chunk.zarr")
         chunk = max((p for p in (self.out / "chunk.zarr").rglob("*") if p.is_file()), key=lambda p: p.stat().st_size)
         chunk.unlink()
@@ -208,14 +209,14 @@ class Waits(Files):
             os.mkfifo(self.out / ("p." + end))
         for end in "tif", "nrrd", "nii", "nii.gz", "mha", "mrc", "npy", "h5", "ims", "dcm", "vdb":
             with self.subTest(end):
-                self.fails("info", "p." + end, code=4, says="p." + end)
+                self.fails("info", "p." + end, code=4, expected_text="p." + end)
         for end in "xyz", "csv", "ply", "obj", "off", "las", "zip", "roi", "json":
             with self.subTest("points " + end):
-                self.fails("reconstruct", "p." + end, "-o", "o.vdb", code=4, says="p." + end)
-                self.fails("segment", self.image, "--contours", "p." + end, "-o", "o.vdb", code=4, says="p." + end)
+                self.fails("reconstruct", "p." + end, "-o", "o.vdb", code=4, expected_text="p." + end)
+                self.fails("segment", self.image, "--contours", "p." + end, "-o", "o.vdb", code=4, expected_text="p." + end)
         for end in "ply", "obj", "stl", "off", "glb":
             with self.subTest("mesh " + end):
-                self.fails("check", "p." + end, code=4, says="p." + end)
+                self.fails("check", "p." + end, code=4, expected_text="p." + end)
         mask = ["segment", self.image, "-o", "o.vdb"]
         for code, args in ((3, ["info", "v.zarr"]), (4, ["convert", "chunk.zarr", "o.vdb"]), (3, ["info", "folder"]), (4, ["brick", "run", "plan"]),
                            (4, ["report", self.image, "--points", "marks.xyz", "-o", "o.html", "--run-report", "p.json"]),
@@ -223,7 +224,7 @@ class Waits(Files):
                            (4, [*mask, "--guess", "p.nrrd"]), (4, [*mask, *LINE, "--inside", "p.csv"]),
                            (4, ["rerun", "p.vdb"])):
             with self.subTest(args[0] + " " + str(args[-1])):
-                self.fails(*args, code=code, says="")
+                self.fails(*args, code=code, expected_text="")
 
     def test_points_that_come_through_a_pipe(self):
         points = self.points.read_text()
@@ -250,7 +251,7 @@ class Waits(Files):
         self.interrupted(run)
         self.assertEqual(run.returncode, 130)
         self.assertFalse((self.out / "x.nrrd").exists())
-        # One that is not read any further.
+        # A pipe that is no longer read.
         read, write = os.pipe()
         self.addCleanup(os.close, read)
         os.set_blocking(write, False)
@@ -279,7 +280,7 @@ class Waits(Files):
 
 class Places(Files):
     def image_of(self, name, header):
-        """A ball whose pixels lie in a file of their own."""
+        """A ball whose pixels are in a separate file."""
         (self.out / name).write_text(header)
         self.report("info", name)
 
@@ -294,7 +295,7 @@ class Places(Files):
                 f"encoding: raw\ndata file: {data}\n")
 
     def keeps(self, image, *files):
-        """No output of any kind may take the place of one of the files, by whatever name."""
+        """No output of any kind may replace one of the files, whatever name is used for it."""
         before = {name: self.bytes(name) for name in files}
         (self.out / "links").mkdir()
         for name in files:
@@ -304,7 +305,7 @@ class Places(Files):
                 for flag in "--mask", "--json":
                     if flag == "--mask" and not name.endswith((".npy", ".nrrd", ".tif", ".mha", ".nii.gz")):
                         continue
-                    self.fails("segment", image, *LINE, "-o", "s.vdb", flag, path, code=3, says="of this run")
+                    self.fails("segment", image, *LINE, "-o", "s.vdb", flag, path, code=3, expected_text="of this run")
             (self.out / link).unlink()
         (self.out / "links").rmdir()
         self.assertEqual({name: self.bytes(name) for name in files}, before)
@@ -343,7 +344,7 @@ class Places(Files):
         for image in "series", names[0]:
             with self.subTest(image):
                 self.keeps(image, names[0], names[7], names[-1])
-        # Others in that folder are none of the image.
+        # Other files in that folder do not belong to the image.
         (self.out / "series/notes.json").write_text("old")
         self.run_covol("info", "series", "--json", "series/notes.json")
         self.assertNotEqual(self.text("series/notes.json"), "old")
@@ -357,20 +358,20 @@ class Places(Files):
         self.keeps(names[0], *names)
         (self.out / names[1]).unlink()
         os.mkfifo(self.out / names[1])
-        self.fails("info", names[0], code=4, says=names[1] + ": is not a regular file")
+        self.fails("info", names[0], code=4, expected_text=names[1] + ": is not a regular file")
 
     def test_a_zarr_store(self):
         self.run_covol("phantom", "sphere", "--size", SIZE, "-o", "in.zarr")
         inside = sorted(str(p.relative_to(self.out)) for p in (self.out / "in.zarr").rglob("*") if p.is_file())
         self.keeps("in.zarr", *inside[:3])
-        # Nothing new comes into it either: a chunk may be missing there.
-        self.fails("segment", "in.zarr", *LINE, "-o", "in.zarr/s.vdb", code=3, says="lies in in.zarr")
+        # Nothing may be added to it either: the name could be that of a missing chunk.
+        self.fails("segment", "in.zarr", *LINE, "-o", "in.zarr/s.vdb", code=3, expected_text="lies in in.zarr")
 
     def test_a_configuration(self):
         (self.out / "c.toml").write_text("max-steps = 1\n")
         before = self.text("c.toml")
         self.fails("segment", self.image, "--points", "marks.xyz", "--init", "tag", "-o", "s.vdb", "--config", "c.toml",
-                   "--save-config", "c.toml", code=3, says="is an input")
+                   "--save-config", "c.toml", code=3, expected_text="is an input")
         self.assertEqual(self.text("c.toml"), before)
 
     def test_frames(self):
@@ -379,7 +380,7 @@ class Places(Files):
             (self.out / f"m{n}.csv").write_text("x,y,z\n" + self.points.read_text().replace(" ", ","))
         before = self.bytes("m1.csv")
         self.fails("segment", "f0.nrrd", "f1.nrrd", "--points", "m{frame}.csv", "--init", "tag", "--max-steps", "1", "-o", "s.vdb",
-                   "--table", "m1.csv", code=3, says="is an input")
+                   "--table", "m1.csv", code=3, expected_text="is an input")
         self.assertEqual(self.bytes("m1.csv"), before)
 
     def test_as_the_system_does_it(self):
@@ -402,9 +403,9 @@ class Places(Files):
             self.assertTrue((self.out / name).is_symlink())
         self.assertEqual(self.bytes("d/real.nrrd"), self.bytes("d/fresh.nrrd"))
         self.assertEqual(stat.S_IMODE(os.stat(self.out / "d/real.nrrd").st_mode), 0o640)
-        self.fails(*PHANTOM, "-o", "nowhere.nrrd", code=4, says="does not exist")
-        self.fails(*PHANTOM, "-o", "folder.nrrd", code=4, says="it is a folder")
-        # A store behind a link is replaced where it is.
+        self.fails(*PHANTOM, "-o", "nowhere.nrrd", code=4, expected_text="does not exist")
+        self.fails(*PHANTOM, "-o", "folder.nrrd", code=4, expected_text="it is a folder")
+        # A store behind a link is replaced at the link's target.
         self.run_covol(*PHANTOM, "-o", "d/store.zarr")
         os.chmod(self.out / "d/store.zarr", 0o700)
         (self.out / "l.zarr").symlink_to("d/store.zarr")
@@ -413,10 +414,10 @@ class Places(Files):
         self.assertTrue((self.out / "l.zarr").is_symlink())
         self.assertFalse((self.out / "d/store.zarr/old").exists())
         self.assertEqual(stat.S_IMODE(os.stat(self.out / "d/store.zarr").st_mode), 0o700)
-        # Two outputs by two names of one file.
+        # Two outputs with two names of the same file.
         (self.out / "same.csv").symlink_to("t.csv")
         self.fails("segment", self.image, *LINE, "-o", "s.vdb", "--table", "t.csv", "--evidence", "same.csv", code=3,
-                   says="another output")
+                   expected_text="another output")
 
     def test_permissions_stay(self):
         old = os.umask(0o027)
@@ -439,7 +440,7 @@ class Places(Files):
 
 
 class Streams(Files):
-    """What was asked for on a stream and cannot be said there is an error, with a word."""
+    """If output that was requested on a stream cannot be written there, the run ends with an error and a message."""
 
     def commands(self):
         self.segment("--max-steps", "1", "--init", "tag")
@@ -469,7 +470,7 @@ class Streams(Files):
         base = ["segment", self.image, *LINE, "-o", "t.vdb"]
         for flag, path in (("--json", "/dev/full"), ("--save-config", "/dev/full"), ("--table", "full.csv"), ("--evidence", "full.csv")):
             with self.subTest(flag):
-                self.fails(*base, flag, path, code=4, says="cannot write: No space left on device")
+                self.fails(*base, flag, path, code=4, expected_text="cannot write: No space left on device")
                 self.assertFalse((self.out / "t.vdb").exists())
 
     def test_a_stream_that_is_a_file_goes_on(self):
@@ -483,7 +484,7 @@ class Streams(Files):
         self.assertTrue(text.startswith("before\n{") and text.endswith("}\nafter\n"), text)
 
 
-del Files, Case  # have no tests
+del Files, Case  # base classes without tests
 
 if __name__ == "__main__":
     unittest.main()

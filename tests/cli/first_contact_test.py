@@ -1,4 +1,4 @@
-"""What a person meets first: covol without a command, covol help, covol demo, covol doctor. Standard library only.
+"""The first contact with covol: covol without a command, covol help, covol demo, covol doctor. Standard library only.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/first_contact_test.py
 """
@@ -20,30 +20,30 @@ SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/d
 
 class Words(Case):
     def on_terminal(self, *words):
-        """What a command says on a terminal, and its exit code."""
+        """The output of a command on a terminal, and its exit code."""
         near, far = pty.openpty()
         try:
             process = subprocess.Popen([COVOL, *words], stdin=far, stdout=far, stderr=far, cwd=self.out)
         finally:
             os.close(far)
-        said = b""
+        output = b""
         try:
             while part := os.read(near, 65536):
-                said += part
-        except OSError:  # the other end is closed
+                output += part
+        except OSError:  # the other end was closed
             pass
         os.close(near)
-        return said.decode().replace("\r", ""), process.wait(60)
+        return output.decode().replace("\r", ""), process.wait(60)
 
     def test_without_a_command(self):
-        said, code = self.on_terminal()
+        output, code = self.on_terminal()
         self.assertEqual(code, 2)
-        lines = said.strip().splitlines()
+        lines = output.strip().splitlines()
         self.assertEqual([line.split()[1] for line in lines], ["demo", "mark", "segment", "help"])
         self.assertIn("--report", lines[2])
         self.assertLessEqual(max(map(len, lines)), 100)
-        self.assertNotIn("error", said)
-        self.refuse(code=2, says="covol --help")  # a script is told that a command is missing
+        self.assertNotIn("error", output)
+        self.refuse(code=2, expected_text="covol --help")  # scripts get an error if the command is missing
 
     def test_help_begins_with_what_to_do(self):
         text = self.run_covol("--help").stdout
@@ -55,10 +55,10 @@ class Words(Case):
         self.assertEqual(self.run_covol("help").stdout, self.run_covol("--help").stdout)
         for command in COMMANDS:
             self.assertEqual(self.run_covol("help", command).stdout, self.run_covol(command, "--help").stdout)
-        self.refuse("help", "segmnet", code=2, says="segment")
-        self.refuse("help", "segment", "mesh", code=2, says="expected one command")
+        self.refuse("help", "segmnet", code=2, expected_text="segment")
+        self.refuse("help", "segment", "mesh", code=2, expected_text="expected one command")
 
-    def test_the_version_says_the_build(self):
+    def test_the_version_states_the_build(self):
         first, second = self.run_covol("--version").stdout.splitlines()
         self.assertRegex(first, r"^covol \d+\.\d+\.\d+$")
         self.assertRegex(second, r"^(GCC|Clang) \d+\.\d+.*, (x86_64|aarch64), OpenVDB \d+\.\d+\.\d+")
@@ -70,9 +70,9 @@ class Demo(PageCase):
 
     def end(self, program):
         program.send_signal(signal.SIGINT)
-        said = program.stderr.read()
-        self.assertEqual(program.wait(60), 0, said)
-        return said
+        output = program.stderr.read()
+        self.assertEqual(program.wait(60), 0, output)
+        return output
 
     def test_a_surface_without_a_click(self):
         program, page = self.start()
@@ -81,16 +81,16 @@ class Demo(PageCase):
         [structure] = live.state["structures"]
         self.assertEqual((structure["name"], len(structure["marks"])), ("embryo", 398))
         result = live.wait_for(structure["id"], "refined", 1)
-        self.assertGreater(result["volume"], 3e6)  # 4.0e6 cubic pixels, by the quickstart
-        said = self.end(program)
+        self.assertGreater(result["volume"], 3e6)  # 4.0e6 cubic pixels according to the quickstart
+        output = self.end(program)
         folder = self.out / "covol_demo"
         for name in ("celegans_embryo.tif", "celegans_marks.csv"):
             self.assertEqual((folder / name).read_bytes(), (SAMPLES / name).read_bytes())
         self.assertTrue((folder / "README.md").exists() and (folder / "celegans_embryo.tif.covol").is_dir())
-        # The command that it names does the same without a page.
-        command = said.split("without a page: covol ")[1].splitlines()[0].split()
+        # The command that the message names gives the same result without a page.
+        command = output.split("without a page: covol ")[1].splitlines()[0].split()
         self.assertEqual(self.run_covol("plan", *command, "--quiet").returncode, 0)
-        program, page = self.start()  # once more: the study goes on, and marks are not added twice
+        program, page = self.start()  # again: the study is continued, and marks are not added twice
         again = Live(page)
         self.addCleanup(again.close)
         self.assertEqual(len(again.state["structures"][0]["marks"]), 398)
@@ -108,7 +108,7 @@ class Demo(PageCase):
 
 class Doctor(Case):
     def test_what_is_there(self):
-        said = self.run_covol("doctor", "--json", "r.json").stdout
+        output = self.run_covol("doctor", "--json", "r.json").stdout
         found = json.loads((self.out / "r.json").read_text())["doctor"]
         self.assertEqual({part["name"]: part["problem"] for part in found["readers"]},
                          {"itk": "", "gdcm": "", "hdf5": "", "covol-reader": ""})
@@ -116,12 +116,12 @@ class Doctor(Case):
         self.assertGreater(found["memory"]["free_bytes"], 0)
         self.assertGreater(found["scratch"]["free_bytes"], 0)
         self.assertEqual(pathlib.Path(found["program"]), pathlib.Path(COVOL).resolve())
-        counts = {folder: int(count) for count, folder in re.findall(r"^  (\d+) in (/.*)$", said, re.M)}
+        counts = {folder: int(count) for count, folder in re.findall(r"^  (\d+) in (/.*)$", output, re.M)}
         self.assertEqual(sum(counts.values()), len(found["libraries"]))
-        for folder in counts:  # each counts once
+        for folder in counts:  # each library is counted once
             self.assertEqual([other for other in counts if other != folder and other.startswith(folder + "/")], [])
         for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: there"):
-            self.assertIn(word, said)
+            self.assertIn(word, output)
 
     def test_a_browser(self):
         tools = self.out / "bin"

@@ -1,4 +1,4 @@
-"""HDF5: what h5py wrote in the layouts of Imaris, BigDataViewer and ilastik, voxel by voxel.
+"""HDF5 files that h5py wrote in the layouts of Imaris, BigDataViewer and ilastik, compared voxel by voxel.
 
     cd tests/cli && COVOL=../../build/bin/covol python3 -m unittest hdf5_test
 """
@@ -33,7 +33,7 @@ class Case(zarr_test.Case):
 
 
 def means(data):
-    """Of 2 x 2 x 2 voxels; an odd one at the end is left out."""
+    """Means of 2 x 2 x 2 voxels; an odd one at the end is ignored."""
     n = [s // 2 * 2 for s in data.shape]
     d = data[:n[0], :n[1], :n[2]].astype(float)
     return d.reshape(n[0] // 2, 2, n[1] // 2, 2, n[2] // 2, 2).mean((1, 3, 5)).astype(data.dtype)
@@ -45,7 +45,7 @@ def letters(text):
 
 @unittest.skipIf(MISSING, MISSING)
 class Plain(Case):
-    """Datasets of their own."""
+    """Datasets in plain HDF5 files."""
 
     def test_types_and_byte_orders(self):
         kinds = ["u1", "i1", "<u2", ">u2", "<i2", ">i2", "<u4", ">u4", "<i4", ">i4", "<u8", ">u8", "<i8", ">i8", "<f2", ">f2",
@@ -82,7 +82,7 @@ class Plain(Case):
                 self.check(f"a.h5:/{name}-flat", np.full(SHAPE, 5))
 
     def test_registered_filters(self):
-        """Chunks are packed here and written as they are: h5py knows their filters by number alone."""
+        """Chunks are compressed here and written directly: h5py knows only the numbers of these filters."""
         def lz4(data):
             packed, block = b"", 1000
             for begin in range(0, len(data), block):
@@ -247,7 +247,7 @@ class Plain(Case):
         self.assertNotIn("/data", listed)
 
     def test_cut_and_damaged(self):
-        """Every cut and many flipped bytes are an error or another grey value, and never a crash."""
+        """Every truncation and many flipped bytes give an error or another grey value, and never a crash."""
         with self.file() as f:
             f.create_dataset("data", data=pixels("<u2"), chunks=CHUNKS, compression="gzip", shuffle=True)
         good = self.path("a.h5").read_bytes()
@@ -256,7 +256,7 @@ class Plain(Case):
         cuts = [good[:len(good) * n // 8] for n in range(8)]
         places = np.concatenate([rng.integers(0, len(good), 8), rng.integers(0, 2048, 24)])
         flips = [good[:p] + bytes([good[p] ^ 1 << int(rng.integers(8))]) + good[p + 1:] for p in places]
-        # The library keeps objects of a damaged header, and complained when the process ended.
+        # The HDF5 library keeps objects of a damaged header, and printed errors when the process ended.
         header = [good[:p] + bytes([good[p] ^ 128]) + good[p + 1:] for p in range(800, 832)]
         for n, bad in enumerate(cuts + flips + header):
             self.path("bad.h5").write_bytes(bad)
@@ -381,7 +381,7 @@ class Imaris(Case):
         self.assertIn("states no spacing", self.run_covol("info", "a.ims").stderr)
 
     def test_same_volume_from_a_level(self):
-        """A ball: the finest level and the next give surfaces at one place."""
+        """A ball: the finest level and the next give surfaces at the same position."""
         n, radius, centre = 64, 18, 31.5
         voxels = ball(centre, radius, 0, n)
         with self.file("ball.ims") as f:
@@ -466,7 +466,7 @@ class BigDataViewer(Case):
 
 @unittest.skipIf(MISSING, MISSING)
 class Large(Case):
-    """From 256 MiB on chunks are read when they are asked for, and what lies behind each other is mapped."""
+    """From 256 MiB on, chunks are read on demand, and contiguous data is mapped."""
 
     def test_a_ball_in_a_large_dataset(self):
         n, centre, radius = 1024, 500, 30

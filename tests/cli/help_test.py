@@ -1,4 +1,4 @@
-"""The help of each command, and that its groups stay out of files of options. Standard library only.
+"""The help of each command; its groups do not appear in option files. Standard library only.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/help_test.py
 """
@@ -8,8 +8,8 @@ import unittest
 
 from cli_test import COMMANDS, Case
 
-LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]  # --help is a selection
-MOST = 14  # options in a selection, beside help itself
+LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]  # --help lists only a selection of their options
+MAX_SELECTED = 14  # maximum number of options in a selection, without help itself
 
 
 class Help(Case):
@@ -58,12 +58,12 @@ class Help(Case):
                 self.assertEqual([name.split("[=")[0] for name in shown[group["name"]]], expected, command)
             self.assertIn("--threads", shown["Options of every command"], command)
 
-    def test_help_shows_a_selection_and_says_so(self):
+    def test_help_shows_a_selection_and_states_it(self):
         for command in COMMANDS:
             shown = sum(map(len, self.options_of(self.first[command]).values()))
             count = sum(len(g["options"]) for g in self.groups_of(command))
             if command in LONG:
-                self.assertLessEqual(shown - 2, MOST, command)
+                self.assertLessEqual(shown - 2, MAX_SELECTED, command)
                 self.assertIn(f"covol {command} --help-all shows {count - shown} more options.", self.first[command])
             else:
                 self.assertEqual(shown, count, command)
@@ -98,7 +98,7 @@ class OptionFiles(Case):
         return [line for line in (self.out / path).read_text().splitlines() if line and not line.startswith("#")]
 
     def test_saved_options_are_one_list(self):
-        # Of five groups, and in another order than they are bound.
+        # Options of five groups, in another order than that of their definition.
         self.run_covol("segment", self.image, "--up", "y", "--sigma", "1vx", "--points", self.points, "--delta", "2vx", "-o", "s.vdb",
                        "--mesh", "m.ply", "--epsilon", "0.02", "--save-config", "c.toml")
         self.assertNotRegex((self.out / "c.toml").read_text(), r"(?m)^# [\w ]+ Options$")
@@ -106,7 +106,7 @@ class OptionFiles(Case):
                          ["image", "points", "output", "mesh", "delta", "epsilon", "sigma", "up"])
 
     def test_a_file_of_an_earlier_version(self):
-        # Its comments hold descriptions that are different today.
+        # Its comments contain outdated descriptions.
         (self.out / "old.toml").write_text(
             '# covol 1.0.0, segment\n# Image and points together: the surface of a structure\n\n'
             '# 3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse\n'

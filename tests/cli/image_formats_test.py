@@ -33,12 +33,12 @@ except ImportError as error:
 SIZE = (30, 26, 14)           # voxels along x, y, z
 SPACING = (0.5, 0.625, 1.25)  # exact in single precision and in DICOM's decimals
 ORIGIN = (10.0, -20.0, 5.5)
-CENTRE = (16.0, -12.5, 12.0)  # of an ellipsoid, off the image's middle: flips and swaps show
+CENTRE = (16.0, -12.5, 12.0)  # of an ellipsoid away from the image's middle, so that flips and swaps are noticed
 RADII = (3.5, 4.5, 3.0)
 
 
 def voxels():
-    """The image as an array [z, y, x] of bytes: bright ellipsoid, edge blurred over about a voxel."""
+    """The image as an array [z, y, x] of bytes: a bright ellipsoid, its edge blurred over about a voxel."""
     z, y, x = np.meshgrid(*(np.arange(n) for n in SIZE[::-1]), indexing="ij")
     world = [ORIGIN[a] + SPACING[a] * i for a, i in enumerate((x, y, z))]
     r = np.sqrt(sum(((world[a] - CENTRE[a]) / RADII[a]) ** 2 for a in range(3)))
@@ -65,7 +65,7 @@ def nrrd_header(**more):
 
 
 def write_mrc(path, data, mode, big=False, **words):
-    """MRC2014, word by word."""
+    """MRC2014, field by field."""
     order = ">" if big else "<"
     header = bytearray(1024)
     def put(at, kind, *values):
@@ -83,7 +83,7 @@ def write_mrc(path, data, mode, big=False, **words):
 
 
 def write_dicom_series(folder, data, series="1.2.3.4.5", description="ball"):
-    """One file for each slice; names in another order than the slices."""
+    """One file for each slice; the order of the names is not that of the slices."""
     folder.mkdir(exist_ok=True)
     for k in range(data.shape[0]):
         meta = pydicom.dataset.FileMetaDataset()
@@ -100,7 +100,7 @@ def write_dicom_series(folder, data, series="1.2.3.4.5", description="ball"):
         ds.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
         ds.ImagePositionPatient = [ORIGIN[0], ORIGIN[1], ORIGIN[2] + SPACING[2] * k]
         ds.PixelSpacing = [SPACING[1], SPACING[0]]  # rows first
-        ds.SliceThickness = 0.7                     # thinner than the distance: must not be taken for it
+        ds.SliceThickness = 0.7                     # thinner than the distance of slices, with which it must not be confused
         ds.Rows, ds.Columns = data.shape[1:]
         ds.SamplesPerPixel, ds.PhotometricInterpretation, ds.PixelRepresentation = 1, "MONOCHROME2", 0
         ds.BitsAllocated = ds.BitsStored = 16
@@ -149,7 +149,7 @@ class Case(cli_test.Case):
 
 
 class SameSurface(Case):
-    """Every format against a raw NRRD."""
+    """Compares every format with a raw NRRD."""
 
     @classmethod
     def setUpClass(cls):
@@ -163,7 +163,7 @@ class SameSurface(Case):
         cls.shifted = self.surface(at_zero, points=cls.shifted_marks).rename(cls.folder / "reference0.vdb")
 
     def assert_ellipsoid(self, path):
-        """The reference itself is right: the marks lie on it."""
+        """The reference itself is correct: the marks lie on its surface."""
         fit = self.report("compare", self.world_marks, path)["fit"]["points_to_surface"]
         self.assertLess(fit["mean"], 0.5 * SPACING[0])
 
@@ -228,7 +228,7 @@ class SameSurface(Case):
     def test_nifti_with_flipped_and_swapped_axes(self):
         ras = np.zeros((4, 4))
         ras[3, 3] = 1
-        # stored z fastest, y backwards: the affine says so
+        # stored z fastest and y backwards, as the affine states
         stored = self.data[:, ::-1, :].transpose(0, 1, 2)
         lps = np.zeros((3, 4))
         lps[2, 0] = SPACING[2]
@@ -243,7 +243,7 @@ class SameSurface(Case):
         self.assertGreater(compare["dice"], 0.9999)
 
     def test_nifti_in_micrometres(self):
-        """In the file's own unit, whichever of the forms it has."""
+        """In the file's own unit, in each of the forms that a file may have."""
         scaled = np.diag([-SPACING[0] * 1000, -SPACING[1] * 1000, SPACING[2] * 1000, 1.0])
         scaled[:3, 3] = (-ORIGIN[0] * 1000, -ORIGIN[1] * 1000, ORIGIN[2] * 1000)
         for forms in "sq":
@@ -301,14 +301,14 @@ class SameSurface(Case):
                 if name == "lzw.tif":
                     try:
                         tifffile.imwrite(str(self.folder / "try.tif"), self.data[:2], compression="lzw")
-                    except Exception:  # imagecodecs is no Debian package
+                    except Exception:  # imagecodecs is not packaged in Debian
                         continue
                 tifffile.imwrite(str(self.folder / name), self.data, imagej=True,
                                  resolution=(1 / SPACING[0], 1 / SPACING[1]),
                                  metadata={"axes": "ZYX", "spacing": SPACING[2], "unit": "um"}, **more)
                 self.check(name, origin=False, unit="um")
         with tifffile.TiffFile(str(self.folder / "one.tif")) as one:
-            self.assertEqual(len(list(one.pages.pages)), 1)  # this is the form of stacks over 4 GB
+            self.assertEqual(len(list(one.pages.pages)), 1)  # the form of stacks larger than 4 GB
 
     def test_imagej_origin(self):
         text = ("ImageJ=1.53t\nimages=%d\nslices=%d\nunit=um\nspacing=%r\nxorigin=%r\nyorigin=%r\nzorigin=%r\n"
@@ -318,7 +318,7 @@ class SameSurface(Case):
                 tiff.write(self.data[k], contiguous=False, metadata=None, description=text if k == 0 else None,
                            resolution=(1 / SPACING[0], 1 / SPACING[1]))
         self.check("origin.tif", unit="um")
-        # and what covol writes as TIFF lies where the image lies
+        # a TIFF that covol writes has the position of the image
         self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.tif")
         self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.nrrd")
         self.assertEqual(self.report("compare", "m.tif", "m.nrrd")["compare"]["dice"], 1)
@@ -352,7 +352,7 @@ class SameSurface(Case):
         self.assertIn("choose 0 (membrane), 1 (nuclei) with --channel", error)
 
     def test_ome_tiff_in_several_files(self):
-        """Slices dealt to two files, in each backwards; each file names all."""
+        """Slices are distributed over two files, in reverse order in each; each file names all."""
         names = ["part0.ome.tif", "part1.ome.tif"]
         places = {k: (names[k % 2], (SIZE[2] - 1 - k) // 2) for k in range(SIZE[2])}
         xml = ome_xml([places[k] for k in range(SIZE[2])])
@@ -370,8 +370,7 @@ class SameSurface(Case):
 
 class Options(Case):
     def test_roi_gives_the_surface_of_the_whole(self):
-        """Any box: its voxels are the whole domain's, and nothing that is chosen depends on it; the mask keeps the
-        image's lattice."""
+        """With any box, voxels are those of the whole domain, and automatic choices do not depend on it; the mask keeps the image's lattice."""
         image = self.write_nrrd()
         box = ",".join(str(CENTRE[a] + side * (RADII[a] + 2.3 + 0.1 * a)) for side in (-1, 1) for a in range(3))
         results = {}
@@ -384,7 +383,7 @@ class Options(Case):
         chosen = 0
         for what in ("delta", "tau", "sigma", "edge_k", "attraction_range"):
             pair = of_part["resolved"][what], of_whole["resolved"][what]
-            if pair != (None, None):  # what nothing needed
+            if pair != (None, None):  # not needed in either run
                 self.assertAlmostEqual(pair[0] / pair[1], 1, 3, what)
                 chosen += 1
         self.assertGreater(chosen, 2)
@@ -401,7 +400,7 @@ class Options(Case):
         size = {name: self.report("info", name)["grids"][0] for name in ("whole.vdb", "part.vdb")}
         self.assertLess(size["part.vdb"]["active_voxels"], size["whole.vdb"]["active_voxels"] / 4)
         part = self.report("info", image, "--roi", "15.5,-13,11.9,16.5,-12,12.1")["image"]
-        self.assertGreater(part["range"][0], 100)  # the ellipsoid's inside alone
+        self.assertGreater(part["range"][0], 100)  # only the inside of the ellipsoid
         self.assertEqual(info["range"][0], 30)
         error = self.run_covol("info", image, "--roi", "0,0,0,1,1,1", code=3).stderr
         self.assertIn("outside the image", error)
@@ -437,7 +436,7 @@ class Options(Case):
         self.assertIn("a slice is missing", self.run_covol("info", folder, code=3).stderr)
 
     def test_a_missing_module_is_an_error(self):
-        """libcovol alone, without the folder of modules beside it."""
+        """libcovol alone, without the folder of modules next to it."""
         loaded = subprocess.run(["ldd", COVOL], capture_output=True, text=True, check=True).stdout
         library = re.search(r"(libcovol\.so\S*) => (\S+)", loaded)
         if not library:
@@ -472,7 +471,7 @@ class Options(Case):
         expect("alone/covol-[0-9.]+/{module}: expected covol's module for {formats} ")
 
     def test_a_huge_image_takes_little_memory(self):
-        """2048^3 bytes on disk (a sparse file), a small ball in it; whole and with --roi."""
+        """A sparse file of 2048^3 bytes with a small ball in it; read as a whole and with --roi."""
         n, centre, radius = 2048, 1000, 12
         header = (f"NRRD0005\ntype: uint8\ndimension: 3\nsizes: {n} {n} {n}\nspacings: 1 1 1\nendian: little\n"
                   "encoding: raw\n\n").encode()

@@ -1,4 +1,4 @@
-"""The macro for ImageJ and Fiji: marks as a person sets them there, and what comes back, in Debian's ImageJ under a virtual screen.
+"""The macro for ImageJ and Fiji: marks as a user sets them there, and the results, in Debian's ImageJ on a virtual screen.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/imagej_test.py
 """
@@ -37,7 +37,7 @@ saveAs("Results", "%(out)s/table.csv");
 
 
 def roi_of_points(points):
-    """A selection of the multi-point tool as ImageJ saves it, of (x, y, slice from 1): points of several slices."""
+    """A multi-point selection as ImageJ saves it, of (x, y, slice from 1): points on several slices."""
     n = len(points)
     head, head2 = bytearray(64), bytearray(64)
     struct.pack_into(">4shBB", head, 0, b"Iout", 228, 10, 0)
@@ -54,7 +54,7 @@ def roi_of_points(points):
 @unittest.skipIf(PROGRAMS or not JAR.exists(), "SKIPPED: ImageJ is not there (apt-get install imagej xvfb xauth)")
 class Macro(Folder):
     def java(self, text):
-        """Runs a macro as from ImageJ's menu: in its batch mode one macro does not see the ROI Manager of another."""
+        """Runs a macro as from ImageJ's menu: in batch mode, a macro does not have access to the ROI Manager of another one."""
         (self.out / "test.ijm").write_text(text + 'exec("sh", "-c", "kill $PPID");')
         self.temporary.mkdir(exist_ok=True)
         return subprocess.run(["xvfb-run", "-a", "java", "-Xmx1g", f"-Duser.home={self.out}", f"-Djava.io.tmpdir={self.temporary}", "-cp", JAR, "ij.ImageJ", "-macro",
@@ -62,19 +62,19 @@ class Macro(Folder):
 
     @property
     def temporary(self):
-        """The folder that ImageJ takes for the system's one of temporary files: no other program's files lie there."""
+        """The folder that ImageJ uses for temporary files: no other program's files are there."""
         return self.out / "temporary"
 
     def assert_nothing_is_left(self):
         self.assertEqual([entry.name for entry in self.temporary.glob("covol-*")], [])
 
     def imagej(self, marks, settings="", title="i.tif"):
-        """Runs the macro; @return (mask, [(slice, area of its outline)], the table's row)"""
+        """Runs the macro. @return (mask, [(slice, area of its outline)], the table's row)"""
         for name in ("overlay.txt", "back.tif", "table.csv"):
             (self.out / name).unlink(missing_ok=True)
-        said = self.java(SETUP % {"image": self.private / "i.tif", "marks": marks, "macro": MACRO, "out": self.out, "title": title,
+        output = self.java(SETUP % {"image": self.private / "i.tif", "marks": marks, "macro": MACRO, "out": self.out, "title": title,
                                   "settings": "program=" + str(Path(COVOL).resolve()) + settings})
-        self.assertTrue((self.out / "back.tif").exists(), (self.out / "said.txt").read_text() + said.stdout + said.stderr)
+        self.assertTrue((self.out / "back.tif").exists(), (self.out / "said.txt").read_text() + output.stdout + output.stderr)
         name, *rows = (self.out / "overlay.txt").read_text().splitlines()
         self.assertEqual(name, "title=" + title)
         with open(self.out / "table.csv", newline="") as file:
@@ -82,7 +82,7 @@ class Macro(Folder):
         return tifffile.imread(self.out / "back.tif"), [tuple(map(float, row.split(","))) for row in rows], table
 
     def rings(self):
-        """(slice from 1, x, y) of rings around the ball in pixels, and of its poles."""
+        """(slice from 1, x, y) of rings around the ball, in pixels, and of its poles."""
         geometry = self.report("info", self.private / "i.tif")["image"]
         middle = (np.array(CENTRE) - geometry["origin"]) / geometry["spacing"]
         radius = RADIUS / np.array(geometry["spacing"])
@@ -94,7 +94,7 @@ class Macro(Folder):
         return rings
 
     def multi_point(self):
-        """A macro that opens the rings as one selection of the multi-point tool."""
+        """A macro that opens the rings as one multi-point selection."""
         points = [(x, y, z) for z, xs, ys in self.rings() for x, y in zip(xs, ys)]
         (self.out / "points.roi").write_bytes(roi_of_points(points))
         return f'open("{self.out}/points.roi");'
@@ -102,7 +102,7 @@ class Macro(Folder):
     def expect_the_ball(self, found):
         mask, outlines, table = found
         self.run_covol(*self.job, "-o", "s.vdb", "--mask", "s.nrrd")
-        # ImageJ's file lies where the stack does: covol compares the two in the world.
+        # ImageJ's file has the position of the stack: covol compares the two in the world.
         compared = self.report("compare", "back.tif", "s.nrrd")["compare"]
         self.assertGreater(compared["dice"], 0.97)
         full = [k for k in range(len(mask)) if mask[k].any()]
@@ -118,7 +118,7 @@ class Macro(Folder):
 
     def test_outlines_and_points_in_the_roi_manager(self):
         marks, (first, *between, last) = "", self.rings()
-        for z, xs, ys in between[::2]:  # by the corners of pixels, as ImageJ has outlines of areas
+        for z, xs, ys in between[::2]:  # in coordinates of pixel corners, as ImageJ stores outlines of areas
             x, y = (", ".join(f"{v + 0.5:.2f}" for v in values) for values in (xs, ys))
             marks += f'setSlice({z}); makeSelection("polygon", newArray({x}), newArray({y})); roiManager("add");\n'
         for z, xs, ys in (first, last):
@@ -141,8 +141,8 @@ class Macro(Folder):
         for n, (begin, settings, _) in enumerate(cases):
             text += f'{begin}said = runMacro("{MACRO}", "{settings}"); File.saveString(said, "{self.out}/said{n}.txt"); close("*");\n'
         done = self.java(text)
-        for n, (_, _, says) in enumerate(cases):
-            self.assertIn(says, (self.out / f"said{n}.txt").read_text(), done.stdout + done.stderr)
+        for n, (_, _, expected_text) in enumerate(cases):
+            self.assertIn(expected_text, (self.out / f"said{n}.txt").read_text(), done.stdout + done.stderr)
         self.assert_nothing_is_left()
 
 

@@ -1,5 +1,5 @@
-"""What other programs find in covol's files: places, units, names, ranges; read by other libraries, or by readers of
-other people's specifications that are written out here.
+"""What other programs find in covol's files: positions, units, names, ranges; read by other libraries, or by readers that are
+written here from the formats' specifications.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/interchange_test.py
 """
@@ -31,7 +31,7 @@ RADIUS = 3.5
 
 
 def read_ply(path):
-    """Vertices with all of their numbers, triangles, comments."""
+    """Vertices with all of their properties, triangles, comments."""
     header, data = path.read_bytes().split(b"end_header\n", 1)
     lines = header.decode().splitlines()
     names = [line.split()[-1] for line in lines if line.startswith("property float")]
@@ -74,7 +74,7 @@ def read_glb(path):
 
 
 def to_z_up(v):
-    """What importers of glTF do where z is up, Blender's among them."""
+    """The conversion that importers of glTF make if z is up, Blender's among them."""
     return np.stack([v[:, 0], -v[:, 2], v[:, 1]], axis=1)
 
 
@@ -99,7 +99,7 @@ def write_um_tiff(path, pixels):
 
 
 class Folder(unittest.TestCase):
-    """An image in micrometres of a ball, its marks, and what one run makes of them."""
+    """An image in micrometres of a ball, its marks, and the files of one run."""
 
     @classmethod
     def setUpClass(cls):
@@ -134,7 +134,7 @@ class MeshFiles(Folder):
         np.testing.assert_allclose(to_z_up(normals), ply[:, 3:6], atol=1e-6)
         np.testing.assert_array_equal(triangles, faces)
         self.assertGreater(np.abs(positions - ply[:, :3]).max(), 1, "the format is y up")
-        # Smooth: the normals are the ball's.
+        # Smooth: the normals are those of the ball.
         outward = (ply[:, :3] - CENTRE) / np.linalg.norm(ply[:, :3] - CENTRE, axis=1, keepdims=True)
         self.assertGreater((outward * ply[:, 3:6]).sum(1).min(), 0.95)
         self.run_covol("mesh", "s.vdb", "-o", "z.glb", "--up", "z", "--quiet")
@@ -159,7 +159,7 @@ class MeshFiles(Folder):
                 report = self.report("check", name)
                 self.assertEqual(report["problems"], 0)
                 self.assertTrue(any("different pieces meet" in f["text"] for f in report["findings"]), report["findings"])
-        # One solid whose pieces cross is still no solid.
+        # Surfaces of one solid that cross each other are still an error.
         parts = read_glb(self.out / "two.glb")
         vertices = np.concatenate([parts[0][0], parts[0][0] + (1, 0, 0)])
         faces = np.concatenate([parts[0][2], parts[0][2] + len(parts[0][0])])
@@ -217,7 +217,7 @@ class Vdb(Folder):
             shown = subprocess.run(["vdb_print", "-l", str(self.out / "s.vdb")], capture_output=True, text=True)
             self.assertEqual(shown.returncode, 0, shown.stderr)
             self.assertIn("covol_space", shown.stdout)
-        # The single steps pass it on.
+        # Single steps preserve it.
         self.run_covol("surface", "s.vdb:surface", "-o", "again.vdb", "--quiet")
         self.assertEqual(pyopenvdb.read(str(self.out / "again.vdb"), "surface").metadata["covol_unit"], "um")
 
@@ -276,7 +276,7 @@ class MaskFiles(Folder):
         done = self.run_covol("mask", "s.vdb", "--like", self.private / "i.tif", "-o", "w.ome.tif")
         self.assertIn("no place for the image's origin", done.stderr)
 
-    def test_nifti_says_micrometres(self):
+    def test_nifti_states_micrometres(self):
         image = nibabel.load(self.mask("m.nii.gz"))
         self.assertEqual(image.header.get_xyzt_units()[0], "micron")
         np.testing.assert_allclose(image.header.get_zooms(), SPACING)
@@ -383,9 +383,9 @@ class NumpyImages(Folder):
         self.assertIn("--spacing", self.run_covol("info", "a.npy").stderr)
 
     def test_what_is_no_image_is_named(self):
-        def refused(name, says, code=3):
+        def refused(name, expected_text, code=3):
             done = self.run_covol("info", name, code=code)
-            self.assertIn(says, done.stderr)
+            self.assertIn(expected_text, done.stderr)
         np.save(self.out / "flat.npy", np.zeros((4, 5)))
         refused("flat.npy", "three axes z, y, x")
         np.save(self.out / "long.npy", np.zeros((4, 5, 6), np.int64))

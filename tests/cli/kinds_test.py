@@ -65,29 +65,29 @@ class Painted(KindsCase):
     def test_slices_become_a_body(self):
         paint = self.labels("paint.nrrd", 4 * on_slices(ball(), 4, 2))
         report = self.report("segment", self.image, "--painted", paint, "-o", "s.vdb", "--mask", "m.nrrd")
-        told, = report["input"]["painted"]
-        self.assertEqual(told["label"], 4)
-        self.assertEqual(told["slices"], [{"axis": "z", "slices": [10, 14, 18, 22, 26, 30, 34], "outlines": 7}])
-        self.assertEqual(told["scribbled"], 0)
-        self.assertIn("7 slices across z (10, 14, 18, 22, 26, 30, 34) taken as painted as a whole", told["understood"])
+        reported, = report["input"]["painted"]
+        self.assertEqual(reported["label"], 4)
+        self.assertEqual(reported["slices"], [{"axis": "z", "slices": [10, 14, 18, 22, 26, 30, 34], "outlines": 7}])
+        self.assertEqual(reported["scribbled"], 0)
+        self.assertIn("7 slices across z (10, 14, 18, 22, 26, 30, 34) taken as painted as a whole", reported["understood"])
         mask = read_labels(self.out / "m.nrrd")
         self.assertEqual(sorted(np.unique(mask)), [0, 4])
         self.assertGreater(dice(mask > 0, ball()), 0.96)
 
     def test_slices_side_by_side_become_a_body(self):
-        # The ball reaches over 28 slices; all but the first and the last two are painted, or the middle ones.
+        # The ball covers 28 slices; painted are all but the first and the last two, or the middle ones.
         for first, last in ((12, 36), (16, 32)):
             with self.subTest(first):
                 some = np.zeros((SIZE,) * 3, bool)
                 some[first:last] = ball()[first:last]
                 report = self.report("segment", self.image, "--painted", self.labels("run.nrrd", some), "-o", "s.vdb", "--mask", "m.nrrd")
-                told, = report["input"]["painted"]
-                self.assertEqual(told["slices"][0]["axis"], "z")
-                self.assertEqual(told["slices"][0]["slices"], list(range(first, last)))
-                self.assertEqual(told["scribbled"], 0)
+                reported, = report["input"]["painted"]
+                self.assertEqual(reported["slices"][0]["axis"], "z")
+                self.assertEqual(reported["slices"][0]["slices"], list(range(first, last)))
+                self.assertEqual(reported["scribbled"], 0)
                 self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.99 * dice(some, ball()))
 
-    def test_says_what_it_understood(self):
+    def test_reports_what_it_understood(self):
         paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
         result = self.run_covol("segment", self.image, "--painted", paint, "-o", "s.vdb")
         self.assertIn("label 1: ", result.stderr)
@@ -144,7 +144,7 @@ class Painted(KindsCase):
         self.assertEqual(report["seeds"]["wrong"], 0)
 
     def test_paint_is_not_called_seeds(self):
-        # A cone whose tip is painted by specks on slices side by side: they are no slices of a body, and lie beyond it.
+        # A cone whose tip is painted as specks on adjacent slices: they are not cross-sections, and lie beyond the body's end.
         x, y, z = lattice()
         cone = (np.hypot(x, y) < 0.35 * (8 - z)) & (abs(z) < 9)
         cone[[k for k in range(SIZE) if k % 5 not in (1, 2)]] = False
@@ -182,18 +182,18 @@ class Seeds(KindsCase):
                              self.cloud("out.xyz", 10), "-o", "s.vdb")
         self.assertEqual(report["seeds"], {"inside": 1, "outside": 41, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0})
         result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--json", "r.json")
-        self.assertEqual(json.loads((self.out / "r.json").read_text())["seeds"]["wrong"], 0)  # the guess goes around it
+        self.assertEqual(json.loads((self.out / "r.json").read_text())["seeds"]["wrong"], 0)  # the guess avoids it
         result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--model", "paper")
         self.assertIn("1 of 1 seeds lie on the wrong side of the surface", result.stderr)
 
     def test_seeds_alone_are_a_start(self):
-        # Halfway is at 6.5.
-        for count, least in ((40, 0.9), (300, 0.95)):
+        # Halfway between the seeds is a radius of 6.5.
+        for count, minimum in ((40, 0.9), (300, 0.95)):
             with self.subTest(count):
                 report = self.report("segment", self.image, "--inside", self.cloud("in.xyz", 4, count), "--outside",
                                      self.cloud("out.xyz", 9, count), "-o", "s.vdb", "--mask", "m.nrrd", "--max-steps", 0)
                 self.assertIn("halfway between seeds", report["automatic"]["start"])
-                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball(radius=6.5)), least)
+                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball(radius=6.5)), minimum)
 
     def test_mistakes(self):
         self.assertIn("inside and outside", self.run_covol("segment", self.image, "--inside", "1,1,1", "--outside", "1,1,1", "-o", "s.vdb", code=3).stderr)
@@ -209,16 +209,16 @@ class Starts(KindsCase):
         return path
 
     def test_the_image_alone_grows_from_a_sphere_or_a_seed(self):
-        # Far from every edge, and beside one.
+        # Far from every edge, and close to one.
         for place, radius in (("0,0,0", 1.5), ("4,0,0", 1.5), ("0,-3,3", 2)):
             with self.subTest(place):
                 report = self.report("segment", self.image, "--theta", 0, "--init", f"sphere:{place},{radius}", "-o", "s.vdb", "--mask", "m.nrrd")
                 self.assertIn("to edges", report["automatic"]["growth"])
                 self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.95)
-        # The model of the paper has no such start, and curvature closes it.
+        # The paper's model does not grow this start, and curvature makes it vanish.
         for name in self.files():
             (self.out / name).unlink()
-        self.refuse("segment", self.image, "--theta", 0, "--init", "sphere:0,0,0,1.5", "--model", "paper", "-o", "p.vdb", code=3, says="vanished")
+        self.refuse("segment", self.image, "--theta", 0, "--init", "sphere:0,0,0,1.5", "--model", "paper", "-o", "p.vdb", code=3, expected_text="vanished")
 
     def test_a_guess_flows_by_the_model_of_the_paper(self):
         marks = self.marks(600)
@@ -236,7 +236,7 @@ class Starts(KindsCase):
         self.assertNotIn("did nothing", done.stderr)
 
     def test_an_outline_on_the_first_slice_is_the_outline_of_the_cut(self):
-        # A ball that the first slice cuts off below its middle; three outlines, the first of them on that slice.
+        # A ball that the first slice cuts below its middle; three outlines, the first of them on that slice.
         z = np.arange(SIZE) * H + ORIGIN[2]
         center = (0.0, 0.0, z[0] + 3.0)
         image = self.inputs / "cut.nrrd"
@@ -252,7 +252,7 @@ class Starts(KindsCase):
         self.assertNotIn("lie in the cut", report["automatic"]["guess"])
         self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball(center)), 0.95)
 
-    def test_two_bodies_are_told(self):
+    def test_two_bodies_are_reported(self):
         path = self.inputs / "two.csv"
         write_points(path, [(x + 3 * p[0], 3 * p[1], 3 * p[2]) for x in (-4, 4) for p in fibonacci(60)])
         done = self.run_covol("segment", self.image, "--points", path, "--rho", 0, "-o", "two.vdb")
@@ -268,7 +268,7 @@ class Starts(KindsCase):
         self.assertIn("near its marks", again["automatic"]["start"])
         self.assertEqual(again["solve"]["steps"], 0)
         self.assertLess(again["fit"]["points_to_surface"]["max"], 0.5 * H)
-        # Far from the mark nothing has changed.
+        # Far from the mark the result is unchanged.
         far = self.report("compare", "first.vdb", "again.vdb")["compare"]
         self.assertGreater(far["dice"], 0.98)
 
@@ -294,16 +294,16 @@ class Guess(KindsCase):
         before, after = dice(self.wrong, ball()), dice(new > 0, ball())
         self.assertGreater(after, before + 0.5 * (1 - before))
         changed = (new > 0) != self.wrong
-        told = report["correction"]
-        self.assertEqual(told["marks"], 10)
-        self.assertEqual(told["mask"]["added"] + told["mask"]["removed"], np.count_nonzero(changed))
-        self.assertLess(told["marks_to_corrected"]["max"], H)
-        # Beyond the largest reach of all marks every voxel is as it was.
+        reported = report["correction"]
+        self.assertEqual(reported["marks"], 10)
+        self.assertEqual(reported["mask"]["added"] + reported["mask"]["removed"], np.count_nonzero(changed))
+        self.assertLess(reported["marks_to_corrected"]["max"], H)
+        # Beyond the largest reach of all marks every voxel is unchanged.
         x, y, z = lattice()
         points = np.loadtxt(self.marks)
         nearest = np.min([np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2) for p in points], axis=0)
-        self.assertFalse(np.any(changed & (nearest >= told["radius"]["largest"])))
-        # Nothing is left to support; where the cap is still missing something is.
+        self.assertFalse(np.any(changed & (nearest >= reported["radius"]["largest"])))
+        # All parts are supported by marks, except if those of the missing cap are left out.
         some = self.inputs / "some.xyz"
         write_points(some, points[5:])
         half = self.report("segment", self.image, "--guess", mask, "--points", some, "-o", "h.vdb", "--suggest", 2)
@@ -322,7 +322,7 @@ class Guess(KindsCase):
         self.assertTrue(np.array_equal(new == 8, labels == 8))
         self.assertGreater(dice(new == 3, ball()), dice(self.wrong, ball()))
 
-    def test_without_marks_it_stays_and_suggestions_say_where_to_look(self):
+    def test_without_marks_it_stays_and_suggestions_show_where_to_look(self):
         mask = self.labels("mask.nrrd", self.wrong)
         report = self.report("segment", self.image, "--guess", mask, "-o", "s.vdb", "--mask", "m.nrrd", "--suggest", 1)
         self.assertTrue(np.array_equal(read_labels(self.out / "m.nrrd"), self.wrong.astype(np.uint8)))

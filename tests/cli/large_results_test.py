@@ -1,4 +1,4 @@
-"""Masks that are written box by box and meshes that are written piece by piece, read back by other programs.
+"""Masks written box by box and meshes written piece by piece, read back by other programs.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/large_results_test.py
 """
@@ -25,7 +25,7 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-SIZE = (150, 141, 139)         # voxels along x, y, z: two chunks of Zarr along each axis
+SIZE = (150, 141, 139)         # voxels along x, y, z: two Zarr chunks along each axis
 SPACING = (0.5, 0.625, 1.25)
 ORIGIN = (10.0, -20.0, 5.5)
 CENTRE = (46.3, 22.1, 90.4)
@@ -46,7 +46,7 @@ def write_like(path):
 
 
 def ball():
-    """A level set on voxels of 0.5, and its trilinear samples at the image's voxels: [z, y, x]."""
+    """A level set with voxels of 0.5, and its trilinear samples at the image's voxels: [z, y, x]."""
     h = 0.5
     grid = vdb.createLevelSetSphere(radius=RADIUS, center=CENTRE, voxelSize=h, halfWidth=3.0)
     grid.name = "surface"
@@ -103,7 +103,7 @@ class Masks(unittest.TestCase):
         return path, report
 
     def check(self, voxels, label=1):
-        """Equal to the dense samples but where rounding decides."""
+        """Equal to the dense samples except for rounding."""
         inside = self.distance < 0
         differs = (np.asarray(voxels) != label * inside) & (np.abs(self.distance) > 1e-5)
         self.assertEqual(np.asarray(voxels).shape, inside.shape)
@@ -133,7 +133,7 @@ class Masks(unittest.TestCase):
                 np.testing.assert_allclose(affine[:3, :3], np.diag((-0.5, -0.625, 1.25)), atol=1e-6)
 
     def test_nifti_of_a_turned_image(self):
-        """qform and sform agree, for rotations about each axis and mirror images."""
+        """qform and sform agree, for rotations about each axis and for mirror images."""
         pixels = np.zeros((5, 6, 7), np.uint8)
         for n, axes in enumerate(((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2), (0, 2, 1))):
             for flip in (1, 1, 1), (-1, 1, 1), (-1, -1, 1), (-1, -1, -1):
@@ -167,7 +167,7 @@ class Masks(unittest.TestCase):
         self.assertEqual(scale[0]["coordinateTransformations"],
                          [{"type": "scale", "scale": [1.25, 0.625, 0.5]}, {"type": "translation", "translation": [5.5, -20, 10]}])
         self.assertIn("image-label", group.attrs)
-        # A level's voxels have the value of most of theirs.
+        # A voxel of a level has the most frequent value of its voxels on the finer level.
         fine, coarse = group["0"][:], group["1"][:]
         factors = [round(b / a) for a, b in zip(scale[0]["coordinateTransformations"][0]["scale"],
                                                 scale[1]["coordinateTransformations"][0]["scale"])]
@@ -176,7 +176,7 @@ class Masks(unittest.TestCase):
         whole = (fine[:, :140] == 3).reshape(139, 70, 2, 75, 2).sum((2, 4))
         decided = whole != 2
         self.assertTrue(((coarse[:, :70] == 3) == (whole > 2))[decided].all())
-        # covol reads it as the same mask.
+        # covol reads the same mask from it.
         self.mask("m.nrrd", "--label", 3)
         same = json.loads(run("compare", path, self.folder / "m.nrrd", "--json", "-").stdout)
         self.assertEqual(same["compare"]["dice"] if "compare" in same else same["dice"], 1)
@@ -234,7 +234,7 @@ class Meshes(unittest.TestCase):
         h = 0.5
         one = vdb.createLevelSetSphere(radius=60.0, center=(3.1, -7.7, 12.3), voxelSize=h, halfWidth=3.0)
         other = vdb.createLevelSetSphere(radius=4.0, center=(80, 0.3, 0.1), voxelSize=h, halfWidth=3.0)
-        # Both in one grid: the smaller value of the two everywhere.
+        # Both in one grid: the minimum of the two values everywhere.
         one.combine(other, min)
         one.name = "surface"
         cls.vdb = cls.folder / "balls.vdb"

@@ -1,4 +1,4 @@
-"""Limits of memory and of threads: those of control groups, small files that claim much, threads that the system does not make.
+"""Limits of memory and of threads: control groups, small files that claim large sizes, threads that the system refuses to create.
 
     COVOL=build/bin/covol COVOL_NO_THREADS=build/tests/libcovol_no_threads.so python3 -m unittest tests/cli/limits_test.py
 """
@@ -22,7 +22,7 @@ MIB = 1 << 20
 
 class Limited(Case):
     def peak(self, *words, **how):
-        """@return exit code (a signal's negative), peak of resident memory in bytes, standard error"""
+        """@return exit code (minus the signal's number if killed), peak of resident memory in bytes, standard error"""
         with open(self.out / "errors", "w+") as errors:
             run = subprocess.Popen([str(pathlib.Path(COVOL).resolve()), *map(str, words)], cwd=self.out, stdout=subprocess.DEVNULL,
                                    stderr=errors, **how)
@@ -39,7 +39,7 @@ class ControlGroups(Limited):
 
     @staticmethod
     def memory_folder():
-        """The folder of the memory controller's hierarchy in which this process may make groups, and the name of a limit there."""
+        """The folder in the memory controller's hierarchy in which this process may create groups, and the name of the limit there."""
         own = {}
         for line in pathlib.Path("/proc/self/cgroup").read_text().splitlines():
             _, controllers, group = line.split(":", 2)
@@ -56,7 +56,7 @@ class ControlGroups(Limited):
 
     @contextlib.contextmanager
     def group(self):
-        """The file that takes the processes of a group without a limit of its own, in one of 200 MiB."""
+        """The cgroup.procs file of a group without a limit of its own, within a group limited to 200 MiB."""
         folder, limit = self.memory_folder()
         if folder is None:
             self.skipTest("no hierarchy of control groups has a memory controller")
@@ -81,11 +81,11 @@ class ControlGroups(Limited):
         super().setUp()
         self.run_covol("phantom", "torus", "--size", 448, "--count", 200000, "-o", "t.nrrd", "--points", "t.ply")
 
-    def test_jobs_that_need_more_than_their_group_has_are_told(self):
+    def test_jobs_that_need_more_than_their_group_has_are_reported(self):
         self.run_covol("distance", "t.ply", "--like", "t.nrrd", "-o", "d.vdb", "--max-distance", "8vx")
         self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "3vx")
         before = self.files()
-        # They hold 210 to 450 MB where they may.
+        # Without a limit they use 210 to 450 MB.
         jobs = {
             "convert": ["convert", "t.nrrd", "o.vdb"],
             "distance": ["distance", "t.ply", "--like", "t.nrrd", "-o", "o.vdb", "--max-distance", "90vx"],
@@ -98,7 +98,7 @@ class ControlGroups(Limited):
                     code, _, text = self.peak(*words, "--quiet", preexec_fn=lambda: processes.write_text(str(os.getpid())))
                     self.assertEqual(code, 3, text)
                     self.assertIn("memory", text)
-                    if "voxel size" not in text:  # which is refused before any memory is taken
+                    if "voxel size" not in text:  # which is refused before memory is allocated
                         self.assertIn("control group", text)
                     self.assertEqual(self.files(), before)
             code, _, text = self.peak("info", "t.nrrd", preexec_fn=lambda: processes.write_text(str(os.getpid())))
@@ -125,7 +125,7 @@ class Threads(Limited):
         return {name: hashlib.sha256((self.out / name).read_bytes()).hexdigest() for name in self.files()}
 
     def ends_well(self, code, _, text, expected, seen):
-        """With the same bits on fewer threads, or with one clear error and no file."""
+        """Either the same bits with fewer threads, or one clear error and no file."""
         seen.add(code)
         self.assertIn(code, (0, 4), text)
         if code == 0:
@@ -151,7 +151,7 @@ class Threads(Limited):
         self.assertIn(0, seen)
 
     def test_a_limit_of_processes(self):
-        # Root has none.
+        # For root there is no such limit.
         user = 65534 if os.geteuid() == 0 else os.geteuid()
 
         def limited(count):
@@ -191,16 +191,16 @@ def bomb_of_rois(path, entries, points):
 
 
 class SmallFiles(Limited):
-    """What a file claims is compared with what may be taken, before anything is."""
+    """Sizes that files claim are compared with the allowed memory before anything is allocated."""
 
     ALLOWED = 300 * MIB
 
-    def refused(self, *words, says="memory"):
-        # The test's own guard: a program that takes all that it gets ends here.
+    def refused(self, *words, expected_text="memory"):
+        # A safeguard of the test itself: it stops a program that allocates all it can get.
         code, peak, text = self.peak(*words, "--quiet", preexec_fn=lambda: resource.setrlimit(
             resource.RLIMIT_AS, (8 << 30, 8 << 30)))
         self.assertEqual(code, 3, text)
-        self.assertIn(says, text)
+        self.assertIn(expected_text, text)
         self.assertLess(peak, self.ALLOWED, words)
         self.assertEqual(self.files(), [])
 
@@ -238,10 +238,10 @@ class SmallFiles(Limited):
     def test_archives_of_rois(self):
         path = self.inputs / "one.zip"
         bomb_of_rois(path, 1, 50_000_000)
-        self.refused("info", path, says="archive")
+        self.refused("info", path, expected_text="archive")
         path = self.inputs / "many.zip"
         bomb_of_rois(path, 200, 250_000)
-        self.refused("info", path, says="archive")
+        self.refused("info", path, expected_text="archive")
         bomb_of_rois(path, 3, 1000)
         self.assertIn("3000 points", self.run_covol("info", path).stdout)
 
@@ -251,7 +251,7 @@ class SmallFiles(Limited):
         data = path.read_bytes()
         size = struct.pack("<I", 64 + 4 * 2_000_000)
         path.write_bytes(data.replace(size, struct.pack("<I", 1000)))
-        self.refused("info", path, says="damaged")
+        self.refused("info", path, expected_text="damaged")
 
     def test_an_image_that_does_not_fit(self):
         self.run_covol("phantom", "sphere", "--size", 160, "-o", self.inputs / "b.tif")
@@ -264,29 +264,29 @@ class SmallFiles(Limited):
 
 
 class Places(Case):
-    """Lattices that numbers do not hold well are refused, whatever the format."""
+    """Lattices that floating-point numbers cannot represent well are refused in every format."""
 
     def test_spacings_and_origins(self):
         import nibabel
-        for spacing, origin, says in ((1e26, 0, "spacing"), (1e-26, 0, "spacing"), (1, 1.8e19, "origin"), (1e-3, 1e10, "origin")):
+        for spacing, origin, expected_text in ((1e26, 0, "spacing"), (1e-26, 0, "spacing"), (1, 1.8e19, "origin"), (1e-3, 1e10, "origin")):
             with self.subTest((spacing, origin)):
                 path = self.inputs / "i.nrrd"
                 write_nrrd(path, (4, 4, 4), bytes(64), spacing=spacing, origin=(origin, 0, 0))
-                self.refuse("info", path, code=3, says=says)
+                self.refuse("info", path, code=3, expected_text=expected_text)
                 path = self.inputs / "i.mha"
                 path.write_bytes((f"ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementSpacing = {spacing} {spacing} {spacing}\n"
                                   f"Offset = {origin} 0 0\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n").encode() + bytes(64))
-                self.refuse("info", path, code=3, says=says)
+                self.refuse("info", path, code=3, expected_text=expected_text)
                 path = self.inputs / "i.nii"
                 affine = np.diag([spacing, spacing, spacing, 1.0])
                 affine[0, 3] = origin
                 nibabel.save(nibabel.Nifti1Image(np.zeros((4, 4, 4), np.uint8), affine), path)
                 self.run_covol("info", path, code=3)
-        self.refuse("info", self.image, "--spacing", "1e26,1,1", code=3, says="spacing")
+        self.refuse("info", self.image, "--spacing", "1e26,1,1", code=3, expected_text="spacing")
 
     def test_grids(self):
         import pyopenvdb as vdb
-        for size, origin, says in ((1e26, 0, "voxels up to"), (1, 1e11, "origin"), (1, 1000, "")):
+        for size, origin, expected_text in ((1e26, 0, "voxels up to"), (1, 1e11, "origin"), (1, 1000, "")):
             with self.subTest((size, origin)):
                 grid = vdb.FloatGrid(0.0)
                 grid.name = "u"
@@ -294,20 +294,20 @@ class Places(Case):
                 grid.transform = vdb.createLinearTransform([[size, 0, 0, 0], [0, size, 0, 0], [0, 0, size, 0], [origin, 0, 0, 1]])
                 path = self.inputs / "grid.vdb"
                 vdb.write(str(path), grids=[grid])
-                if says:
-                    self.refuse("convert", path, "o.nrrd", code=3, says=says)
+                if expected_text:
+                    self.refuse("convert", path, "o.nrrd", code=3, expected_text=expected_text)
                 else:
                     self.run_covol("convert", path, "o.nrrd")
 
     def test_far_places_that_numbers_hold(self):
-        # National grids in metres with voxels of a millimetre; a stage in nanometres.
+        # National grids in metres with voxels of a millimetre; a microscope stage in nanometres.
         for spacing, origin in ((1e-3, 4.2e6), (5e-9, 0.1), (300.0, 1e9)):
             write_nrrd(self.inputs / "i.nrrd", (4, 4, 4), bytes(64), spacing=spacing, origin=(origin, 0, 0))
             self.run_covol("info", self.inputs / "i.nrrd")
 
 
 class LargeImages(Limited):
-    """2048^3 bytes, of which the file system keeps those around a ball."""
+    """2048^3 bytes, of which the file system stores only those around a ball."""
 
     SIZE, RADIUS = 2048, 40
 
@@ -335,14 +335,14 @@ class LargeImages(Limited):
         np.savetxt(cls.inputs / "large.xyz", n // 2 + r * np.column_stack([ring * np.cos(golden), ring * np.sin(golden), height]))
 
     def test_info_looks_at_a_part(self):
-        said = self.run_covol("info", self.large, "--json", "r.json").stdout
-        self.assertIn("0 to 200", said)
-        self.assertIn("an estimate", said)
+        output = self.run_covol("info", self.large, "--json", "r.json").stdout
+        self.assertIn("0 to 200", output)
+        self.assertIn("an estimate", output)
         self.assertTrue(json.loads((self.out / "r.json").read_text())["image"]["range_is_estimate"])
         self.assertNotIn("estimate", self.run_covol("info", self.image).stdout)
 
     def test_plan_knows_of_mapped_pages(self):
-        # The system maps more of them at once where it has read them before; docs/benchmarks.md has how good plans are.
+        # The system maps more pages at once if it has read them before; docs/benchmarks.md states how accurate plans are.
         job = ["segment", self.large, "--points", self.inputs / "large.xyz", "-o", "s.vdb", "--quiet", "--json"]
         self.run_covol("plan", *job, "plan.json")
         planned = json.loads((self.out / "plan.json").read_text())["plan"]
@@ -353,7 +353,7 @@ class LargeImages(Limited):
         self.assertLess(ratio, 1.5)
 
 
-del Limited, Case  # have no tests
+del Limited, Case  # base classes without tests
 
 
 if __name__ == "__main__":

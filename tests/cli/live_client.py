@@ -1,4 +1,4 @@
-"""A browser's part in `covol mark`, without a browser: the cookie, requests and the WebSocket (RFC 6455)."""
+"""Acts as the browser in tests of `covol mark`: the cookie, requests and the WebSocket (RFC 6455)."""
 import base64
 import http.client
 import json
@@ -9,7 +9,7 @@ import zlib
 
 
 class Page:
-    """What a page that was loaded from `url` can ask."""
+    """The requests of a page that was loaded from `url`."""
 
     def __init__(self, url):
         self.origin, self.token = url.split("/?token=")
@@ -21,7 +21,7 @@ class Page:
         self.cookie = headers["Set-Cookie"].split(";")[0]
 
     def get(self, path, cookie=True, **headers):
-        """Status, headers and body, unpacked."""
+        """Status, headers and body, decompressed."""
         connection = http.client.HTTPConnection(*self.address, timeout=60)
         given = {"Cookie": self.cookie} if cookie else {}
         connection.request("GET", path, headers=given | {name.replace("_", "-"): value for name, value in headers.items()})
@@ -44,7 +44,7 @@ class Page:
         try:
             connection.send(body)
         except OSError:
-            pass  # it was refused before it was read
+            pass  # the server refused it before reading all
         answer = connection.getresponse()
         text = answer.read().decode()
         connection.close()
@@ -57,7 +57,7 @@ class Page:
 
 
 class Live:
-    """The WebSocket; messages as JSON."""
+    """The WebSocket; messages are JSON."""
 
     def __init__(self, page, origin=None, cookie=None):
         self.socket = socket.create_connection(page.address, timeout=60)
@@ -72,7 +72,7 @@ class Live:
         head, self.buffer = self.buffer.split(b"\r\n\r\n", 1)
         self.status = int(head.split()[1])
         self.count = 0
-        self.results = []  # all that were told, in their order
+        self.results = []  # all results, in the order of their messages
         if self.status == 101:
             self.state = self.receive()["state"]
             self.results += [s["result"] for s in self.state["structures"] if s["result"]]
@@ -120,7 +120,7 @@ class Live:
                 return message
 
     def act(self, **action):
-        """Sends an action and waits until it is on the disk; the patches that came meanwhile, and the last message."""
+        """Sends an action and waits until it is on disk. @return the patches that came meanwhile, and the last message"""
         self.count += 1
         key = action.setdefault("key", f"test-{id(self)}-{self.count}")
         self.send_text(json.dumps(action))
@@ -143,7 +143,7 @@ class Live:
         return patches[-1]["structures"][0]["marks"][-1]["id"]
 
     def wait_for(self, structure, stage, sequence=0):
-        """The next result of that stage, or the last one where it was made from that state or a later one."""
+        """The last result of that stage if it was computed for that state or a later one, else the next such result."""
         for result in reversed(self.results):
             if (result["structure"], result["stage"]) == (structure, stage) and result["seq"] >= max(sequence, 1):
                 return result

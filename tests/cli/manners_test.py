@@ -1,4 +1,4 @@
-"""How covol behaves among other programs: what goes to which stream, what a report holds, what a wrong word is answered.
+"""How covol behaves among other programs: use of the streams, contents of reports, answers to misspelt arguments.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/manners_test.py
 """
@@ -18,7 +18,7 @@ DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 
 
 def fields_of(json_value, path=""):
-    """Paths of all that a report holds; lists are written []."""
+    """Paths of all fields of a report; lists are written as []."""
     if isinstance(json_value, dict):
         for key, value in json_value.items():
             yield from fields_of(value, f"{path}.{key}" if path else key)
@@ -32,14 +32,14 @@ def fields_of(json_value, path=""):
 class Streams(Case):
     def test_results_go_to_standard_output_and_messages_do_not(self):
         self.segment("--mesh", "m.ply", "--quiet")
-        for words, says in ((("info", "s.vdb"), "surface: Tree_float"), (("info", self.image), "spacing 0.5 x 0.5 x 0.5"),
+        for words, expected_text in ((("info", "s.vdb"), "surface: Tree_float"), (("info", self.image), "spacing 0.5 x 0.5 x 0.5"),
                             (("compare", "s.vdb", "m.ply"), "Dice"), (("compare", "s.vdb", self.points), "points to surface"),
                             (("check", "m.ply"), "no problem"), (("check", self.image), "the file names no unit"),
                             (("plan", "segment", self.image, "--points", self.points, "-o", "x.vdb"), "memory: about")):
             with self.subTest(words=words):
                 done = self.run_covol(*words)
-                self.assertIn(says, done.stdout)
-                self.assertNotIn(says, done.stderr)
+                self.assertIn(expected_text, done.stdout)
+                self.assertNotIn(expected_text, done.stderr)
                 self.assertEqual(self.run_covol(*words, "--quiet").stderr, "")
         done = self.segment()
         self.assertEqual(done.stdout, "")
@@ -61,14 +61,14 @@ class Streams(Case):
         done = subprocess.run([COVOL, "segment", str(self.image), "--points", "-", "-o", "e.vdb", "--quiet"],
                               input=self.points.read_text(), text=True, cwd=self.out, capture_output=True)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        for text, says in ("", "got nothing"), ("1 2 x\n", "standard input"):
+        for text, expected_text in ("", "got nothing"), ("1 2 x\n", "standard input"):
             done = subprocess.run([COVOL, "reconstruct", "-", "-o", "f.vdb"], input=text, text=True, cwd=self.out,
                                   capture_output=True)
             self.assertEqual(done.returncode, 3)
-            self.assertIn(says, done.stderr)
+            self.assertIn(expected_text, done.stderr)
 
     def test_progress_never_runs_backwards(self):
-        """On a terminal: within a line that begins the same, no percentage is below one before it."""
+        """Percentages on a terminal: on lines with the same beginning they never decrease."""
         main, side = pty.openpty()
         process = subprocess.Popen([COVOL, "segment", str(self.image), "--init", "sphere:3,-2,1,8", "--coarse-levels", "1",
                                     "--rho", "1", "-o", "s.vdb", "--voxel-size", "0.25"], cwd=self.out, stderr=side,
@@ -94,7 +94,7 @@ class Streams(Case):
 
 class Reports(Case):
     def runs(self):
-        """A report of each command, by its name."""
+        """A report of each command, by the command's name."""
         self.segment("--mesh", "m.ply", "--mask", "k.nrrd", "--fields", "f.vdb", "--quiet", "--suggest", "2")
         two = ("--points", f"a={self.points}", "--suggest", "1")
         for words in (("segment", self.image, "--points", self.points, "-o", "o.vdb", "--evidence", "e.csv"),
@@ -177,10 +177,10 @@ class Outputs(Case):
 
     def test_what_cannot_be(self):
         job = ("segment", self.image, "--points", self.points)
-        self.refuse(*job, "-o", "a.ply", "--mesh", "b.stl", code=2, says="expected one of them")
-        self.refuse(*job, "-o", "a.nrrd", "--mask", "b.nrrd", code=2, says="expected one of them")
-        self.refuse(*job, "-o", "a.doc", code=3, says=".vdb")
-        self.refuse("reconstruct", self.points, "-o", "a.nrrd", code=3, says=".vdb")
+        self.refuse(*job, "-o", "a.ply", "--mesh", "b.stl", code=2, expected_text="expected one of them")
+        self.refuse(*job, "-o", "a.nrrd", "--mask", "b.nrrd", code=2, expected_text="expected one of them")
+        self.refuse(*job, "-o", "a.doc", code=3, expected_text=".vdb")
+        self.refuse("reconstruct", self.points, "-o", "a.nrrd", code=3, expected_text=".vdb")
 
     def test_what_a_failed_run_had(self):
         points = self.out / "flat.xyz"
@@ -200,29 +200,29 @@ class Outputs(Case):
         self.assertEqual(self.run_covol("mesh", "kept.vdb:start", "-o", "start.ply", "--quiet").returncode, 0)
         volume = self.report("info", "start.ply")["mesh"]["volume"]
         self.assertAlmostEqual(volume / (4 / 3 * math.pi * 27), 1, 1)
-        # A run that goes well keeps nothing.
+        # A successful run keeps nothing.
         self.segment("--keep-failed", "none.vdb", "--quiet")
         self.assertNotIn("none.vdb", self.files())
 
 
 class Words(Case):
     def test_nearest_command_and_option(self):
-        self.refuse("segmnt", self.image, code=2, says="'segmnt' is no command of covol; did you mean segment?")
-        self.refuse("reconstuct", "x", code=2, says="did you mean reconstruct?")
-        line = self.refuse("melt", code=2, says="'melt' is no command")
+        self.refuse("segmnt", self.image, code=2, expected_text="'segmnt' is no command of covol; did you mean segment?")
+        self.refuse("reconstuct", "x", code=2, expected_text="did you mean reconstruct?")
+        line = self.refuse("melt", code=2, expected_text="'melt' is no command")
         self.assertNotIn("did you mean", line)
         job = ("segment", self.image, "-o", "s.vdb")
-        self.refuse(*job, "--point", self.points, code=2, says="--point is no option of covol segment; did you mean --points?")
-        self.refuse(*job, "--voxelsize=2", code=2, says="did you mean --voxel-size?")
-        self.refuse(*job, "--thread", "2", code=2, says="did you mean --threads?")
-        self.refuse("mesh", "s.vdb", "--tetra", "1", code=2, says="--tetra is no option of covol mesh. See covol mesh")
+        self.refuse(*job, "--point", self.points, code=2, expected_text="--point is no option of covol segment; did you mean --points?")
+        self.refuse(*job, "--voxelsize=2", code=2, expected_text="did you mean --voxel-size?")
+        self.refuse(*job, "--thread", "2", code=2, expected_text="did you mean --threads?")
+        self.refuse("mesh", "s.vdb", "--tetra", "1", code=2, expected_text="--tetra is no option of covol mesh. See covol mesh")
         self.assertIn("--points", self.run_covol("segment", "--help").stdout)
 
     def test_a_blank_before_the_unit(self):
         job = ("segment", self.image, "--points", self.points, "-o", "s.vdb")
         for unit in "vx", "voxels":
-            self.refuse(*job, "--delta", "0.5", unit, code=2, says="--delta: expected a length in voxels without a blank, 0.5vx")
-        self.refuse(*job, "--voxel-size", "2", "um", code=2, says="lengths are in the image's own unit")
+            self.refuse(*job, "--delta", "0.5", unit, code=2, expected_text="--delta: expected a length in voxels without a blank, 0.5vx")
+        self.refuse(*job, "--voxel-size", "2", "um", code=2, expected_text="lengths are in the image's own unit")
         self.run_covol(*job, "--delta", "0.5vx", "--quiet")
 
 

@@ -1,4 +1,4 @@
-"""Paint, files, options, colours and the table on the page of `covol mark`, in headless Chromium.
+"""Painting, files, options, colours and the table on the page of `covol mark`, in headless Chromium.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_content_page_test.py
 """
@@ -16,13 +16,13 @@ class Content(PageCase):
         return self.js("return mark.study.structures[arguments[0]].strokes", structure)
 
     def colour_at(self, axis, index):
-        """Of the canvas, red, green and blue."""
+        """A pixel of the canvas: red, green and blue."""
         x, y = self.spot(axis, index)
         return self.js("const p = mark.panels[arguments[0]], c = p.layer.canvas, b = c.getBoundingClientRect(), r = c.width / b.width; p.draw();"
                        "return [...c.getContext('2d').getImageData((arguments[1] - b.left) * r, (arguments[2] - b.top) * r, 1, 1).data].slice(0, 3)", axis, x, y)
 
     def painted(self, axis, at):
-        """Voxels of the slice that the page shows as painted."""
+        """Number of voxels that the page shows as painted on the current slice."""
         return self.js("const s = mark.study.structures[0], c = mark.panels[arguments[0]].painting.get(s, arguments[0], arguments[1]);"
                        "if (!c) return 0; const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
                        "for (let i = 3; i < d.length; i += 4) n += d[i] > 0; return n", axis, at)
@@ -39,9 +39,9 @@ class Content(PageCase):
         self.assertAlmostEqual(radius, 5, places=6)
         self.assertAlmostEqual(self.painted(2, 30), math.pi * 25 + 10 * 20, delta=25)
         self.assertEqual(self.painted(2, 31), 0)
-        self.assertGreater(self.painted(1, 42), 20)  # as a line of the slice across
+        self.assertGreater(self.painted(1, 42), 20)  # visible as a line in a slice across
         self.assertEqual([action["do"] for action in self.server.journal()], ["add_structure", "add_stroke"])
-        # The eraser's middle goes; Shift makes the brush an eraser as well.
+        # The eraser clears the middle; Shift makes the brush an eraser, too.
         self.keys("g")
         self.drag(2, [35, 42, 30], [36, 42, 30])
         self.settled()
@@ -50,7 +50,7 @@ class Content(PageCase):
         self.keys("z")
         self.wait("return mark.study.structures[0].strokes.length === 1 && mark.queue.items.length === 0")
         self.assertGreater(self.painted(2, 30), rubbed)
-        # A ball, larger.
+        # A larger ball.
         self.keys("b", "d", ".", ".")
         self.click(2, [34, 42, 30])
         self.settled()
@@ -62,7 +62,7 @@ class Content(PageCase):
         self.driver.find_element(By.CSS_SELECTOR, '[aria-label="remove all paint"]').click()
         self.settled()
         self.assertEqual(self.strokes(), [])
-        # What the pages shows is what the program paints: whole cross-sections give the body.
+        # The page shows the same voxels as the program paints: whole cross-sections determine the body.
         self.js("mark.state.set({brush: {radius: 1, isBall: false}})")
         for k in (22, 26, 30, 34, 38):
             self.js("const [k, r] = arguments; mark.study.act({do: 'add_stroke', structure: mark.study.structures[0].id, erases: false, radius: r, axis: 2, at: k, world: [mark.space.toWorld([34, 42, k])]})",
@@ -83,8 +83,8 @@ class Content(PageCase):
         self.assertIn("±", self.driver.find_element(By.CSS_SELECTOR, ".structure .figures").text)
         self.keys("z")
         self.wait("return mark.study.structures[0].marks.length === 0")
-        # What cannot be read is told, and nothing changes.
-        self.may_fail = True  # the browser logs the answer 400
+        # A file that cannot be read causes a message and no change.
+        self.may_fail = True  # the browser logs the response 400
         broken = self.server.folder / "broken.nii"
         broken.write_bytes(b"no image")
         self.js("mark.files.as = 'guess'")
@@ -100,7 +100,7 @@ class Content(PageCase):
         self.settled()
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=table]").click()
         self.wait("return document.querySelectorAll('dialog.results tbody tr').length === 2")
-        # Rows are made anew whenever a result comes: no element is held.
+        # Rows are created anew with each result, so that element references become stale.
         rows = self.js("return [...document.querySelectorAll('dialog.results tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent).join(' '))")
         self.assertRegex(rows[0], r"structure 1.* 9 ")
         self.assertIn("–", rows[1])
@@ -113,7 +113,7 @@ class Content(PageCase):
         if os.environ.get("COVOL_PICTURES"):
             self.driver.save_screenshot(os.environ["COVOL_PICTURES"] + "/table.png")
         self.keys(Keys.ESCAPE)
-        # The first answer's voxels are coarser: a machine that is busy may still show it.
+        # The voxels of the first answer are coarser, and a busy machine may still show it.
         before = self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.triangles")
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=options]").click()
         field = self.driver.find_element(By.CSS_SELECTOR, "dialog.options [name=voxel_size]")
@@ -134,14 +134,14 @@ class Content(PageCase):
                 self.assertGreater(red, 128)
             else:
                 self.assertGreater(blue, green)
-        # Kept over a reload.
+        # Kept after a reload.
         self.wait("return localStorage.getItem('covol-mark/view/ball.nrrd/colors') === '\"inverted\"'")
         self.driver.refresh()
         self.ready()
         self.assertEqual(self.js("return mark.state.get('colors')"), "inverted")
 
     def test_a_notebook_shows_it_in_a_frame_and_others_do_not(self):
-        """Pages of two servers: the one whose origin was named shows the page, at the same host name."""
+        """Pages of two servers: only the one whose origin was named may embed the page, on the same host name."""
         notebook, other = (self.serve_page() for _ in range(2))
         self.open(options=("--in-frame-of", f"http://localhost:{notebook}"))
         address = self.server.url.replace("127.0.0.1", "localhost")
@@ -156,7 +156,7 @@ class Content(PageCase):
         self.settled()
         self.assertEqual(len(self.server.journal()), 2)
         self.driver.switch_to.default_content()
-        self.may_fail = True  # the browser logs what it refuses
+        self.may_fail = True  # the browser logs the refusal
         for port, host in ((other, "localhost"), (notebook, "127.0.0.1")):
             self.driver.get(f"http://{host}:{port}/")
             self.driver.execute_script(show, address)

@@ -1,4 +1,4 @@
-"""What a study of `covol mark` holds beside clicks: guesses, labels, marks of files, paint, options, statistics.
+"""Contents of a study of `covol mark` other than clicks: guesses, labels, marks of files, paint, options, statistics.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_content_test.py
 """
@@ -14,7 +14,7 @@ MIDDLE = (SIZE - 1) / 2
 
 
 def mask_bytes(of):
-    """Labels by `of` the distance to the middle, in voxels, and i."""
+    """Labels by a function `of` the distance from the middle, in voxels, and of i."""
     return bytes(of(math.dist((i, j, k), (MIDDLE,) * 3), i) for k in range(SIZE) for j in range(SIZE) for i in range(SIZE))
 
 
@@ -42,7 +42,7 @@ class ContentCase(MarkCase):
         return zlib.decompress(data.split(b"\n\n", 1)[1], 47)
 
     def same_without_a_page(self, page, program, *options):
-        """What the page exports is what the program makes of the study."""
+        """The page exports the same files as the program makes from the study."""
         exported = page.get("/export?structure=0&format=mask.nrrd")[2]
         self.end(program)
         self.run_covol("segment", "--study", "ball.nrrd.covol", "-o", "s.vdb", "--mask", "s.nrrd", *options)
@@ -70,7 +70,7 @@ class Content(ContentCase):
         self.assertEqual(patches[0]["structures"][0]["guess"]["name"], "small.nrrd")
         live.wait_for(structure["id"], "refined", 10)
         self.same_without_a_page(page, program)
-        # The journal finds the file from the study's folder; another file in its place is an error.
+        # The journal refers to the file relative to the study's folder; replacing the file is an error.
         line = json.loads(self.journal()[2])
         self.assertEqual((self.out / "ball.nrrd.covol" / line["path"]).resolve(), self.small.resolve())
         broken = [text if n != 2 else json.dumps({**line, "digest": "xxh128:0"}) for n, text in enumerate(self.journal())]
@@ -91,7 +91,7 @@ class Content(ContentCase):
             self.assertGreater(result["volume"], 0.7 * 2 / 3 * math.pi * (11 * H) ** 3 - 4 * math.pi * (11 * H) ** 2 * H)
         self.same_without_a_page(page, program)
         self.assertEqual(set(self.voxels("s.nrrd")), {0, 3, 8})
-        # The same command line again adds nothing.
+        # Repeating the command adds nothing.
         program, page = self.start("--labels", self.halves)
         self.assertEqual(len(self.open(page).state["structures"]), 2)
         self.end(program)
@@ -182,7 +182,7 @@ class Content(ContentCase):
 
 
 class Files(ContentCase):
-    """Files that a page sends."""
+    """Files that are uploaded by the page."""
 
     def send(self, page, name, body, **query):
         return page.post("/import?" + "&".join(f"{key}={value}" for key, value in ({"key": f"k{name}{len(body)}", "as": "guess", "name": name} | query).items()), body)
@@ -195,7 +195,7 @@ class Files(ContentCase):
         self.assertEqual(status, 200, text)
         patch = live.receive()["patch"]
         self.assertEqual(len(patch["structures"][0]["marks"]), len(MARKS))
-        # Sent again after a lost answer it is there once.
+        # Sent again after a lost response, the marks are added only once.
         self.assertEqual(self.send(page, "marks.csv", self.marks.read_bytes(), **{"as": "points", "structure": structure})[0], 200)
         self.assertEqual(len(self.open(page).state["structures"][0]["marks"]), len(MARKS))
         status, text = self.send(page, "../../small.nrrd", self.small.read_bytes(), structure=structure)
@@ -221,7 +221,7 @@ class Files(ContentCase):
         live.add_mark(structure, CENTER, "inside")
         live.add_mark(structure, world(2, 2, 2), "outside")
         exported = page.get(f"/export?structure={structure}&format=marks.csv")[2]
-        # The program reads them as they were meant.
+        # The program interprets the marks as intended.
         result = live.wait_for(structure, "refined", len(MARKS) + 3)
         (self.out / "exported.csv").write_bytes(exported)
         self.run_covol("segment", self.stack, "--points", "exported.csv", "-o", "e.vdb", "--json", "e.json")
@@ -236,9 +236,9 @@ class Files(ContentCase):
         marks = patch["patch"]["structures"][0]["marks"]
         plain = [(m["kind"], m["world"]) for m in next(s for s in self.open(page).state["structures"] if s["id"] == structure)["marks"]]
         self.assertEqual(sorted(m["kind"] for m in marks), sorted(kind for kind, _ in plain))
-        for mark in marks:  # a table has six digits
+        for mark in marks:  # tables have six digits
             self.assertLess(min(math.dist(mark["world"], place) for kind, place in plain if kind == mark["kind"]), 1e-4)
-        # Of napari: a closed line on a slice is an outline, one across slices is marks.
+        # From napari: a closed line within a slice is an outline, one across slices is read as marks.
         ring = [(17, MIDDLE + 8 * math.sin(n * math.pi / 6), MIDDLE + 8 * math.cos(n * math.pi / 6)) for n in range(12)]
         slanted = [(10 + n, 18 + n, 16 + 2 * n) for n in range(4)]
         rows = [f"{shape},{kind},{n},{z},{y},{x}" for shape, (kind, line) in enumerate((("polygon", ring), ("path", slanted))) for n, (z, y, x) in enumerate(line)]
@@ -275,7 +275,7 @@ class Files(ContentCase):
             self.assertNotIn("\x1b", text)
         files = self.out / "ball.nrrd.covol" / "files"
         self.assertEqual(list(files.iterdir()) if files.exists() else [], [])
-        # A page's messages name no files.
+        # Messages of a page must not name files.
         live = self.open(page)
         for action in ({"do": "set_guess", "structure": structure, "path": "/etc/passwd", "digest": "xxh128:0", "label": 0},
                        {"do": "add_labels", "path": "/etc/passwd", "digest": "xxh128:0", "labels": [{"label": 1, "name": "a"}]}):
@@ -287,7 +287,7 @@ class Files(ContentCase):
             self.assertEqual(status, 400, key)
             self.assertIn("'key'", text)
         self.assertEqual(len(self.journal()), 2)
-        # Neither does any other site's page send one.
+        # Pages of other sites cannot upload either.
         good = f"/import?key=k&as=guess&name=a.nrrd&structure={structure}"
         body = self.small.read_bytes()
         self.assertEqual(page.post(good, body, Origin=None)[0], 403)

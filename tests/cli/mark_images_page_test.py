@@ -1,4 +1,4 @@
-"""Images on the page of `covol mark` that are not plain: of sheared axes, and with several channels, in headless Chromium.
+"""Images with sheared axes, and with several channels, on the page of `covol mark`, in headless Chromium.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_images_page_test.py
 """
@@ -14,7 +14,7 @@ try:
 except ImportError:
     tifffile = None
 
-# The rows of slices across k lean by 20 degrees, and slices along k by others.
+# The rows of slices across k are sheared by 20 degrees, and slices along k by other angles.
 SHEARED = np.array([[1, math.sin(math.radians(20)), 0.2], [0, math.cos(math.radians(20)), -0.25], [0, 0, math.sqrt(1 - 0.2 ** 2 - 0.25 ** 2)]])
 
 
@@ -54,13 +54,13 @@ class Images(PageCase):
         for mark, (axis, index) in zip(marks, ((2, [40, 20, 30]), (1, [20, 42, 45]), (0, [34, 60, 12]))):
             self.near(mark["index"], index, axis)
             np.testing.assert_allclose(mark["world"], self.world(mark["index"]), atol=1e-6)
-        # On the screen lengths and angles are those of the world.
+        # On the screen, lengths and angles are those of the world.
         places = [self.js("const p = mark.panels[2]; return p.spotOf(mark.space.toWorld(arguments[0]))", index) for index in ([20, 20, 30], [60, 20, 30], [20, 60, 30])]
         a, b = (np.subtract(place, places[0]) for place in places[1:])
         world_a, world_b = self.world([60, 20, 30]) - self.world([20, 20, 30]), self.world([20, 60, 30]) - self.world([20, 20, 30])
         self.assertAlmostEqual(np.linalg.norm(a) / np.linalg.norm(b), np.linalg.norm(world_a) / np.linalg.norm(world_b), places=3)
         self.assertAlmostEqual(abs(a @ b) / np.linalg.norm(a) / np.linalg.norm(b), abs(world_a @ world_b) / np.linalg.norm(world_a) / np.linalg.norm(world_b), places=3)
-        # The picture leans as the marks do: the bright body is where its voxels are.
+        # The picture is sheared like the marks: the bright body is at its voxels.
         self.slices(*BALL)
         for index, is_bright in (([34, 42, 30], True), ([34, 42 - 20, 30], True), ([34, 42 - 30, 30], False), ([34 + 26, 42, 30], False), ([34, 42 + 20, 30], True)):
             self.assertEqual(self.bright(2, index), is_bright, index)
@@ -81,7 +81,7 @@ class Images(PageCase):
         grey = ("const o = mark.view.oblique, p = o.pixels, n = 384, at = (x, y) => p.slice(4 * (y * n + x), 4 * (y * n + x) + 4);"
                 "return o.codes ? [[...at(192, 192)], [...at(0, 0)]] : null")
         middle, corner = self.wait(grey)
-        self.assertGreater(middle[0], 110)  # the bright body lies in the middle
+        self.assertGreater(middle[0], 110)  # the bright body is in the middle
         self.assertEqual(middle[3], 255)
         self.assertEqual(corner[3], 0)  # outside of the image
         self.driver.find_element(By.CSS_SELECTOR, ".three canvas").send_keys("]" * 3)
@@ -116,7 +116,7 @@ class Images(PageCase):
         np.testing.assert_allclose(left, own, atol=2)
         np.testing.assert_allclose(right, other, atol=2)
         self.assertEqual(self.driver.find_element(By.CSS_SELECTOR, "[data-channel='1']").get_attribute("aria-checked"), "true")
-        # The value that is told is the marked channel's; the choice survives a reload.
+        # The displayed value is that of the marked channel; the choice is kept after a reload.
         self.driver.refresh()
         self.ready()
         self.wait("return mark.panels[2].slice.others.size === 1 && mark.state.get('grey').others?.length === 1")
@@ -131,7 +131,7 @@ class Images(PageCase):
             self.assertEqual(page.get(bad)[0], 400, bad)
 
     def colours(self):
-        """On the left and on the right of the middle, as they are drawn."""
+        """Brightness on the left and on the right of the middle, as drawn."""
         self.wait("return mark.slices.underWay.size === 0")
         found = []
         for index in ([10, 20, 5], [50, 20, 5]):

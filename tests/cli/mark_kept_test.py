@@ -1,4 +1,4 @@
-"""Surfaces of a study of `covol mark` that is opened again: kept, and found anew.
+"""Surfaces of a study of `covol mark` that is opened again: loaded if still valid, else recomputed.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_kept_test.py
 """
@@ -18,7 +18,7 @@ class Kept(MarkCase):
         return self.out / "ball.nrrd.covol" / "surfaces" / "1.surface"
 
     def begin(self):
-        """The refined result and its mesh, of a program that has ended."""
+        """The refined result and its mesh, after the program has ended."""
         program, page = self.start()
         live = self.open(page)
         structure = self.marked(live)
@@ -29,7 +29,7 @@ class Kept(MarkCase):
         return result, mesh
 
     def again(self):
-        """What a page is told at once, and what later."""
+        """The results that a page gets at once, and those that it gets later."""
         program, page = self.start()
         live = self.open(page)
         structure, = live.state["structures"]
@@ -48,7 +48,7 @@ class Kept(MarkCase):
             self.assertEqual(refined[name], result[name], name)
         self.assertEqual(kept, mesh)
         self.assertEqual(after, mesh)
-        self.assertEqual(refined["version"], at_once["version"])  # pages need not ask for it again
+        self.assertEqual(refined["version"], at_once["version"])  # pages need not request it again
         self.assertEqual(at_once["stage"], "first")
 
     def test_other_marks_have_another_surface(self):
@@ -56,7 +56,7 @@ class Kept(MarkCase):
         program, page = self.start()
         live = self.open(page)
         live.act(do="remove_mark", structure=1, mark=live.state["structures"][0]["marks"][0]["id"])
-        program.kill()  # before or after it is found: the kept one is no surface of these marks
+        program.kill()  # whether or not the new surface was found by then, the old one does not belong to these marks
         program.wait()
         _, page = self.start()
         result = self.open(page).state["structures"][0]["result"]
@@ -86,7 +86,7 @@ class Kept(MarkCase):
     def test_another_image_in_its_place_has_its_own_surface(self):
         result, _ = self.begin()
         data = bytearray(self.stack.read_bytes())
-        data[-SIZE_OF_SLICES:] = bytes(SIZE_OF_SLICES)  # nothing is bright any more beyond the ball's middle
+        data[-SIZE_OF_SLICES:] = bytes(SIZE_OF_SLICES)  # beyond the middle of the ball nothing is bright any more
         self.stack.write_bytes(bytes(data))
         at_once, _, refined, _ = self.again()
         self.assertNotEqual(refined["mean"], result["mean"])

@@ -1,4 +1,5 @@
-"""`covol mark` on an image in chunks with a pyramid: which level slices come from, and surfaces where only some chunks are.
+"""`covol mark` on an image in chunks with a pyramid: the level from which slices are taken, and surfaces if only some chunks
+exist.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_large_test.py
 """
@@ -18,7 +19,7 @@ MIDDLE, RADIUS = np.array([96, 160, 224]), 20                 # x y z, of a brig
 
 
 def write_pyramid(folder):
-    """Voxels are 10 where there is no chunk; level n is 40 n brighter in the ball than level 0, to tell which one is seen."""
+    """Voxels are 10 where there is no chunk; in the ball, level n is brighter than level 0 by 40 n, so that the displayed level can be recognised."""
     folder.mkdir()
     (folder / ".zgroup").write_text('{"zarr_format": 2}')
     scales = [{"path": str(n), "coordinateTransformations": [{"type": "scale", "scale": [SPACING * 2 ** n] * 3}]} for n in range(LEVELS)]

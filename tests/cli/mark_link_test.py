@@ -1,4 +1,4 @@
-"""What the page of `covol mark` keeps: over a lost connection, a reload, beside another page; and on a phone.
+"""What the page of `covol mark` keeps after a lost connection, after a reload, and with a second page; and the page on a phone.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_link_test.py
 """
@@ -12,7 +12,7 @@ EVIL = "<img src=x onerror=alert(1)><script>alert(2)</script>\"&amp;'"
 class Link(PageCase):
     def test_a_program_that_was_killed_takes_what_was_kept(self):
         self.open()
-        self.may_fail = True  # the browser says that nobody answers
+        self.may_fail = True  # the browser logs that there is no server
         self.mark_ball(2)
         self.server.kill()
         self.wait("return mark.state.get('link') === 'lost'")
@@ -40,7 +40,7 @@ class Link(PageCase):
         self.mark_ball(2)
         self.js("mark.connection.socket.send(JSON.stringify({key: 'x-1', do: 'add_mark', structure: mark.study.structures[0].id, kind: 'surface', world: [0, 20, 30]}))")
         self.wait("return mark.study.structures[0].marks.length === 3")
-        # As if the answer had been lost: it is kept, and is sent again by the next page.
+        # As if the response had been lost: the action is stored, and the next page sends it again.
         self.js("localStorage.setItem('covol-mark/actions/ball.nrrd/x-1', JSON.stringify({time: 1, action: {key: 'x-1', do: 'add_mark', structure: mark.study.structures[0].id, kind: 'surface', world: [0, 20, 30]}}))")
         self.driver.refresh()
         self.ready()
@@ -89,7 +89,7 @@ class Link(PageCase):
         self.assertEqual(counts[-1], 5)
 
     def test_names_with_markup_stay_text(self):
-        name = EVIL.replace("/", "")  # which no file has in its name
+        name = EVIL.replace("/", "")  # file names cannot contain a slash
         self.open(name=name)
         self.assertEqual(self.driver.find_element(By.CSS_SELECTOR, "h1").text, name + ".nrrd")
         self.mark_ball(1)
@@ -109,7 +109,7 @@ class Link(PageCase):
         self.assertIn("?structure=1&format=surface.vdb", links)
 
     def test_a_file_that_only_its_user_can_read_leads_to_the_page(self):
-        """As covol mark opens the browser: the address is a secret, and stands on no command line."""
+        """How covol mark opens the browser: the address is a secret, and must not be on a command line."""
         self.open()
         link = self.server.folder / "open.html"
         link.write_text(f'<!doctype html><meta http-equiv="refresh" content="0;url={self.server.url}">')

@@ -1,4 +1,4 @@
-"""What tests of the page of `covol mark` share: the program with an image, a browser, the mouse and the keys."""
+"""Common to the tests of the page of `covol mark`: the program with an image, a browser, mouse and keys."""
 import json
 import math
 import pathlib
@@ -24,22 +24,22 @@ except ImportError:
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 SIZE, SPACING, ORIGIN = (96, 80, 60), (0.8, 0.8, 1.4), (-31, 12, 5)
-BALL = (34, 42, 30)  # the middle of the bright body, and how far its surface is
+BALL = (34, 42, 30)  # the middle of the bright body, and the distance of its surface
 RADII = (20, 24, 13)
-# Pages are put together by the processor, as on a computer without a graphics card; SwiftShader is for WebGL alone.
+# Pages are composited on the CPU, as on a computer without a graphics card; SwiftShader is only for WebGL.
 FLAGS = ["--headless=new", "--disable-gpu-compositing", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-quic",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=1400,900"]
 
 
 def turned():
-    """A direction: about a slanted axis, by 25 degrees."""
+    """A direction matrix: a rotation by 25 degrees about an oblique axis."""
     axis = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + math.sin(0.44) * cross + (1 - math.cos(0.44)) * cross @ cross
 
 
 def write_image(path, direction, unit):
-    """A bright ellipsoid with a brighter core in noise, on a background that varies."""
+    """A bright ellipsoid with a brighter core, noise and a varying background."""
     i, j, k = np.meshgrid(*map(np.arange, SIZE), indexing="ij")
     soft = (lambda distance: 1 / (1 + np.exp(2 * distance)))
     ball = 14 * (np.sqrt(sum(((x - c) / r) ** 2 for x, c, r in zip((i, j, k), BALL, RADII))) - 1)
@@ -54,10 +54,10 @@ def write_image(path, direction, unit):
 
 
 class Server:
-    """The program. Killed and started again it has the same study, and another token."""
+    """The program. After being killed and restarted it has the same study, but another token."""
 
     def __init__(self, is_turned=False, is_anatomical=False, name="ball", options=(), write=None):
-        """@param write  makes another image in a folder, and gives its path"""
+        """@param write  writes another image into a folder and returns its path"""
         self.options = options
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-mark-"))
         self.image = write(self.folder) if write else self.folder / f"{name}.nrrd"
@@ -85,7 +85,7 @@ class Server:
 
 
 def start_chromium(profile):
-    """The driver of a Chromium without a window. @param profile  a folder of its own"""
+    """The driver of a headless Chromium. @param profile  a folder of its own"""
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for argument in [*FLAGS, f"--user-data-dir={profile}"]:
@@ -120,9 +120,9 @@ class PageCase(unittest.TestCase):
 
     def quiet(self):
         severe = [entry for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"]
-        # A surface that is asked for while a newer one takes its place is no fault.
+        # A request for a surface that has just been replaced by a newer one is not an error.
         severe = [entry for entry in severe if not ("/mesh?" in entry["message"] and "404" in entry["message"])]
-        self.driver.get("about:blank")  # before the server goes
+        self.driver.get("about:blank")  # before the server ends
         if not self.may_fail:
             self.assertEqual(severe, [])
 
@@ -133,7 +133,7 @@ class PageCase(unittest.TestCase):
         return WebDriverWait(self.driver, seconds, 0.05).until(lambda _: self.js(script, *arguments))
 
     def settled(self):
-        """All that was done is on disk."""
+        """Waits until all actions are on disk."""
         self.wait("return mark.queue.items.length === 0")
 
     def structures(self):
@@ -157,7 +157,7 @@ class PageCase(unittest.TestCase):
         return ActionChains(self.driver, duration=0)
 
     def move(self, chain, spot):
-        """Both devices advance by one tick: keys that are held are down before the press."""
+        """Both devices advance by one tick: held keys are down before the button press."""
         chain.w3c_actions.pointer_action.move_to_location(*spot)
         chain.w3c_actions.key_action.pause()
         return chain
@@ -198,12 +198,12 @@ class PageCase(unittest.TestCase):
         chain.perform()
 
     def near(self, index, wanted, axis):
-        """A pixel of the screen is not finer than a part of a voxel; along the axis there is no doubt."""
+        """Along the axis the position is exact; within the slice, a screen pixel has a finite size in voxels."""
         for a in range(3):
             self.assertLess(abs(index[a] - wanted[a]), 1e-6 if a == axis else 0.5, (index, wanted))
 
     def mark_ball(self, count=8):
-        """Marks all around it; the first ones on its middle slice."""
+        """Marks all around it; the first ones are on its middle slice."""
         for n in range(count):
             up = (0, 0, -0.5, 0.5, 0, -0.8, 0.8)[n % 7]
             angle, wide = 2 * math.pi * n / count, math.sqrt(1 - up * up)
@@ -215,4 +215,4 @@ class PageCase(unittest.TestCase):
 
     def surface(self, structure=0):
         self.wait("const s = mark.study.structures[arguments[0]]; return s?.result?.stage === 'refined' && mark.meshes.get(s.id)?.version === s.result.version", structure)
-        self.wait("return mark.view.due === Infinity")  # it is seen in 3D as well
+        self.wait("return mark.view.due === Infinity")  # it is shown in 3D as well

@@ -1,4 +1,4 @@
-"""Marks, outlines and views of the page of `covol mark` in headless Chromium, by true mouse and key events.
+"""Marks, outlines and views of the page of `covol mark` in headless Chromium, with real mouse and key events.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_page_test.py
 """
@@ -21,7 +21,7 @@ class Marks(PageCase):
             self.click(axis, wanted)
             self.assertEqual(len(self.marks()), before + 1)
             self.near(self.marks()[-1]["index"], wanted, axis)
-            # Zoomed in about a place off the middle.
+            # Zoomed in about a position away from the middle.
             x, y = self.spot(axis, wanted)
             self.js("const p = mark.panels[arguments[0]], b = p.canvas.getBoundingClientRect(); p.zoomAt(5, arguments[1] - b.left, arguments[2] - b.top)", axis, x, y)
             self.slices(31, 36, 26)
@@ -56,7 +56,7 @@ class Marks(PageCase):
         self.surface()
         self.slices(*BALL)
         self.wait("return mark.lastShown > mark.lastAction")
-        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")  # of the last mark
+        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")  # result of the last mark
         self.assertGreater(self.js("return mark.resultsSeen"), 1)
         self.assertIn("µm³", self.driver.find_element(By.CSS_SELECTOR, ".structure .figures").text)
         self.assertRegex(self.driver.find_element(By.CSS_SELECTOR, ".structure .dice").text, r"0\.\d\d \(0\.\d\d–0\.\d\d\)")
@@ -120,7 +120,7 @@ class Marks(PageCase):
         self.settled()
         self.near(self.marks()[0]["index"], [60, 20, 30], 2)
         self.assertEqual(len(self.marks()), 1)
-        # Chosen by a click, then removed while the pointer is elsewhere.
+        # Selected by a click, then deleted while the pointer is elsewhere.
         self.click(2, [60, 20, 30])
         self.assertEqual(len(self.marks()), 1)
         self.assertTrue(self.driver.find_element(By.CSS_SELECTOR, ".chosen").is_displayed())
@@ -128,7 +128,7 @@ class Marks(PageCase):
         self.keys(Keys.BACKSPACE)
         self.settled()
         self.assertEqual(self.marks(), [])
-        # A press that moves is no click.
+        # A press with movement is not a click.
         self.drag(2, [20, 20, 30], [26, 26, 30])
         self.assertEqual(self.marks(), [])
 
@@ -161,7 +161,7 @@ class Marks(PageCase):
         self.click(2, [65, 25, 20])
         self.settled()
         self.assertEqual(len(self.structures()[0]["outlines"]), 2)
-        # A double click closes, and is one corner.
+        # A double click closes the outline and adds one corner.
         self.keys("c")
         self.slices(30, 42, 22)
         for place in ([20, 30, 22], [50, 30, 22]):
@@ -202,7 +202,7 @@ class Marks(PageCase):
         self.assertTrue(self.driver.find_element(By.CSS_SELECTOR, "dialog.help").is_displayed())
         self.keys(Keys.ESCAPE, "w")
         self.assertEqual(self.js("return mark.state.get('window').white"), self.js("return mark.image.high"))
-        # Each control has a name.
+        # Every control has a name.
         nameless = self.js("return [...document.querySelectorAll('button, input, select, a, canvas')].filter((e) => e.checkVisibility() && !e.closest('[aria-hidden=true]') && !(e.getAttribute('aria-label') || e.textContent.trim())).map((e) => e.outerHTML)")
         self.assertEqual(nameless, [])
 
@@ -290,7 +290,7 @@ class Marks(PageCase):
         self.wait("return mark.meshes.get(mark.study.structures[0].id).before === null", seconds=5)
         self.assertEqual(self.js(camera), before)
         self.assertIsNotNone(self.js(count + "?.version"))
-        # Whole loops: a plane through the middle of a ball cuts one.
+        # Outlines are joined to whole loops: a plane through the middle of a ball gives a single one.
         lines = self.js("const m = mark.meshes.get(mark.study.structures[0].id); mark.panels[2].draw(); return m.lines[2].lines.map((l) => [l.closed, l.places.length])")
         self.assertEqual(len(lines), 1)
         self.assertTrue(lines[0][0])
@@ -308,8 +308,8 @@ class Marks(PageCase):
         self.actions().move_to_element(canvas).click().perform()
         self.wait("return mark.state.get('slices').some((v) => v > 0)")
         index = self.slices()
-        share = math.sqrt(sum(((index[a] - BALL[a]) / RADII[a]) ** 2 for a in range(3)))
-        self.assertLess(abs(share - 1), 0.15)
+        fraction = math.sqrt(sum(((index[a] - BALL[a]) / RADII[a]) ** 2 for a in range(3)))
+        self.assertLess(abs(fraction - 1), 0.15)
         count = len(self.marks())
         self.actions().key_down(Keys.SHIFT).move_to_element(canvas).click().key_up(Keys.SHIFT).perform()
         self.settled()

@@ -143,7 +143,7 @@ class Study(MarkCase):
             self.assertIn(why, answer["why"])
         live.send_text("nonsense")
         while "failed" not in (answer := live.receive()):
-            self.assertIn("result", answer)  # of the marks before, at any time
+            self.assertIn("result", answer)  # of the marks before, computed at any time
         self.assertIsNone(answer["failed"])
         live.act(do="lock", structure=structure, locked=True)
         _, answer = live.act(do="add_mark", structure=structure, kind="surface", world=list(MARKS[3]))
@@ -188,7 +188,7 @@ class Study(MarkCase):
 
 
 class Safe(MarkCase):
-    def test_who_may_ask(self):
+    def test_allowed_requests(self):
         _, page = self.start()
         stranger = {"cookie": False}
         self.assertEqual(page.get("/", **stranger)[0], 403)

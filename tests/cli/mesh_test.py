@@ -1,4 +1,4 @@
-"""Meshes of random solids by the real binary: proper, without slivers, decimated within what the report states.
+"""Meshes of random solids by the real program: valid, without slivers, decimated within the deviation that the report states.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/mesh_test.py
 """
@@ -60,4 +60,4 @@ class Meshes(Case):
     def test_adaptive_has_a_bound(self):
         self.segment()
         (self.out / "s.vdb").rename(self.inputs / "s.vdb")
-        self.refuse("mesh", self.inputs / "s.vdb", "-o", "m.ply", "--adaptive", "3vx", code=3, says="at most two voxels")
+        self.refuse("mesh", self.inputs / "s.vdb", "-o", "m.ply", "--adaptive", "3vx", code=3, expected_text="at most two voxels")

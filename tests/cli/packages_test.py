@@ -1,4 +1,4 @@
-"""The Debian packages that cpack makes: what is in them, what they ask for, and that they run from a folder of their own.
+"""The Debian packages that cpack makes: their contents, their dependencies, and that they run when unpacked into a folder.
 
     COVOL=build/bin/covol COVOL_BUILD=build python3 -m unittest tests/cli/packages_test.py
 
@@ -38,7 +38,7 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.work = pathlib.Path(tempfile.mkdtemp(prefix="covol-packages-"))
         cls.addClassCleanup(shutil.rmtree, cls.work)
-        shutil.rmtree(BUILD / "made", ignore_errors=True)  # as after a build of the program alone: cpack makes it
+        shutil.rmtree(BUILD / "made", ignore_errors=True)  # as after a build of the program alone: cpack creates it
         run("cpack", "-G", "DEB", "--config", BUILD / "CPackConfig.cmake", "-B", cls.work, cwd=BUILD)
         cls.debs = {path.name.split("_")[0]: path for path in cls.work.glob("*.deb")}
         assert sorted(cls.debs) == NAMES, cls.debs
@@ -63,8 +63,8 @@ class Packages(unittest.TestCase):
         self.assertNotIn("python", self.field("covol", "Depends"))
         self.assertIn(f"covol (= {version})", self.field("libcovol-dev", "Depends"))
         python = self.field("python3-covol", "Depends")
-        for asked in (f"covol (= {version})", "python3-numpy", f"python3 (>= 3.{sys.version_info.minor}"):
-            self.assertIn(asked, python)
+        for dependency in (f"covol (= {version})", "python3-numpy", f"python3 (>= 3.{sys.version_info.minor}"):
+            self.assertIn(dependency, python)
         for name in NAMES:
             self.assertEqual(self.field(name, "Architecture"), run("dpkg", "--print-architecture").strip())
 
@@ -96,16 +96,16 @@ class Packages(unittest.TestCase):
 
     def test_quickstart(self):
         out = self.work / "out"
-        said = run("bash", ROOT / "houdini_free_examples/00_quickstart.sh",
+        output = run("bash", ROOT / "houdini_free_examples/00_quickstart.sh",
                    env={**self.environment, "COVOL": str(self.root / "usr/bin/covol"), "COVOL_OUT": str(out)})
-        self.assertIn("closed, genus 0", said)
+        self.assertIn("closed, genus 0", output)
         self.assertGreater((out / "quickstart/embryo.png").stat().st_size, 1000)
 
     def test_python(self):
         script = "import covol; i, p, l = covol.phantom('sphere', 32, 80); r = covol.segment(i, p); print(covol.__file__, r)"
-        said = run("/usr/bin/python3", "-c", script, env=self.environment, cwd="/")
-        self.assertIn(str(self.root), said)
-        self.assertIn("covol.Result", said)
+        output = run("/usr/bin/python3", "-c", script, env=self.environment, cwd="/")
+        self.assertIn(str(self.root), output)
+        self.assertIn("covol.Result", output)
 
     @unittest.skipUnless(shutil.which("pkg-config"), "needs pkg-config")
     def test_pkg_config(self):
@@ -129,13 +129,13 @@ class Packages(unittest.TestCase):
         if shutil.which("groff"):
             for page in pages:
                 text = gzip.decompress(page.read_bytes()).decode()
-                said = run("groff", "-man", "-Tutf8", "-ww", "-z", input=text)
-                self.assertEqual(said, "", page.name)
+                output = run("groff", "-man", "-Tutf8", "-ww", "-z", input=text)
+                self.assertEqual(output, "", page.name)
 
 
 @unittest.skipUnless((BUILD / "made/completions/covol").exists(), "needs the target covol_made")
 class Completion(unittest.TestCase):
-    """Each shell is asked what it would offer."""
+    """Checks the completions that each shell offers."""
     folder = BUILD / "made/completions"
 
     def bash(self, line):
@@ -157,8 +157,8 @@ class Completion(unittest.TestCase):
     @unittest.skipUnless(shutil.which("fish"), "needs fish")
     def test_fish(self):
         def fish(line):
-            said = run("fish", "-c", f"source {self.folder}/covol.fish; complete -C '{line}'")
-            return [offer.split("\t")[0] for offer in said.splitlines()]
+            output = run("fish", "-c", f"source {self.folder}/covol.fish; complete -C '{line}'")
+            return [offer.split("\t")[0] for offer in output.splitlines()]
         self.assertEqual(fish("covol seg"), ["segment"])
         self.assertIn("--tag-distance", fish("covol segment --tag"))
         self.assertEqual(fish("covol segment --model "), ["guided", "paper"])

@@ -14,8 +14,8 @@ from structures_test import H, ORIGIN, ball_image, ball_points, write_points
 BLUE, RED = (68, 119, 170), (238, 102, 119)  # the first two structures'
 
 
-def near(pixels, color, most=60):
-    return np.abs(pixels.astype(int) - color).sum(axis=-1) < most
+def near(pixels, color, upper_bound=60):
+    return np.abs(pixels.astype(int) - color).sum(axis=-1) < upper_bound
 
 
 class Pictures(Case):
@@ -44,7 +44,7 @@ class Pictures(Case):
         both = self.picture("--figure", "surface", "--view", "front", "--size", "500x300")
         self.assertEqual(both.shape, (300, 500, 3))
         middle = both[60:240]  # below the legend
-        # Hue, for shades differ.
+        # By hue, because the shading varies.
         blue = (middle[..., 2].astype(int) - middle[..., 0] > 30).nonzero()[1]
         red = (middle[..., 0].astype(int) - middle[..., 2] > 30).nonzero()[1]
         self.assertGreater(len(blue), 4000)
@@ -72,7 +72,8 @@ class Pictures(Case):
         self.assertFalse(np.array_equal(composed, self.picture("--image", self.stack, "--size", "600x400")))
 
     def nest(self, apart):
-        """A core and the layer around it; the layer's wall is now before the core's, now behind it, by up to `apart` voxels."""
+        """A core and a surrounding layer; the wall of the layer is partly in front of that of the core and partly behind it, by up
+        to `apart` voxels."""
         x, y, z = np.mgrid[-16:17, -16:17, -16:17] + 0.3
         r, grids = np.sqrt(x**2 + y**2 + z**2), []
         inner = 7 + apart * np.sin(x) * np.sin(z)
@@ -84,7 +85,7 @@ class Pictures(Case):
         self.two = self.out / "nested.vdb"
         vdb.write(str(self.two), grids)
 
-    def test_a_wall_that_two_share_has_the_colour_of_the_one_behind(self):
+    def test_a_common_wall_has_the_colour_of_the_one_behind(self):
         self.nest(0.2)
         pixels = self.picture("--figure", "surface", "--view", "front", "--size", "400x400").astype(int)
         y, x = np.mgrid[0:400, 0:400]
@@ -95,7 +96,7 @@ class Pictures(Case):
         behind, beside = redness[away < 0.4], redness[(away > 0.6) & (away < 0.8)]
         self.assertLess(behind.std(), 0.25 * (beside.mean() - behind.mean()), "specks of the layer's inner wall on the core")
 
-    def test_an_outline_that_two_share_shows_both(self):
+    def test_a_common_outline_shows_both(self):
         self.nest(0)
         write_nrrd(self.out / "grey.nrrd", (33,) * 3, np.full(33**3, 128, np.uint8).tobytes(), 1, (-16,) * 3)
         pixels = self.picture("--image", "grey.nrrd", "--figure", "slices", "--slices", 1, "--size", "1200x1200").astype(int)

@@ -1,4 +1,4 @@
-"""What covol plan foretells, against what the job then takes.
+"""The predictions of covol plan, compared with the actual job.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/plan_test.py
 """
@@ -10,7 +10,7 @@ from cli_test import Case
 
 class Plan(Case):
     def run_both(self, *job):
-        """The plan, and the report of the job itself."""
+        """The plan, and the report of the actual job."""
         self.run_covol("plan", *job, "--json", "plan.json")
         self.assertEqual([path.name for path in self.out.iterdir()], ["plan.json"])
         planned = json.loads((self.out / "plan.json").read_text())["plan"]

@@ -1,4 +1,4 @@
-"""Marks as people have them: the real binary reads them, and says what does not fit.
+"""Marks as users have them: the real program reads them and reports what does not fit.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/points_test.py
     COVOL_DATA=FOLDER ... with the embryo phantom in FOLDER/phantoms, and a spleen in FOLDER/images
@@ -17,14 +17,14 @@ import numpy as np
 
 from cli_test import Case
 
-# An image whose axes, voxels and place are all different.
+# An image whose axes, voxel sizes and origin are all different.
 SIZES = (60, 50, 16)
 SPACING = (0.5, 0.4, 2.0)
 ORIGIN = (12.0, 31.0, 207.0)
 
 
 def index_marks():
-    """Closed outlines on every second slice, voxels."""
+    """Closed outlines on every second slice, in voxels."""
     return [(30.3 + 18.2 * math.cos(0.2618 * n), 24.1 + 15.3 * math.sin(0.2618 * n) + 0.2 * k, k)
             for k in range(3, 14, 2) for n in range(24)]
 
@@ -34,7 +34,7 @@ def to_world(marks):
 
 
 def roi(points, position):
-    """A Fiji polygon with sub-pixel resolution: by pixel corners, slices from 1."""
+    """A Fiji polygon with sub-pixel resolution: in coordinates of pixel corners, slices from 1."""
     n = len(points)
     head = bytearray(64)
     struct.pack_into(">4shB", head, 0, b"Iout", 228, 0)
@@ -63,22 +63,22 @@ class PointsCase(Case):
         return path
 
     def converted(self, path, *more):
-        """The points as covol places them in the image's world."""
+        """The positions of the points in the image's world, as covol computes them."""
         out = self.out / "out.csv"
         self.run_covol("convert", path, out, "--like", self.image3, "--quiet", *more)
         with open(out) as file:
             return [tuple(map(float, row)) for row in csv.reader(file) if row[0][0] not in "#x"]
 
-    def mistake(self, path, *says, image=None, more=()):
-        """An error that names the mistake and the option."""
+    def mistake(self, path, *expected_text, image=None, more=()):
+        """Checks for an error that names the mistake and the option."""
         out = self.out / "s.vdb"
-        line = self.refuse("segment", image or self.image3, "--points", path, "-o", out, *more, code=3, says=says[0])
-        for part in says[1:]:
+        line = self.refuse("segment", image or self.image3, "--points", path, "-o", out, *more, code=3, expected_text=expected_text[0])
+        for part in expected_text[1:]:
             self.assertIn(part, line)
 
-    def warning(self, path, *says, image=None, more=()):
+    def warning(self, path, *expected_text, image=None, more=()):
         done = self.run_covol("check", path, "--image", image or self.image3, *more)
-        for part in says:
+        for part in expected_text:
             self.assertIn(part, done.stderr)
 
 
@@ -95,7 +95,7 @@ class Formats(PointsCase):
     def same_place(self, path, *more):
         got = self.converted(path, *more)
         self.assertEqual(len(got), len(self.world))
-        # polygons of an archive come in its order
+        # polygons of an archive come in the order of the archive
         for a, b in zip(sorted(got), sorted(self.world)):
             for u, v in zip(a, b):
                 self.assertAlmostEqual(u, v, delta=1e-4)
@@ -112,7 +112,7 @@ class Formats(PointsCase):
         self.assertIn("6 polygon", report["rule"])
 
     def test_fiji_results(self):
-        # Fiji knows the spacing and no origin
+        # Fiji stores the spacing but no origin
         rows = [(n + 1, 200, p[0] * SPACING[0], p[1] * SPACING[1], p[2] + 1) for n, p in enumerate(self.marks)]
         path = self.write("Results.csv", rows, " ,Mean,X,Y,Slice\n", ",")
         self.same_place(path)
@@ -131,7 +131,7 @@ class Formats(PointsCase):
 
     def test_options_go_before_the_format(self):
         path = self.write("reversed.xyz", [(p[2], p[1], p[0]) for p in self.marks])
-        self.refuse("info", path, "--points-space", "moon", code=2, says="--points-space")
+        self.refuse("info", path, "--points-space", "moon", code=2, expected_text="--points-space")
         self.same_place(path, "--points-space", "index", "--points-order", "zyx")
         self.same_place(self.write("ras.xyz", [(-p[0], -p[1], p[2]) for p in self.world]), "--points-space", "ras")
         self.same_place(self.write("nm.xyz", [tuple(1000 * v for v in p) for p in self.world]), "--points-scale", "0.001")
@@ -158,7 +158,7 @@ class Mistakes(PointsCase):
         self.mistake(self.write("local.xyz", [tuple(v - o for v, o in zip(p, ORIGIN)) for p in self.world]),
                      "--points-space local would", "they leave out the image's origin")
 
-    def test_both_boxes_are_told(self):
+    def test_both_boxes_are_reported(self):
         path = self.write("far.xyz", [(1e4, -1e4, 0), (2e4, 5, 6)])
         self.mistake(path, "2 of 2 points lie outside the image: points from (10000, -10000, 0) to (20000, 5, 6), image from ")
 
@@ -234,16 +234,16 @@ class Cleaning(PointsCase):
         self.assertAlmostEqual(report["surface"]["volume"] / clean["surface"]["volume"], 1, delta=0.01)
 
     def test_bad_values(self):
-        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=0.5", code=3, says="--remove-outliers: expected 0 or >= 1")
-        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=many", code=2, says="--remove-outliers")
-        self.refuse("convert", self.dirty, "o.xyz", "--smooth", "butter", code=2, says="--smooth")
-        self.refuse("convert", self.dirty, "o.xyz", "--simplify", "1vx", code=2, says="--like IMAGE")
+        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=0.5", code=3, expected_text="--remove-outliers: expected 0 or >= 1")
+        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=many", code=2, expected_text="--remove-outliers")
+        self.refuse("convert", self.dirty, "o.xyz", "--smooth", "butter", code=2, expected_text="--smooth")
+        self.refuse("convert", self.dirty, "o.xyz", "--simplify", "1vx", code=2, expected_text="--like IMAGE")
 
 
 class WrongMarks(Case):
     @unittest.skipUnless(os.environ.get("COVOL_DATA"), "SKIPPED: COVOL_DATA is not set")
     def test_few_among_many_in_thick_slices(self):
-        """A spleen in slices of 5 mm: right marks lie half a slice off, and that is no reason to give up the body."""
+        """A spleen in slices of 5 mm: correct marks are off by half a slice, which is no reason to reject the body."""
         folder = pathlib.Path(os.environ["COVOL_DATA"]) / "images"
         truth = np.asanyarray(nibabel.load(folder / "ct_spleen_gt.nii.gz").dataobj) > 0
         rng = np.random.default_rng(5)

@@ -1,4 +1,4 @@
-"""Nothing lost, nothing wrong in silence: kills, signals, hostile numbers, marks of another image, with the real binary.
+"""No lost data and no silent errors: kills, signals, hostile numbers, marks of another image, with the real program.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/reliability_test.py
 """
@@ -20,18 +20,18 @@ OUTPUTS = ["-o", "s.vdb", "--mesh", "s.ply", "--mask", "s.nrrd", "--table", "s.c
 
 
 class Sets(Case):
-    """Outputs of a run come together, or none does."""
+    """The outputs of a run appear together, or none does."""
 
     def segment(self, *more):
         return [COVOL, "segment", self.image, "--points", self.points, "--quiet", "--threads", "1", "--init", "tag", *OUTPUTS, *more]
 
     def state(self):
-        """Of each output; those that hold times change from run to run."""
+        """A digest of each output; outputs that contain times change from run to run."""
         return {name: hashlib.sha256((self.out / name).read_bytes()).hexdigest() for name in self.files()
                 if name not in ("s.json", "s.csv")}
 
     def clear(self):
-        """The next run in this folder clears up."""
+        """The next run in this folder removes leftovers."""
         self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
         (self.out / "next.nrrd").unlink()
         self.assertEqual([p.name for p in self.out.iterdir() if p.name.startswith(".")], [])
@@ -62,7 +62,7 @@ class Sets(Case):
             new += self.state() != last
         self.assertEqual(code, 0)
         self.assertEqual(self.state(), sets[choice])
-        # Each of the five outputs was put in place by a call of its own, and one that was killed between them went on.
+        # Each of the five outputs was put in place by a separate call, and a run that was killed between these calls was completed.
         self.assertGreaterEqual(new, len(sets[0]))
         self.assertGreater(call, 2 * len(sets[0]))
 
@@ -105,7 +105,7 @@ class Sets(Case):
 
 class Inputs(Case):
     def test_an_image_that_is_cut_short_while_it_is_read(self):
-        size = 704  # of so large a file pages are mapped
+        size = 704  # a file this large is mapped
         image, points = self.inputs / "large.nrrd", self.inputs / "marks.xyz"
         write_nrrd(image, (size,) * 3, b"", spacing=1, origin=(0, 0, 0))
         with open(image, "r+b") as file:
@@ -124,15 +124,15 @@ class Inputs(Case):
         self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
 
     def test_a_point_that_no_grid_holds(self):
-        """Named at once, not after minutes or for want of memory."""
+        """Detected at once, not after minutes or by running out of memory."""
         wild = (np.array(sphere_points(6000)) - CENTER) / RADIUS
         wild[17] = (1e7, 3, 4)
         path = self.inputs / "cloud.xyz"
         np.savetxt(path, wild, "%.9g")
-        self.refuse("reconstruct", path, "-o", "o.vdb", code=3, says="points: (1e+07, 3, 4) lies")
+        self.refuse("reconstruct", path, "-o", "o.vdb", code=3, expected_text="points: (1e+07, 3, 4) lies")
 
     def test_small_parts_far_apart(self):
-        """Two balls 10^4 radii apart cost what their points cost."""
+        """Two balls 10^4 radii apart need no more than their points do."""
         apart = 0.01 * (np.array(sphere_points(6000)) - CENTER) / RADIUS
         apart[::2] += (100, 0, 0)
         path = self.inputs / "cloud.xyz"
@@ -143,9 +143,9 @@ class Inputs(Case):
 
 
 class Memory(Case):
-    """--memory-limit bounds what the program holds, whatever it is busy with."""
+    """--memory-limit bounds the program's memory in every phase."""
 
-    # What a program takes that has done nothing, and what a growing one takes between two looks at it.
+    # Memory of a program that has not done anything yet, and its possible growth between two checks.
     OWN = 76 << 20
 
     def peak(self, *words):
@@ -193,7 +193,7 @@ class Memory(Case):
             "compare points": ["compare", "t.ply", "b.vdb"],
         }, 6)
 
-    def stay_within(self, jobs, least):
+    def stay_within(self, jobs, minimum):
         seen = 0
         for name, words in jobs.items():
             with self.subTest(name):
@@ -210,7 +210,7 @@ class Memory(Case):
                 self.assertIn("memory", text)
                 self.assertLess(peak, 1.05 * limit + self.OWN)
                 self.assertEqual(self.files(), before)
-        self.assertGreaterEqual(seen, least)
+        self.assertGreaterEqual(seen, minimum)
 
 
 class Numbers(Case):
@@ -218,14 +218,14 @@ class Numbers(Case):
         for option, value in (("--tau", "1e-9"), ("--tau", "1e300"), ("--delta", "1e308")):
             with self.subTest(option + " " + value):
                 self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--init", "tag", option, value, code=3,
-                            says=option)
+                            expected_text=option)
 
     def test_more_frames_than_memory_are_refused(self):
         path = self.inputs / "frames.nrrd"
         header = ("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 8 8 8 3000000\nspacings: 1 1 1 1\nencoding: raw\nbyte skip: {}\n\n")
         for skip in (-1, 5):
             path.write_bytes(header.format(skip).encode() + bytes(5000))
-            self.refuse("info", path, code=3, says="frames")
+            self.refuse("info", path, code=3, expected_text="frames")
         path = self.inputs / "frames.mha"
         path.write_bytes(b"ObjectType = Image\nNDims = 4\nDimSize = 8 8 8 3000000\nElementSpacing = 1 1 1 1\nHeaderSize = 150\n"
                          b"ElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + bytes(5000))
@@ -234,16 +234,16 @@ class Numbers(Case):
 
 class Damaged(Case):
     def test_files_that_crashed_a_library_are_refused(self):
-        """Found by tests/fuzz/mutate.py: they made OpenVDB write behind a buffer, ITK abort, MetaIO go on for hours."""
+        """Found by tests/fuzz/mutate.py: these files made OpenVDB write beyond a buffer, ITK abort, or MetaIO run for hours."""
         files = sorted(p for p in (pathlib.Path(__file__).resolve().parents[1] / "fuzz/regressions").iterdir() if p.is_file())
         self.assertGreaterEqual(len(files), 4)
         for path in files:
             with self.subTest(path.name):
                 self.refuse("mesh" if path.suffix == ".vdb" else "info", path, *(["-o", "o.ply"] if path.suffix == ".vdb" else []),
-                            code=3, says="damaged")
+                            code=3, expected_text="damaged")
 
     def test_metadata_of_another_length_than_its_type(self):
-        """OpenVDB takes the type's length, and what comes next for the length of a text."""
+        """OpenVDB takes the stored length of the type, and the following bytes for the length of a string."""
         self.segment()
         data = (self.out / "s.vdb").read_bytes()
         (self.out / "s.vdb").unlink()
@@ -252,17 +252,17 @@ class Damaged(Case):
             path = self.inputs / "metadata.vdb"
             self.assertIn(kind + struct.pack("<I", 12), data)
             path.write_bytes(data.replace(kind + struct.pack("<I", 12), kind + struct.pack("<I", length)))
-            self.refuse("info", path, code=3, says="damaged")
+            self.refuse("info", path, code=3, expected_text="damaged")
 
     def test_what_is_kept_of_leaves_for_delayed_loading(self):
-        """OpenVDB takes as much memory as it says, reads behind its blocks, and takes what follows for the next text."""
+        """OpenVDB allocates the stored size, reads beyond its blocks, and takes the following bytes for the next string."""
         self.segment()
         data = (self.out / "s.vdb").read_bytes()
         (self.out / "s.vdb").unlink()
         kind = b"\x0d\0\0\0__delayedload"
         begin = data.index(kind) + len(kind)
         length, leaves, packed = struct.unpack_from("<3I", data, begin)
-        self.assertEqual(packed, 0)  # a byte for each leaf, as it is; then eight for each in a block of Blosc's
+        self.assertEqual(packed, 0)  # a byte for each leaf, uncompressed; then eight for each in a Blosc block
         block = begin + 12 + leaves
         header = struct.unpack_from("<5I", data, block)  # packed size; versions; size, size of its blocks, packed size
         self.assertEqual(header[2::2], (8 * leaves, header[0]))
@@ -271,7 +271,7 @@ class Damaged(Case):
             path = self.inputs / "leaves.vdb"
             path.write_bytes(data[:place] + struct.pack("<I", value) + data[place + 4:])
             with self.subTest(place=place - begin, value=value):
-                self.refuse("info", path, code=3, says="damaged")
+                self.refuse("info", path, code=3, expected_text="damaged")
 
     def test_a_minute_of_fuzzing(self):
         script = pathlib.Path(__file__).resolve().parents[1] / "fuzz/mutate.py"
@@ -281,7 +281,7 @@ class Damaged(Case):
 
 
 class WrongInSilence(Case):
-    """Runs that end well on inputs that are not."""
+    """Runs that succeed on flawed inputs."""
 
     @classmethod
     def setUpClass(cls):
@@ -322,7 +322,7 @@ class WrongInSilence(Case):
         self.assertNotEqual(warnings, [])
 
     def test_marks_that_went_astray(self):
-        """The surface goes where they are, and the image has no say; who made them has to look."""
+        """The surface follows the marks, and the image has no influence; the user has to check the marks."""
         far = np.array(CENTER) + [[0.45 * SIZE * H, 0, 0], [0, 0.46 * SIZE * H, 0.45 * SIZE * H]]
         small = np.array(CENTER) + 0.4 * (self.marks - CENTER)
         for marks, astray in ((small, 0), (np.concatenate([small, far]), 2)):

@@ -1,4 +1,4 @@
-"""What tests of report pages share: pages, a browser, the mouse and the keys."""
+"""Common to the tests of report pages: pages, a browser, mouse and keys."""
 import csv
 import json
 import os
@@ -20,13 +20,13 @@ except ImportError:
     webdriver = By = Keys = WebDriverWait = None
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-EVIL = "<!--<script>alert(1)\"&amp;'"  # a name of a structure holds no slash
+EVIL = "<!--<script>alert(1)\"&amp;'"  # names of structures cannot contain a slash
 MB = 1e6
 COARSE = ("--voxel-size", 2 * H)
 
 
 def data_of(page):
-    """What the page tells, as a browser finds it."""
+    """The data of the page, as a browser finds it."""
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script', page.read_text(), re.S)[1])
 
 
@@ -81,7 +81,7 @@ class BrowserCase(PageCase):
         self.driver.get_log("performance")
         self.load(page.as_uri())
         self.addCleanup(self.quiet)
-        # The next test begins anew.
+        # The next test starts from an empty state.
         self.addCleanup(self.js, "Storage.prototype.setItem = () => {}; localStorage.clear(); sessionStorage.clear()")
 
     def load(self, address):
@@ -89,7 +89,7 @@ class BrowserCase(PageCase):
         WebDriverWait(self.driver, 60).until(lambda d: d.execute_script("return Boolean(window.covolReport?.done)"))
 
     def quiet(self):
-        """Nothing went wrong, and nobody was asked for anything."""
+        """No errors occurred, and nothing was requested from the network."""
         self.assertEqual([entry for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"], [])
         for entry in self.driver.get_log("performance"):
             message = json.loads(entry["message"])["message"]
@@ -100,7 +100,7 @@ class BrowserCase(PageCase):
         return self.driver.execute_script("const report = window.covolReport;" + script, *arguments)
 
     def picture(self):
-        """The 3D view's pixels: how many are drawn, and their sum."""
+        """The pixels of the 3D view: how many are drawn, and their sum."""
         return self.js("""
             report.view.renderNow();
             const gl = report.view.renderer.getContext(), width = gl.drawingBufferWidth, height = gl.drawingBufferHeight;
@@ -119,7 +119,7 @@ class BrowserCase(PageCase):
         return self.js("return report.state.get('slices')")
 
     def marks(self, structure=0):
-        """Where they are, in voxels, with their kinds."""
+        """The positions of the marks, in voxels, with their kinds."""
         return self.js("return report.study.structures[arguments[0]].marks.map((m) => [m.kind, ...report.space.toIndex(m.world)])", structure)
 
     def new_marks(self, structure=0):
@@ -129,7 +129,7 @@ class BrowserCase(PageCase):
         return [round(v) for v in self.js("const p = report.panels[arguments[0]]; p.draw(); return p.pixelOf(report.space.toWorld(arguments[1]))", axis, index)]
 
     def mouse(self, *steps, keys=()):
-        """True events: ("move", x, y), ("down", button), ("up", button), ("wheel", x, y, delta)."""
+        """Real events: ("move", x, y), ("down", button), ("up", button), ("wheel", x, y, delta)."""
         chain = ActionChains(self.driver, duration=0)
         for key in keys:
             chain.key_down(key)

@@ -34,7 +34,7 @@ class Page(PageCase):
         self.assertEqual(sorted(data["facts"]["given"]), ["image", "output", "points", "report", "voxel-size"])
         self.assertTrue(data["facts"]["command_line"].startswith("covol segment "))
         self.assertEqual(report["page"]["bytes"], (self.out / "s.html").stat().st_size)
-        # Marks are floats behind each other.
+        # Marks are consecutive floats.
         first = zlib.decompress(base64.b64decode(ball["marks"]["data"]))
         self.assertEqual(len(first), 60 * 12)
         self.assertIn("suggestions", report["evidence"])
@@ -45,15 +45,15 @@ class Page(PageCase):
         a, b = (data_of(self.out / name) for name in ("a.html", "b.html"))
         self.assertEqual(a["structures"][0]["mesh"]["corners"], b["structures"][0]["mesh"]["corners"])
         self.assertEqual(a["image"]["slices"], b["image"]["slices"])
-        self.assertEqual(b["facts"]["resolved"], a["facts"]["resolved"])  # the .vdb keeps it
+        self.assertEqual(b["facts"]["resolved"], a["facts"]["resolved"])  # kept in the .vdb
 
     def test_facts_of_the_run(self):
         self.segment(*COARSE, "--json", "s.json")
         self.run_covol("report", "s.vdb", "--run-report", "s.json", "-o", "p.html")
-        told = json.loads((self.out / "s.json").read_text())
+        reported = json.loads((self.out / "s.json").read_text())
         facts = data_of(self.out / "p.html")["facts"]
-        self.assertEqual(facts["seconds"], told["seconds"])
-        self.assertEqual(facts["automatic"], told["automatic"])
+        self.assertEqual(facts["seconds"], reported["seconds"])
+        self.assertEqual(facts["automatic"], reported["automatic"])
         (self.out / "odd.json").write_text(json.dumps({"covol": 1, "input": 3, "seconds": [], "structures": [4], "warnings": "x"}))
         self.run_covol("report", "s.vdb", "--run-report", "odd.json", "--points", self.few, "-o", "o.html")
         (self.out / "bad.json").write_text("[1, 2]")
@@ -99,9 +99,9 @@ class Page(PageCase):
         self.assertFalse(data_of(self.out / "t.html")["anatomical"])
 
     def test_wrong_names(self):
-        self.refuse("segment", self.image, "--points", self.few, *COARSE, "-o", "s.vdb", "--report", "s.pdf", code=3, says="--report: s.pdf: expected a name that ends in .html")
-        self.refuse("report", "none.vdb", "-o", "s.html", code=4, says="none.vdb")
-        self.refuse("report", self.image, "-o", "s.html", code=3, says="ball.nrrd")
+        self.refuse("segment", self.image, "--points", self.few, *COARSE, "-o", "s.vdb", "--report", "s.pdf", code=3, expected_text="--report: s.pdf: expected a name that ends in .html")
+        self.refuse("report", "none.vdb", "-o", "s.html", code=4, expected_text="none.vdb")
+        self.refuse("report", self.image, "-o", "s.html", code=3, expected_text="ball.nrrd")
 
     def test_the_page_names_no_host(self):
         self.segment(*COARSE, "--report", "s.html")
@@ -113,7 +113,7 @@ class Page(PageCase):
 
 class Browser(BrowserCase):
     def test_the_first_view_shows_the_whole_body(self):
-        """No slice plane hides a half: what is drawn lies inside of the view, and every structure is there."""
+        """The slice planes hide no half of the bodies: what is drawn lies within the view, and every structure is visible."""
         self.open(self.two())
         self.assertEqual(self.js("return report.state.get('planes')"), [False, False, False])
         edges = self.js("""
@@ -170,7 +170,7 @@ class Browser(BrowserCase):
             self.assertAlmostEqual(float(row[f"extent_x_{unit}"]), own["mesh"]["max"][0] - own["mesh"]["min"][0], places=9)
 
     def test_outline_is_where_the_surface_is(self):
-        """Through the middle of a ball it is a circle: its points are as far from the middle as the mesh says."""
+        """Through the middle of a ball the outline is a circle: its points are at the mesh's distance from the middle."""
         self.open(self.two())
         radii = self.js("""
             const middle = (report.space.size[0] - 1) / 2, panel = report.panels[2], drawn = [], context = panel.canvas.getContext('2d');
@@ -192,9 +192,9 @@ class Browser(BrowserCase):
             self.assertLess(max(line), RADIUS / H + 2)
 
     def test_a_suggestion_is_jumped_to(self):
-        half = self.inputs / "half.xyz"  # no marks above
+        half = self.inputs / "half.xyz"  # no marks in the upper half
         write_xyz(half, [p for p in sphere_points(120) if p[2] < CENTER[2] + 1] + [(CENTER[0], CENTER[1], CENTER[2] + RADIUS)])
-        half_image = self.inputs / "half.nrrd"  # nothing to see there either
+        half_image = self.inputs / "half.nrrd"  # and nothing visible there either
         write_nrrd(half_image, (SIZE,) * 3, ball_bytes()[:SIZE ** 3 // 2] + bytes([20]) * (SIZE ** 3 // 2))
         self.open(self.page_of("half", "segment", half_image, "--points", half, "-o", "s.vdb", "--suggest", 2))
         buttons = self.driver.find_elements(By.CSS_SELECTOR, ".suggestion")
@@ -208,9 +208,9 @@ class Browser(BrowserCase):
         self.assertNotEqual(self.picture()[1], before)
         self.assertEqual(buttons[0].get_attribute("aria-current"), "true")
         count = len(self.marks())
-        self.keys(Keys.ENTER)  # on the button: that one again
+        self.keys(Keys.ENTER)  # the focus is on the button: goes there again
         self.js("document.activeElement.blur()")
-        self.keys(Keys.ENTER)  # the border is at the ring
+        self.keys(Keys.ENTER)  # the border is at the crosshair's ring
         self.assertEqual(len(self.marks()), count + 1)
 
     def test_dark_light_and_a_phone(self):
@@ -232,7 +232,7 @@ class Browser(BrowserCase):
         WebDriverWait(self.driver, 60).until(lambda d: d.execute_script("return Boolean(window.covolReport?.done)"))
         self.assertIn("no WebGL", self.driver.find_element(By.CSS_SELECTOR, ".three .notice").text)
         self.assertGreater(len(self.slice_picture(2)), 2000)
-        self.driver.get_log("browser")  # three.js says there that it has no context
+        self.driver.get_log("browser")  # three.js logs that it has no context
 
     def test_points_alone_have_no_slices(self):
         self.open(self.page_of("cloud", "reconstruct", self.points, "-o", "s.vdb"))
@@ -258,7 +258,7 @@ class Browser(BrowserCase):
         self.assertLess(page.stat().st_size, 15 * MB)
         self.open(page)
         print(f"page of {page.stat().st_size / MB:.1f} MB: first view after {self.js('return report.ready'):.0f} ms, all slices after {self.js('return report.decoded'):.0f} ms")
-        self.assertLess(self.js("return report.ready"), 20000)  # no gate on time: a machine with two busy cores
+        self.assertLess(self.js("return report.ready"), 20000)  # generous: both cores of the machine may be busy
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a person does on a report page, by true mouse, touch and key events in headless Chromium.
+"""Interaction with a report page by real mouse, touch and key events in headless Chromium.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/report_viewer_test.py
 """
@@ -37,7 +37,7 @@ class Viewer(BrowserCase):
         image = data_of(self.two())["image"]
         value = float(re.search(r"value \u2248\u2009([\d.]+)", cursor)[1])
         self.assertGreater(value, image["black"] + 0.8 * (image["white"] - image["black"]))  # the inside of the ball
-        self.load(self.driver.current_url)  # what was seen survives it
+        self.load(self.driver.current_url)  # the view is kept after a reload
         self.assertAlmostEqual(self.js("return report.state.get('views')[2].zoom"), zoom)
         self.assertEqual(self.js("return report.state.get('window')"), window)
         self.js("document.activeElement.blur()")
@@ -73,12 +73,12 @@ class Viewer(BrowserCase):
         self.assertNotEqual(self.slice_picture(2), before)
         where = self.driver.find_element(By.CSS_SELECTOR, ".axis-2 .where")
         self.assertIn("12 of 0\u201339", where.text)
-        where.click()  # as Fiji counts
+        where.click()  # counted as in Fiji
         WebDriverWait(self.driver, 10).until(lambda _: "13 of 1\u201340" in where.text)
         spot = self.spot(2, [15, 25, 12])
         self.mouse(("wheel", *spot, 100))
         self.assertEqual(self.slices()[2], 13)
-        self.click(2, [15, 25, 13])  # the crosshair is the tool at first
+        self.click(2, [15, 25, 13])  # the crosshair is the initial tool
         self.assertEqual(self.slices(), [15, 25, 13])
         self.keys("]", Keys.ARROW_LEFT)
         self.assertEqual(self.slices(), [14, 25, 14])
@@ -126,7 +126,7 @@ class Viewer(BrowserCase):
         self.assertNotEqual(self.picture()[1], before)
         normal, eye = self.js("const v = report.view, e = v.camera.position.clone().sub(v.controls.target).normalize(); return [report.state.get('oblique').normal, e.toArray()]")
         self.assertLess(math.dist(normal, eye), 1e-6)
-        # In the middle of the ball it is as bright as the ball, at its rim as dark as what is around it.
+        # In the middle of the ball the value is that of the ball, at its rim that of the background.
         values = self.js("""
             const {pixels} = report.view.oblique, n = Math.sqrt(pixels.length / 4), at = (x, y) => pixels[4 * (Math.round(y * (n - 1)) * n + Math.round(x * (n - 1)))];
             return [at(0.5, 0.5), at(0.5, 0.72), at(0.72, 0.5)];""")
@@ -158,7 +158,7 @@ class Viewer(BrowserCase):
         WebDriverWait(self.driver, 60).until(lambda d: d.current_url == pages[0].as_uri() and d.execute_script("return Boolean(window.covolReport?.done)"))
 
     def test_the_keyboard_alone(self):
-        """Tab reaches the plane; keys move, mark, measure nothing, enlarge and list themselves."""
+        """Tab reaches the plane; keys move, mark, enlarge, and list the keys, but do not measure."""
         self.open(self.two())
         self.js("document.querySelector('.axis-2 .where').focus()")
         for _ in range(4):

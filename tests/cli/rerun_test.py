@@ -30,8 +30,8 @@ class Rerun(Case):
 
     def test_digests_are_those_of_xxh128sum(self):
         self.make()
-        said = subprocess.run(["xxh128sum", "ball.nrrd", "marks with space.xyz"], cwd=self.out, capture_output=True, text=True, check=True)
-        expected = [{"name": line[34:], "digest": f"xxh128:{line[:32]}"} for line in said.stdout.splitlines()]
+        output = subprocess.run(["xxh128sum", "ball.nrrd", "marks with space.xyz"], cwd=self.out, capture_output=True, text=True, check=True)
+        expected = [{"name": line[34:], "digest": f"xxh128:{line[:32]}"} for line in output.stdout.splitlines()]
         facts = vdb.readMetadata(str(self.out / "s.vdb"))
         self.assertEqual(json.loads(facts["covol_inputs"]), expected)
 
@@ -70,7 +70,7 @@ class Rerun(Case):
         self.assertIn("the same bits", self.run_covol("rerun", "t.vdb").stdout)
 
     def write_with(self, name, changed):
-        """s.vdb with other metadata."""
+        """Writes s.vdb with other metadata."""
         grids, facts = vdb.readAll(str(self.out / "s.vdb"))
         for grid in grids:
             for key, value in changed.items():
@@ -81,7 +81,7 @@ class Rerun(Case):
         self.make()
         facts = vdb.readMetadata(str(self.out / "s.vdb"))
         options = json.loads(facts["covol_options"])
-        for name, value, says in (("covol_given", '"output"', "damaged"), ("covol_given", '[3]', "damaged"),
+        for name, value, expected_text in (("covol_given", '"output"', "damaged"), ("covol_given", '[3]', "damaged"),
                                   ("covol_given", '["frames"]', "missing"), ("covol_given", "nothing", "damaged"),
                                   ("covol_inputs", '[{"name": 1}]', "damaged"), ("covol_inputs", "[4]", "damaged"),
                                   ("covol_inputs", '[{"name": "../ball.nrrd", "digest": "xxh128:"}]', "expected a file's name"),
@@ -91,8 +91,8 @@ class Rerun(Case):
                                   ("covol_options", json.dumps(options | {"command": "fly"}), "no command 'fly'")):
             with self.subTest(name=name, value=value[:40]):
                 self.write_with("t.vdb", {name: value})
-                self.assertIn(says, self.run_covol("rerun", "t.vdb", code=3).stderr)
-        # Outputs stay where they belong.
+                self.assertIn(expected_text, self.run_covol("rerun", "t.vdb", code=3).stderr)
+        # Outputs are written only to where they belong.
         self.write_with("t.vdb", {"covol_options": json.dumps(options | {"output": "../../away.vdb"})})
         before = self.files()
         self.assertIn("the same bits", self.run_covol("rerun", "t.vdb", "-o", "again.vdb").stdout)
@@ -109,7 +109,7 @@ class Rerun(Case):
             while "running" not in run.stderr.readline():
                 self.assertIsNone(run.poll(), "ended before the signal")
             run.terminate()
-            run.communicate(timeout=60)  # which ends with the last that holds the stream, the run within
+            run.communicate(timeout=60)  # this ends with the last process that has the stream open, which is the inner run
         finally:
             run.kill()
         self.assertEqual(run.returncode, 130)

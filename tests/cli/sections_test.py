@@ -19,8 +19,8 @@ AXES = rotation((1, 2, 3), 0.7)  # columns: axes of the ellipsoid
 
 
 def section(normal, offset, count=48, radii=RADII, axes=AXES):
-    """The ellipsoid's outline in the plane normal . (x - CENTRE) = offset; none where they do not meet."""
-    n = axes.T @ normal * radii  # the plane, where the ellipsoid is the unit ball
+    """The ellipsoid's outline in the plane normal . (x - CENTRE) = offset; empty if they do not meet."""
+    n = axes.T @ normal * radii  # the plane in coordinates in which the ellipsoid is the unit ball
     reach = np.linalg.norm(n)
     if abs(offset) >= 0.98 * reach:
         return None
@@ -96,7 +96,7 @@ class Sections(Case):
         self.assertEqual(report["surface"]["components"], 2)
 
     def test_many_thin_bodies(self):
-        """Of the outlines of all few lie on each: the surface that bends least through them runs off."""
+        """Each of the outlines has few marks on it: the surface of minimum bending energy through them runs away."""
         rng, radii, bodies = np.random.default_rng(5), np.array([3.2, 0.9, 0.9]), []
         for place in itertools.product((-7.0, 0, 7.0), (-3.0, 0, 3.0), (-1.5, 1.5)):
             bodies.append((np.array(place), rotation((0.3, 1, 0.2), 0.2) @ rotation(rng.normal(size=3), 0.2)))
@@ -122,7 +122,7 @@ class Sections(Case):
         planes = [(n, o, [(1, line)]) for n, o, line in family((1, 2, -2), 7)]
         planes += [(n, o + n @ other, [(2, line + other)]) for n, o, line in family((1, 2, -2), 7)]
         path = write_csl(self.inputs / "two.csl", planes, 3)
-        self.refuse("reconstruct", "--contours", path, "-o", "s.vdb", code=3, says="label")
+        self.refuse("reconstruct", "--contours", path, "-o", "s.vdb", code=3, expected_text="label")
         image = self.inputs / "grey.nrrd"
         image.write_text("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 44 28 24\nspace directions: (0.75,0,0) (0,0.75,0) (0,0,0.75)\n"
                          "space origin: (-6,-12,-8)\nencoding: ascii\n\n" + "7 " * (44 * 28 * 24) + "\n")
@@ -131,23 +131,23 @@ class Sections(Case):
         for one in report["structures"]:
             self.assertAlmostEqual(one["surface"]["volume"] / VOLUME, 1, delta=0.05)
 
-    def test_what_is_no_plane_is_told(self):
+    def test_what_is_no_plane_is_reported(self):
         line = section(np.array([0.6, 0, 0.8]), 0.5).copy()
         line[::2] += 0.4
         path = self.inputs / "crooked.csv"
         with open(path, "w", newline="") as file:
             csv.writer(file).writerows([["contour", "x", "y", "z"], *([1, *p] for p in line)])
-        self.refuse("reconstruct", "--contours", path, "-o", "s.vdb", code=3, says="plane")
+        self.refuse("reconstruct", "--contours", path, "-o", "s.vdb", code=3, expected_text="plane")
 
-    def test_damaged_files_are_told(self):
+    def test_damaged_files_are_reported(self):
         good = self.csl("good.csl", family((0, 0, 1), 3)).read_text()
-        for name, text, says in (("a.csl", good[:len(good) // 2], "expected"), ("b.csl", good.replace("CSLC", "CSL"), "CSLC"),
+        for name, text, expected_text in (("a.csl", good[:len(good) // 2], "expected"), ("b.csl", good.replace("CSLC", "CSL"), "CSLC"),
                                  ("c.csl", "CSLC\n1 2\n1 1000000000000 1 0 0 1 0\n0 0 0\n", "whole number"),
                                  ("d.csl", "CSLC\n1 2\n1 3 1 0 0 1 0\n0 0 0\n1 0 0\n0 1 0\n3 1 0 1 7\n", "got '7'"),
                                  ("e.csl", "CSLC\n1 2\n1 3 1 0 0 1 0\n0 0 nan\n", "nan")):
             with self.subTest(name):
                 (self.inputs / name).write_text(text)
-                self.refuse("reconstruct", "--contours", self.inputs / name, "-o", "s.vdb", code=3, says=says)
+                self.refuse("reconstruct", "--contours", self.inputs / name, "-o", "s.vdb", code=3, expected_text=expected_text)
 
 
 if __name__ == "__main__":

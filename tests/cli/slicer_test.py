@@ -1,5 +1,5 @@
-"""The module for 3D Slicer on an object model of the functions that it uses, by their documentation: Debian has no 3D Slicer. Its
-files are the program's own, and what comes back is read here by other code.
+"""The module for 3D Slicer, run with mock objects for the functions that it uses, made from their documentation, because Debian
+has no 3D Slicer. The mock objects write files with the program itself, and results are read here by other code.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/slicer_test.py
 """
@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Segmentation:
-    """vtkSegmentation: segments by ID, in their order; here each with its voxels."""
+    """vtkSegmentation: segments by ID, in order; here each with its voxels."""
 
     def __init__(self, segments):
         self.segments = dict(segments)
@@ -47,7 +47,7 @@ class Segmentation:
 
 
 class Node:
-    """vtkMRMLNode and what its kinds have beside."""
+    """vtkMRMLNode and the members of its derived classes."""
 
     def __init__(self, kind, name, **payload):
         self.kind, self.name, self.reference = kind, name, None
@@ -91,8 +91,8 @@ class Slicer:
         self.nodes.append(Node(kind, name, **payload))
         return self.nodes[-1]
 
-    def export(self, node, filename, properties={}, world=False):  # noqa: B006 - its own signature
-        assert world and node in self.nodes  # what lies below a transform is written where it is
+    def export(self, node, filename, properties={}, world=False):  # noqa: B006 - the signature of the original
+        assert world and node in self.nodes  # nodes below a transform are written at their world positions
         if hasattr(node, "file"):
             shutil.copy(node.file, filename)
         else:
@@ -169,20 +169,20 @@ class Module(Folder):
             ring = middle + np.stack([part * np.cos(turns), part * np.sin(turns), np.full(24, z)], 1)
             curves.append(self.slicer.add("vtkMRMLMarkupsClosedCurveNode", "CC", places=ring.tolist()))
         segmentation, _, report = self.run_job(curves)
-        self.assertAlmostEqual(report["surface"]["volume"] / (4 / 3 * np.pi * 3.5**3), 1, delta=0.08)  # the first and the last curve lie inside
+        self.assertAlmostEqual(report["surface"]["volume"] / (4 / 3 * np.pi * 3.5**3), 1, delta=0.08)  # the end curves lie within
         self.run_covol("segment", self.private / "i.tif", "--points", self.private / "p.xyz", "-o", "g.vdb", "--mask", "guess.seg.nrrd", "--quiet")
         guess = self.slicer.add("vtkMRMLSegmentationNode", "guess", file=self.out / "guess.seg.nrrd")
         _, _, corrected = self.run_job([self.points], guess=guess)
         self.assertEqual(corrected["input"]["points"]["count"], 60)
 
-    def test_what_is_wrong_is_said(self):
+    def test_what_is_wrong_is_reported(self):
         empty = self.slicer.add("vtkMRMLMarkupsFiducialNode", "F", places=[])
         far = self.slicer.add("vtkMRMLMarkupsFiducialNode", "F", places=[[1e4, 0, 0], [1e4, 1, 0], [1e4, 0, 1], [1e4, 1, 1]])
         before = set(Path(tempfile.gettempdir()).glob("covol-slicer-*"))
-        for markups, more, says in (([], {}, "no marks"), ([empty], {}, "no marks"), ([far], {}, "outside"),
+        for markups, more, expected_text in (([], {}, "no marks"), ([empty], {}, "no marks"), ([far], {}, "outside"),
                                     ([self.points], {"options": "--no-such-option"}, "--no-such-option"),
                                     ([self.points], {"options": "'"}, "further options")):
-            with self.subTest(says), self.assertRaisesRegex(self.process.Failed, says):
+            with self.subTest(expected_text), self.assertRaisesRegex(self.process.Failed, expected_text):
                 self.run_job(markups, **more)
         with self.assertRaisesRegex(self.process.Failed, "/nowhere/covol"):
             self.job.Job(self.slicer, "/nowhere/covol", self.volume, [self.points])
@@ -190,7 +190,7 @@ class Module(Folder):
         self.assertEqual(set(Path(tempfile.gettempdir()).glob("covol-slicer-*")), before)
 
     def test_the_panel(self):
-        """Its slots, with Qt and CTK as objects that take everything."""
+        """Its slots, with mock objects for Qt and CTK that accept everything."""
         self.slicer.app = mock.MagicMock()
         self.slicer.app.userSettings().value.return_value = str(COVOL)
         current = iter([self.volume, self.points, None, None])
@@ -213,15 +213,15 @@ class Module(Folder):
                         break
                     time.sleep(0.1)
                     widget.onTick()
-                self.assertIn("closed, genus 0", widget.said.text)
+                self.assertIn("closed, genus 0", widget.message.text)
             self.assertEqual([node.kind for node in self.slicer.nodes].count("vtkMRMLModelNode"), 1)
             self.slicer.util.errorDisplay.assert_not_called()
             widget.onStart()
-            widget.onStart()  # the button says Cancel
+            widget.onStart()  # the button is now Cancel
             while widget.job is not None:
                 time.sleep(0.05)
                 widget.onTick()
-            self.assertEqual(widget.said.text, "cancelled")
+            self.assertEqual(widget.message.text, "cancelled")
 
 
 if __name__ == "__main__":

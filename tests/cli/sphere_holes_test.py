@@ -49,7 +49,7 @@ class SphereHoles(unittest.TestCase):
         for kind in KINDS:
             with self.subTest(kind=kind):
                 self.phantom(kind)
-                # The shell is two voxels thick, its two edges are one: between them the surface is in the shell.
+                # The shell is two voxels thick, and its two edges appear as one: between them the surface is within the shell.
                 self.assertLess(self.expect_points_met("i.nrrd", "p.xyz", kind, 0.02), 2)
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
@@ -62,7 +62,7 @@ class SphereHoles(unittest.TestCase):
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
     def test_marks_on_the_middle_of_a_shell_belong_to_the_image(self):
-        """The steepest slopes are beside a line, not on it; that is no reason to doubt the marks."""
+        """The steepest slopes are beside a line, not on it, which is no reason to doubt the marks."""
         folder = pathlib.Path(DATA or "").resolve() / "phantoms"
         for kind in KINDS:
             with self.subTest(kind=kind):
@@ -71,7 +71,7 @@ class SphereHoles(unittest.TestCase):
                 self.assertEqual(json.loads((self.out / "r.json").read_text()).get("warnings", []), [])
 
     def test_the_image_alone_spans_flat_discs(self):
-        # The smallest surface across a round hole is the disc that its rim bounds; the sphere's cap is 2.7 voxels higher.
+        # The minimal surface across a round hole is the disc bounded by its rim; the cap of the sphere is 2.7 voxels higher.
         self.phantom("round")
         self.run_covol("segment", "i.nrrd", "--theta", 0, *START, "-o", "s.vdb", "--mesh", "m.ply")
         vertices = quality.read_vertices(self.out / "m.ply")

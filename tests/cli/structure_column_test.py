@@ -1,4 +1,4 @@
-"""One file with the marks of several structures, and suggested places for the programs that people mark in.
+"""One file with the marks of several structures, and suggested positions for the programs in which people set marks.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/structure_column_test.py
 """
@@ -14,7 +14,7 @@ RADIUS, LEFT, RIGHT = 3.5, (9.5, 19.5, 19.5), (29.5, 19.5, 19.5)  # voxels
 
 
 def on_ball(middle, count=80):
-    """Voxels, x, y, z."""
+    """Positions in voxels, x, y, z."""
     around = sphere_points(count)
     centre = [sum(p[a] for p in around) / count for a in range(3)]
     size = math.dist(around[0], centre)
@@ -26,7 +26,7 @@ def to_world(index):
 
 
 def multi_point(path, points, counters):
-    """Fiji's .roi of single points: whole pixels, each with its counter and slice."""
+    """Fiji's .roi files of single points: whole pixels, each with its counter and slice."""
     n = len(points)
     head = bytearray(64)
     head[:4] = b"Iout"
@@ -55,7 +55,7 @@ class TwoBalls(Case):
 
 class Columns(TwoBalls):
     def volumes(self, *points):
-        """By structure."""
+        """Marks by structure."""
         report = self.report("segment", self.scene, "--points", *points, "-o", "s.vdb", "--mask", "m.nrrd")
         return {s["name"]: s["surface"]["volume"] for s in report["structures"]}
 
@@ -73,7 +73,7 @@ class Columns(TwoBalls):
         return path
 
     def mixed(self):
-        """Marks of both in turn, with the names of their structures."""
+        """Marks of both structures in turn, with the structures' names."""
         for pair in zip(*self.marks.values()):
             yield from zip(self.marks, pair)
 
@@ -118,21 +118,21 @@ class Columns(TwoBalls):
         report = self.report("segment", self.scene, "--contours", table, "--structure-column", "cell", "-o", "s.vdb")
         for one in report["structures"]:
             self.assertEqual(one["input"]["contours"]["closed"], 6)
-            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.25)  # of seven voxels across
+            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.25)  # the body is seven voxels across
 
-    def test_what_does_not_fit_is_told(self):
+    def test_what_does_not_fit_is_reported(self):
         table = self.write("both.csv", ["x", "y", "z", "cell"], [[*to_world(p), name] for name, p in self.mixed()])
         command = ("segment", self.scene, "-o", "s.vdb", "--structure-column")
-        self.assertIn("x, y, z, cell", self.refuse(*command, "label", "--points", table, code=3, says="--structure-column"))
-        self.refuse(*command, "cell", "--points", f"a={table}", code=2, says="a=")
+        self.assertIn("x, y, z, cell", self.refuse(*command, "label", "--points", table, code=3, expected_text="--structure-column"))
+        self.refuse(*command, "cell", "--points", f"a={table}", code=2, expected_text="a=")
         write_xyz(self.inputs / "plain.xyz", [to_world(p) for p in self.marks["left"]])
-        self.refuse(*command, "cell", "--points", self.inputs / "plain.xyz", code=3, says="--structure-column")
+        self.refuse(*command, "cell", "--points", self.inputs / "plain.xyz", code=3, expected_text="--structure-column")
         empty = self.write("empty.csv", ["x", "y", "z", "cell"], [[1, 2, 3, "a"], [1, 2, 4, ""]])
-        self.refuse(*command, "cell", "--points", empty, code=3, says="empty.csv:3")
+        self.refuse(*command, "cell", "--points", empty, code=3, expected_text="empty.csv:3")
 
 
 class Suggestions(TwoBalls):
-    """Where the image has no edge all that is far from the marks rests on nothing."""
+    """If the image has no edge, all of the surface that is far from the marks is unsupported."""
 
     def half_marked(self):
         image, half = self.inputs / "grey.nrrd", self.inputs / "half.xyz"
@@ -144,7 +144,7 @@ class Suggestions(TwoBalls):
 
     def test_programs_open_them_where_they_lie(self):
         run = (*self.half_marked(), "--suggest", 2)
-        self.refuse(*run, "--suggestions", "s.txt", code=3, says=".mrk.json")
+        self.refuse(*run, "--suggestions", "s.txt", code=3, expected_text=".mrk.json")
         for name, tolerance in (("n.csv", 1e-9), ("s.mrk.json", 1e-9), ("f.roi", 0.51)):
             with self.subTest(name):
                 places = self.report(*run, "--suggestions", name)["evidence"]["suggestions"]

@@ -99,11 +99,11 @@ class Structures(Case):
             self.assertEqual(s["solve"]["stop_reason"], "steady")
             self.assertTrue(s["surface"]["closed"])
             self.assertEqual((s["surface"]["components"], s["surface"]["genus"]), (1, 0))
-            # The surface comes to rest 0.1 voxel inside the points; the radius is 9 voxels.
+            # The steady surface is 0.1 voxel inside the points; the radius is 9 voxels.
             self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.045)
             for field in ("resolved", "automatic", "grid", "fit", "guess"):
                 self.assertIn(field, s)
-            # Of the caps of height 1.5 that went to the other structure, a sixth of each ball, marks lie outside.
+            # The caps of height 1.5, a sixth of each ball, were assigned to the other structure, so that the marks on them lie outside.
             self.assertGreater(s["fit"]["points_to_surface"]["bias"], 0.08)
             self.assertGreater(s["fit"]["marks_off"]["count"], 20)
             self.assertAlmostEqual(s["fit"]["marks_off"]["farthest"]["distance"], 1.5, delta=0.2)
@@ -116,7 +116,7 @@ class Structures(Case):
             self.assertAlmostEqual(float(row["volume"]), s["surface"]["volume"], places=3)
             self.assertAlmostEqual(float(row["area"]), s["surface"]["area"], places=3)
             self.assertTrue(0.8 < float(row["sphericity"]) < 1)
-            # Along x the cap that the other one has is missing.
+            # Along x the cap of the other structure is missing.
             self.assertAlmostEqual(float(row["extent_y"]), 2 * self.RADIUS, delta=0.3)
             self.assertAlmostEqual(float(row["extent_x"]), self.RADIUS + math.dist(self.LEFT, self.RIGHT) / 2, delta=0.3)
             self.assertEqual(float(row["centroid_x"]) > 0, s["name"] == "right")
@@ -134,7 +134,7 @@ class Structures(Case):
         x, y, z = lattice()
         a = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.LEFT))) - self.RADIUS
         b = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.RIGHT))) - self.RADIUS
-        # More than a voxel from all that is decided here.
+        # Voxels that are more than one voxel from the decided borders.
         self.assertTrue(np.all(labels[(a < -H) & (a < b - 2 * H)] == 1))
         self.assertTrue(np.all(labels[(b < -H) & (b < a - 2 * H)] == 2))
         self.assertTrue(np.all(labels[np.minimum(a, b) < -H] != 0))
@@ -183,7 +183,7 @@ class Structures(Case):
         self.assertEqual(first[1]["surface"], turned[0]["surface"])
 
     def test_nested_with_a_seed_of_one_structure(self):
-        # A shell with a cavity, and a ball in it whose surface is the cavity's.
+        # A shell with a cavity, and a ball whose surface is that of the cavity.
         points = np.concatenate([ball_points((0, 0, 0), 9, 4000), ball_points((0, 0, 0), 5)])
         shell, core = self.inputs / "shell.xyz", self.inputs / "core.xyz"
         write_points(shell, points)
@@ -194,15 +194,15 @@ class Structures(Case):
         whole = 4 / 3 * math.pi
         self.assertLess(abs(by_name["core"] / (whole * 125) - 1), 0.05)
         self.assertLess(abs(by_name["shell"] / (whole * (729 - 125)) - 1), 0.05)
-        # Without the seed the shell is a ball; the core is carved out of it.
+        # Without the seed the shell is a solid ball, from which the core is subtracted.
         report = self.report("segment", self.scene, "--points", f"shell={self.outer()}", f"core={core}", "--rho", 0, "-o", "t.vdb")
         self.assertEqual(report["overlaps"][0]["inner"], "core")
         again = {s["name"]: s["surface"]["volume"] for s in report["structures"]}
         self.assertLess(abs(again["shell"] / by_name["shell"] - 1), 0.02)
         (self.out / "s.vdb").unlink()
         (self.out / "t.vdb").unlink()
-        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shel:0,0,0", code=2, says="shel")
-        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shell:0,0", code=2, says="--exterior-seed")
+        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shel:0,0,0", code=2, expected_text="shel")
+        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shell:0,0", code=2, expected_text="--exterior-seed")
 
     def outer(self):
         path = self.inputs / "outer.xyz"
@@ -210,13 +210,13 @@ class Structures(Case):
         return path
 
     def test_names(self):
-        self.refuse("segment", self.scene, "--points", f"left={self.left}", self.right, "-o", "s.vdb", code=2, says="name")
+        self.refuse("segment", self.scene, "--points", f"left={self.left}", self.right, "-o", "s.vdb", code=2, expected_text="name")
         self.refuse("segment", self.scene, "--points", f"a={self.left}", f"b={self.left}", "--rho", 0, "-o", "s.vdb", code=3,
-                    says="same solid")
-        self.refuse("segment", self.scene, "--points", "a=none.xyz", "-o", "s.vdb", code=4, says="none.xyz")
+                    expected_text="same solid")
+        self.refuse("segment", self.scene, "--points", "a=none.xyz", "-o", "s.vdb", code=4, expected_text="none.xyz")
         self.refuse("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--init", "sphere:0,0,0,5",
-                    "-o", "s.vdb", code=2, says="--init")
-        # A file whose own name has the sign.
+                    "-o", "s.vdb", code=2, expected_text="--init")
+        # A file whose own name contains the sign.
         odd = self.inputs / "left=1.xyz"
         odd.write_bytes(self.left.read_bytes())
         report = self.report("segment", self.scene, "--points", odd, "-o", "s.vdb", "--rho", 0)
@@ -229,8 +229,8 @@ class Structures(Case):
         line, broken = self.inputs / "line.xyz", self.inputs / "broken.xyz"
         write_points(line, [(0.137 * n, 0.11, 0.07) for n in range(30)])
         broken.write_text("1 2 3\n1 2 x\n")
-        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={self.right}", "-o", "s.vdb", code=3, says="line: ")
-        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={broken}", "-o", "s.vdb", code=3, says="broken.xyz")
+        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={self.right}", "-o", "s.vdb", code=3, expected_text="line: ")
+        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={broken}", "-o", "s.vdb", code=3, expected_text="broken.xyz")
 
     def test_one_named_structure(self):
         report = self.report("segment", self.scene, "--points", f"the left={self.left}", "-o", "s.vdb", "--rho", 0, "--mesh",
@@ -253,10 +253,10 @@ class Structures(Case):
         self.run_covol("segment", folder / "embryo.tif", "--points", f"ve={folder}/embryo_ve_points.ply",
                        f"exe={folder}/embryo_exe_points.ply", "--exterior-seed", "ve:89.6,89.6,28.5", "--rho", 0,
                        "-o", "e.vdb", "--mask", "e.seg.nrrd")
-        for label, least in ((1, 0.98), (2, 0.985)):
+        for label, lower_bound in ((1, 0.98), (2, 0.985)):
             alike = self.report("compare", "e.seg.nrrd", folder / "embryo_labels.tif", "--label", label, "--spacing",
                                 "0.35,0.35,1")["compare"]
-            self.assertGreaterEqual(alike["dice"], least)
+            self.assertGreaterEqual(alike["dice"], lower_bound)
 
 
 class TimeLapse(Case):
@@ -316,7 +316,7 @@ class TimeLapse(Case):
             for a, name in enumerate("xyz"):
                 self.assertAlmostEqual(float(row[f"centroid_{name} (um)"]), center[a] + self.middle, delta=0.3 * H)
                 self.assertAlmostEqual(float(row[f"extent_{name} (um)"]), 2 * radius, delta=0.7 * H)
-        # Where it is, too: the mask's centre of gravity.
+        # The position, too: the mask's centre of gravity.
         for t in (0, self.FRAMES - 1):
             self.run_covol("mask", f"s_t{t:03d}.vdb", "--like", self.singles[0], "-o", "c.tif")
             where = np.argwhere(tifffile.imread(self.out / "c.tif") > 0).mean(axis=0)[::-1] * H
@@ -366,13 +366,13 @@ class TimeLapse(Case):
 
     def test_outputs_are_checked_first(self):
         self.refuse("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "no/folder/s.vdb", code=4)
-        self.refuse("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "s.vdb", "--table", "t.txt", code=3, says="--table")
+        self.refuse("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "s.vdb", "--table", "t.txt", code=3, expected_text="--table")
 
     def test_an_interrupt_leaves_the_frames_that_are_done(self):
         process = subprocess.Popen([COVOL, "segment", *[self.singles[0]] * 2000, "--points", self.first, "-o", "s.vdb",
                                     "--table", "t.csv"], cwd=self.out, stderr=subprocess.PIPE, text=True)
         try:
-            # Each frame is told once it is there; 1998 are left then.
+            # Each frame is reported once it is done; 1998 are left then.
             while "wrote s_t0001.vdb" not in (line := process.stderr.readline()):
                 self.assertNotEqual(line, "", "ended before the second frame")
             process.send_signal(signal.SIGINT)
@@ -404,8 +404,8 @@ class TimeLapse(Case):
         before, after = ([s["surface"]["volume"] for s in frame["structures"]] for frame in report["frames"])
         for t, volumes in enumerate((before, after)):
             half = 2 / 3 * math.pi * self.ball_at(t)[1] ** 3
-            # The radius is 16 voxels: 3 % are lost where the surface rests 0.1 voxel inside the points, and 1 % where it
-            # rounds the sharp rim by two voxels.
+            # The radius is 16 voxels: 3 % of the volume is lost since the surface is 0.1 voxel inside the points, and 1 % since it rounds the sharp
+            # rim by two voxels.
             for volume in volumes:
                 self.assertTrue(0.95 < volume / half < 1, (t, volume / half))
         for old, new in zip(before, after):
@@ -420,7 +420,7 @@ class TimeLapse(Case):
                              "--table", "t.csv", "--delta", "0.3vx")
         volumes = [f["surface"]["volume"] for f in report["frames"]]
         self.assertEqual(len(volumes), 21)
-        # A droplet is incompressible; half maximum of the first frame encloses about 16 x 17 x 7 voxels.
+        # A droplet is incompressible; in the first frame, voxels above half maximum fill about 16 x 17 x 7 voxels.
         for v in volumes:
             self.assertLess(abs(v / np.median(volumes) - 1), 0.05)
 
@@ -441,7 +441,7 @@ class Evidence(Case):
         write_points(cls.marks, points[points[:, 2] < 0])
 
     def judge(self, *more):
-        # No step: the surface is the start, a sphere.
+        # Without steps the surface is the start, a sphere.
         return ("segment", self.scene, "--points", self.marks, "--init", "sphere:0,0,0,%g" % self.RADIUS, "--max-steps", 0,
                 "-o", "s.vdb", *more)
 
@@ -453,7 +453,8 @@ class Evidence(Case):
         for voxel in (1, 2):
             report = self.report("segment", self.scene, "--points", few, "--voxel-size", f"{voxel * H}", "--suggest", 2, "-o", "s.vdb")
             found.append(report["evidence"])
-            # As far as the surface through marks is right to a fourth of a voxel of the image: 0.3 d^2 / (2 R) = H / 4.
+            # The reach is the distance up to which the surface through the marks is accurate to a fourth of the image's voxel: 0.3 d^2 / (2 R) = H /
+            # 4.
             radius = 3 * report["surface"]["volume"] / report["surface"]["area"]
             self.assertAlmostEqual(found[-1]["reach"], math.sqrt(radius * H / 0.6), delta=0.01 * H)
         one, other = (e["unsupported_area"] / e["area"] for e in found)
@@ -472,7 +473,7 @@ class Evidence(Case):
             self.assertLess(abs(math.dist(s["world"], self.CENTER) - self.RADIUS), 0.3 * H)
             for axis in range(3):
                 self.assertAlmostEqual(s["world"][axis], ORIGIN[axis] + H * s["index"][axis], places=4)
-        # The chord of the reach, from the equator up.
+        # The chord of length `reach` from the equator upwards.
         angle = 2 * math.asin(report["reach"] / (2 * self.RADIUS))
         self.assertAlmostEqual(report["unsupported_area"] / report["area"], (1 - math.sin(angle)) / 2, delta=0.02)
 
@@ -494,8 +495,8 @@ class Evidence(Case):
         self.assertIn(b"property float distance_to_marks\nproperty float edge_strength\n", head)
 
     def test_wrong_numbers(self):
-        self.refuse(*self.judge("--suggest", -1), code=3, says="--suggest")
-        self.refuse(*self.judge("--evidence", "e.txt"), code=3, says="--evidence")
+        self.refuse(*self.judge("--suggest", -1), code=3, expected_text="--suggest")
+        self.refuse(*self.judge("--evidence", "e.txt"), code=3, expected_text="--evidence")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What is around a run: disks that are full, folders and names of all kinds, few file handles, no terminal, no home.
+"""The environment of a run: full disks, folders and names of all kinds, few file handles, no terminal, no home directory.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/surroundings_test.py
 """
@@ -18,7 +18,7 @@ OUTPUTS = {"-o": "s.vdb", "--mesh": "s.ply", "--mask": "s.nrrd"}
 
 
 class Run(Case):
-    """One job with three outputs, over older ones of other options."""
+    """A job with three outputs that replace older ones, which were made with other options."""
 
     def command(self, *more, folder=""):
         outputs = [word for flag, name in OUTPUTS.items() for word in (flag, os.path.join(folder, name))]
@@ -38,19 +38,19 @@ class Run(Case):
         self.assertEqual(self.go("--delta", "3vx", folder=folder).returncode, 0)
         return self.state(folder)
 
-    def refused(self, done, code, says):
-        """One clear line, after warnings of the result."""
+    def refused(self, done, code, expected_text):
+        """Checks for one clear error line, after warnings about the result."""
         text = done.stderr.decode()
         self.assertEqual(done.returncode, code, text)
         *before, last = text.strip().splitlines()
         self.assertTrue(all(line.startswith("covol: warning: ") for line in before), text)
         self.assertTrue(last.startswith("covol: error: "), text)
-        self.assertIn(says, last)
+        self.assertIn(expected_text, last)
 
 
 class Disks(Run):
     def test_a_quota(self):
-        # As where a quota or a limit of files ends the writing, of each output in turn.
+        # As if a quota or a file size limit ended the writing, for each output in turn.
         before = self.with_older_outputs()
         for size in 100, 20_000, 60_000:
             with self.subTest(size):
@@ -124,7 +124,7 @@ class Names(Run):
         done = self.go(folder=folder)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual({name: hashlib.sha256(pathlib.Path(folder, name).read_bytes()).hexdigest() for name in expected}, expected)
-        # Beyond what the system takes: said, and nothing is left.
+        # Names beyond the system's limit cause an error, and no files are left.
         self.refused(self.go(folder=folder + "/" + "e" * 300), 4, "too long")
 
 
@@ -150,7 +150,7 @@ class Processes(Run):
                                       preexec_fn=lambda: [os.close(stream) for stream in closed])
                 self.assertEqual(done.returncode, 0)
                 self.assertEqual(self.files(), ["r.json", *sorted(OUTPUTS.values())])
-        # What is asked for there, and cannot be said, is an error.
+        # It is an error if output that was requested on such a stream cannot be written.
         done = subprocess.run([COVOL, "info", str(self.image)], stderr=subprocess.PIPE, timeout=300, preexec_fn=lambda: os.close(1))
         self.assertEqual(done.returncode, 4, done.stderr)
         with open("/dev/full", "w") as full:
@@ -164,7 +164,7 @@ class Processes(Run):
         done = self.go(env=keep)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.state(), expected)
-        # A run that needs a folder for temporary files, without HOME and TMPDIR, and with one that is not there.
+        # A run that needs a folder for temporary files, without HOME and TMPDIR, and with a TMPDIR that does not exist.
         self.run_covol("segment", self.image, "--points", self.points, "--init", "tag", "--max-steps", "1", "-o", "again.vdb")
         for environment in (keep, {**keep, "TMPDIR": "/nowhere"}):
             done = subprocess.run([str(pathlib.Path(COVOL).resolve()), "rerun", "again.vdb", "--inputs", str(self.inputs), "--quiet"],
@@ -188,7 +188,7 @@ class Processes(Run):
         self.assertEqual(self.state(), expected)
 
 
-del Run, Case  # have no tests
+del Run, Case  # base classes without tests
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,9 +1,9 @@
-"""Images turned, flipped and with their axes in another order: every start gives the same body, with the real binary.
+"""Images that are rotated, flipped and have permuted axes: every start gives the same body, with the real program.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/tilted_test.py
 
-One phantom, an ellipsoid that the image's first slice cuts off (and another one that two of its faces cut, at their
-edge), placed in the world in several ways. Marks are given in world units and move with it.
+One phantom, an ellipsoid that the image's first slice cuts off (and another one that two of its faces cut, at their edge), placed
+in the world in several ways. Marks are in world units and move with the phantom.
 """
 import csv
 import math
@@ -27,7 +27,7 @@ def rotation(axis, angle):
 
 
 class Place:
-    """How the image lies in the world: the columns of `direction` are the directions of its axes; `order` says which of the
+    """Placement of the image in the world: the columns of `direction` are the directions of its axes; `order` states which of the
     phantom's axes are the file's i, j and k."""
 
     def __init__(self, direction, order=(0, 1, 2)):
@@ -35,7 +35,7 @@ class Place:
         self.origin = np.array([12.0, -30.0, 101.0])
 
     def to_world(self, along):
-        """From lengths along the phantom's own axes."""
+        """World positions from lengths along the phantom's own axes."""
         return self.origin + np.asarray(along) @ self.direction.T
 
     def write(self, path, values, kind="uint8"):
@@ -50,7 +50,7 @@ class Place:
         return path
 
     def read(self, path):
-        """The phantom's k, j, i again."""
+        """Back to the phantom's k, j, i."""
         header, pixels = path.read_bytes().split(b"\n\n", 1)
         if b"gzip" in header:
             pixels = zlib.decompress(pixels, 47)
@@ -76,14 +76,14 @@ def lattice():
 
 
 def level(cut):
-    """About the distance to the body's surface, negative inside."""
+    """Approximate distance to the body's surface, negative inside."""
     q = (lattice() - MIDDLES[cut]) / RADII
     r = np.linalg.norm(q, axis=-1)
     return (r - 1) * r / np.maximum(np.linalg.norm(q / RADII, axis=-1), 1e-9)
 
 
 def sections(cut, step=3):
-    """Outlines on every step-th slice from the first one on, lengths along the axes, within the image."""
+    """Outlines on every step-th slice, beginning with the first, as lengths along the axes, within the image."""
     lines = []
     for k in range(0, SIZES[2], step):
         w = (SPACING[2] * k - MIDDLES[cut][2]) / RADII[2]
@@ -97,7 +97,7 @@ def sections(cut, step=3):
 
 
 def on_surface(cut, count):
-    """Points all over the surface within the image, none on the cut."""
+    """Points all over the surface within the image, but not on the cut."""
     n = np.arange(count) + 0.5
     z = 1 - 2 * n / count
     turn = np.pi * (1 + 5 ** 0.5) * n
@@ -112,7 +112,7 @@ def dice(a, b):
 
 class TiltedCase(Case):
     def starts(self, place, cut, folder):
-        """By name: the arguments of segment beside image and outputs."""
+        """The arguments of segment, except image and outputs, by the start's name."""
         truth = level(cut) < 0
         contours = folder / "contours.csv"
         with open(contours, "w", newline="") as file:
@@ -158,16 +158,16 @@ class TiltedCase(Case):
         report = self.report("segment", image, *self.starts(place, cut, folder)[name], "-o", "s.vdb", "--mask", "m.nrrd")
         return place.read(folder / "m.nrrd"), report
 
-    def compare(self, cut, name, least=0.97, least_of_truth=0.94):
+    def compare(self, cut, name, minimum=0.97, min_of_truth=0.94):
         truth = level(cut) < 0
         upright, _ = self.segment(UPRIGHT, cut, name)
-        self.assertGreater(dice(upright, truth), least_of_truth, f"{name}, upright")
+        self.assertGreater(dice(upright, truth), min_of_truth, f"{name}, upright")
         for how, place in PLACES.items():
             with self.subTest(start=name, place=how, cut=cut):
                 mask, report = self.segment(place, cut, name)
                 surface = report["surface"]
-                self.assertGreater(dice(mask, upright), least)
-                self.assertGreater(dice(mask, truth), least_of_truth)
+                self.assertGreater(dice(mask, upright), minimum)
+                self.assertGreater(dice(mask, truth), min_of_truth)
                 self.assertEqual((surface["components"], surface["genus"]), (1, 0))
                 volume = np.count_nonzero(mask) * np.prod(SPACING)
                 self.assertLess(abs(surface["volume"] / volume - 1), 0.03)

@@ -1,4 +1,5 @@
-"""Files of strangers: provenance, plans, checkpoints, configurations and names are data, and cannot do what they were not asked for.
+"""Untrusted files: provenance, plans, checkpoints, configurations and names are data, and cannot cause actions that the user did
+not request.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/trust_test.py
 """
@@ -20,13 +21,13 @@ import pyopenvdb as vdb
 from cli_test import CENTER, COVOL, Case, sphere_points, write_xyz
 
 ESC = "\x1b]0;title\x07\x1b[31m"
-# Control characters but line ends, C1 as UTF-8, and signs that turn the direction of writing.
+# Control characters except line ends, C1 in UTF-8, and characters that change the direction of writing.
 STEERS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 FUZZ = pathlib.Path(__file__).resolve().parent.parent / "fuzz"
 
 
 class Stranger(Case):
-    """A folder with a small result, whose metadata is changed."""
+    """A folder with a small result whose metadata is changed."""
 
     def setUp(self):
         super().setUp()
@@ -39,7 +40,7 @@ class Stranger(Case):
         return {key: json.loads(facts[f"covol_{key}"]) for key in ("options", "given", "inputs")}
 
     def write(self, **changed):
-        """t.vdb: s.vdb with other metadata."""
+        """Writes t.vdb: s.vdb with other metadata."""
         grids, facts = vdb.readAll(str(self.out / "s.vdb"))
         texts = {f"covol_{key}": value if isinstance(value, str) else json.dumps(value) for key, value in changed.items()}
         for grid in grids:
@@ -50,24 +51,24 @@ class Stranger(Case):
     def state(self):
         return {str(path.relative_to(self.out)): path.read_bytes() if path.is_file() else None for path in sorted(self.out.rglob("*"))}
 
-    def untouched(self, *command, code=3, says=""):
+    def untouched(self, *command, code=3, expected_text=""):
         before = self.state()
         done = subprocess.run([COVOL, *map(str, command)], cwd=self.out, capture_output=True, timeout=120)
         error = done.stderr.decode(errors="replace")
         self.assertEqual(done.returncode, code, error)
-        self.assertIn(says, error)
+        self.assertIn(expected_text, error)
         self.assertIsNone(STEERS.search(error + done.stdout.decode(errors="replace")), error)
         self.assertEqual(self.state(), before)
         return error
 
 
 class Provenance(Stranger):
-    def test_what_says_how_a_run_goes_is_refused(self):
+    def test_what_states_how_a_run_goes_is_refused(self):
         facts = self.make()
         for name in ("json", "save-config", "config", "checkpoint", "resume", "checkpoint-every", "threads", "memory-limit", "strict", "help"):
             with self.subTest(name):
                 self.write(options=facts["options"] | {name: "stolen"}, given=facts["given"] + [name])
-                self.untouched("rerun", "t.vdb", says=name)
+                self.untouched("rerun", "t.vdb", expected_text=name)
 
     def test_values_are_no_options(self):
         facts = self.make()
@@ -95,7 +96,7 @@ class Provenance(Stranger):
                 self.assertIn("the same bits", done.stdout)
                 self.assertEqual(self.state(), before)
                 self.assertIsNone(STEERS.search(done.stderr))
-                # What is shown is what a shell would take.
+                # The command is shown in the form in which a shell accepts it.
                 shown = next(line for line in done.stderr.splitlines() if "running covol" in line).split("running ", 1)[1]
                 words = subprocess.run(["bash", "-c", f"printf '%s\\0' {shown}"], capture_output=True, check=True).stdout.decode().split("\0")
                 self.assertEqual(os.path.normpath(words[-2]), str(self.out / name))
@@ -106,15 +107,15 @@ class Provenance(Stranger):
     def test_what_is_kept_replaces_no_input(self):
         self.make()
         self.run_covol("segment", "ball.nrrd", "--points", "ball.xyz", "--init", "vdb:s.vdb", "-o", "t.vdb", "--max-steps", "2", "--quiet")
-        self.untouched("rerun", "t.vdb", "-o", "s.vdb", says="is an input of this run")
+        self.untouched("rerun", "t.vdb", "-o", "s.vdb", expected_text="is an input of this run")
 
     def test_only_files_with_their_digest_are_inputs(self):
         facts = self.make()
         self.write(inputs=[*facts["inputs"], {"name": "..", "digest": "xxh128:0"}])
-        self.untouched("rerun", "t.vdb", says="expected a file's name")
+        self.untouched("rerun", "t.vdb", expected_text="expected a file's name")
         self.write(inputs=[])
-        self.untouched("rerun", "t.vdb", says="none of the inputs that it lists")
-        os.mkfifo(self.out / "pipe")  # which nobody writes to
+        self.untouched("rerun", "t.vdb", expected_text="none of the inputs that it lists")
+        os.mkfifo(self.out / "pipe")  # a pipe without a writer
         self.write(options=facts["options"] | {"image": "pipe"}, inputs=[*facts["inputs"], {"name": "pipe", "digest": "xxh128:0"}])
         done = subprocess.run([COVOL, "rerun", "t.vdb"], cwd=self.out, capture_output=True, timeout=60)
         self.assertEqual(done.returncode, 4, done.stderr)
@@ -124,24 +125,24 @@ class Provenance(Stranger):
         deep = "[" * 500_000 + "]" * 500_000
         for key in ("options", "given", "inputs"):
             self.write(**{key: deep})
-            self.untouched("rerun", "t.vdb", says="levels")
+            self.untouched("rerun", "t.vdb", expected_text="levels")
         for options in ({"delta": [[1]]}, {"delta": None}, {"delta": {"a": 1}}, {"delta": [1, 2]}):
             self.write(options=facts["options"] | options, given=facts["given"] + ["delta"])
             self.untouched("rerun", "t.vdb")
         self.write(given=facts["given"] * 2)
-        self.untouched("rerun", "t.vdb", says="twice")
+        self.untouched("rerun", "t.vdb", expected_text="twice")
 
     def test_outputs_stay_in_a_folder_of_their_own(self):
         facts = self.make("--density", "d.vdb")
         for value in ("/tmp/stolen.vdb", "../../stolen.vdb", str(self.out / "ball.vdb"), "~/x.vdb"):
             self.write(options=facts["options"] | {"density": value})
             before = self.state()
-            self.run_covol("rerun", "t.vdb", code=3)  # two .vdb files of other names than t.vdb
+            self.run_covol("rerun", "t.vdb", code=3)  # two .vdb files with names other than t.vdb
             self.assertEqual(self.state(), before)
             self.assertFalse(pathlib.Path("/tmp/stolen.vdb").exists())
         for output in ("s.ply", "..", ".", "x/.."):
             self.write(options=facts["options"] | {"output": output}, given=[name for name in facts["given"] if name != "density"])
-            self.untouched("rerun", "t.vdb", says="makes no .vdb")
+            self.untouched("rerun", "t.vdb", expected_text="makes no .vdb")
 
     def test_frames_are_inputs_too(self):
         for n in range(2):
@@ -159,11 +160,11 @@ class Provenance(Stranger):
     def test_names_in_metadata_do_not_reach_the_terminal(self):
         facts = self.make()
         self.write(version=ESC, instruction_set=ESC)
-        self.untouched("rerun", "t.vdb", code=0, says="\\u001b]0;title\\u0007")
+        self.untouched("rerun", "t.vdb", code=0, expected_text="\\u001b]0;title\\u0007")
         self.write(options=facts["options"] | {"command": ESC})
-        self.untouched("rerun", "t.vdb", says="\\u001b")
+        self.untouched("rerun", "t.vdb", expected_text="\\u001b")
         self.write(given=facts["given"] + [ESC], options=facts["options"] | {ESC: 1})
-        self.untouched("rerun", "t.vdb", says="\\u001b")
+        self.untouched("rerun", "t.vdb", expected_text="\\u001b")
 
     def test_a_kill_leaves_no_child_and_no_folder(self):
         facts = self.make()
@@ -192,7 +193,7 @@ class Provenance(Stranger):
         time.sleep(0.5)
         run.send_signal(signal.SIGKILL)
         run.wait()
-        run.stderr.read()  # which ends with the last that holds the stream
+        run.stderr.read()  # this ends with the last process that has the stream open
         deadline = time.monotonic() + 30
         while (alive() or self.files() != before) and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -207,27 +208,27 @@ class Plans(Stranger):
     def write_plan(self, plan, text=None):
         (self.out / "plan/plan.json").write_text(text if text is not None else json.dumps(plan))
 
-    def refused(self, plan, says="", code=3):
+    def refused(self, plan, expected_text="", code=3):
         self.write_plan(plan)
-        error = self.untouched("brick", "run", "plan", code=code, says=says)
-        self.untouched("brick", "join", "plan", "-o", "x.vdb", code=code, says=says)
+        error = self.untouched("brick", "run", "plan", code=code, expected_text=expected_text)
+        self.untouched("brick", "join", "plan", "-o", "x.vdb", code=code, expected_text=expected_text)
         return error
 
     def test_a_plan_is_settings_and_inputs(self):
-        said = self.run_covol("brick", "plan", "segment", "ball.nrrd", "--points", "ball.xyz", "--model", "paper", "--mesh", "m.ply", "-o", "plan",
+        printed = self.run_covol("brick", "plan", "segment", "ball.nrrd", "--points", "ball.xyz", "--model", "paper", "--mesh", "m.ply", "-o", "plan",
                               "--json", "r.json", "--threads", "2", "--save-config", "c.toml", "--strict", code=5).stderr
-        self.assertIn("brick join: --mesh", said)
+        self.assertIn("brick join: --mesh", printed)
         job = json.loads((self.out / "plan/plan.json").read_text())["job"]
         self.assertEqual(job, {"command": "segment", "options": {"image": ["ball.nrrd"], "points": ["ball.xyz"], "model": ["paper"]}})
 
-    def test_what_a_plan_may_not_ask_for(self):
+    def test_what_a_plan_may_not_request(self):
         plan = self.plan()
         options = plan["job"]["options"]
         for name in ("json", "save-config", "config", "checkpoint", "resume", "output", "mesh", "report", "mask", "keep-failed", "threads", "help"):
             with self.subTest(name):
-                self.refused(plan | {"job": {"command": "segment", "options": options | {name: ["stolen.ply"]}}}, says=name)
+                self.refused(plan | {"job": {"command": "segment", "options": options | {name: ["stolen.ply"]}}}, expected_text=name)
         for command in ("convert", "rerun", "--json=stolen", ""):
-            self.refused(plan | {"job": {"command": command, "options": options}}, says="expected segment or reconstruct")
+            self.refused(plan | {"job": {"command": command, "options": options}}, expected_text="expected segment or reconstruct")
         for job in (["segment", "ball.nrrd", "--json", "stolen"], {}, {"command": "segment"}, {"command": 1, "options": {}}, "segment",
                     {"command": "segment", "options": {"image": "ball.nrrd"}}, {"command": "segment", "options": {"image": [1]}},
                     {"command": "segment", "options": {"image": []}}, {"command": "segment", "options": {"theta": ["0.5", "0.5"]}}):
@@ -265,7 +266,7 @@ class Plans(Stranger):
 
         def refused(changed, brick_alone=False):
             self.write_plan(plan | ({"bricks": [brick | changed, *plan["bricks"][1:]]} if brick_alone else changed))
-            self.untouched("brick", "run", "plan", says="plan")
+            self.untouched("brick", "run", "plan", expected_text="plan")
         bad = {"voxel_size": never[:2] + never[4:6] + never[7:] + small + (True,), "overlap": never + small + (True,), "tolerance": never[:2] + never[5:6] + never[7:] + (0, True),
                "most_sweeps": never + (0, True), "most_voxels": never + (0, True), "has_sweeps": never + small[:1]}
         for name, values in bad.items():
@@ -274,7 +275,7 @@ class Plans(Stranger):
                     refused({name: value})
             with self.subTest(name=name, missing=True):
                 self.write_plan({key: value for key, value in plan.items() if key != name})
-                self.untouched("brick", "run", "plan", says="expected a plan")
+                self.untouched("brick", "run", "plan", expected_text="expected a plan")
         for name in ("origin", "min", "max"):
             for value in (*never[7:], 0, True, [0, 0], [0, 0, 0, 0], [0, 0, "0"], [None] * 3, [1e300] * 3, [-1e300] * 3, [2**63] * 3, *(
                     [[0.5] * 3, [2**31] * 3, [2**30] * 3] if name != "origin" else [])):
@@ -293,19 +294,19 @@ class Plans(Stranger):
                 refused({"neighbours": value}, brick_alone=True)
         for bricks in ([], {}, None, 3, [3], [{}]):
             self.write_plan(plan | {"bricks": bricks})
-            self.untouched("brick", "run", "plan", says="expected a plan")
+            self.untouched("brick", "run", "plan", expected_text="expected a plan")
         for edge in ({}, plan["edge"] | {"feature": 99}, plan["edge"] | {"feature": 0.5}, plan["edge"] | {"low": "a"}, plan["edge"] | {"edge_k": -1}):
             self.write_plan(plan | {"edge": edge})
-            self.untouched("brick", "run", "plan", says="expected a plan")
+            self.untouched("brick", "run", "plan", expected_text="expected a plan")
         text = json.dumps(plan)
         for name in ("voxel_size", "tolerance"):
             for number in ("NaN", "Infinity", "1e999", "-1e999"):
                 self.write_plan(None, re.sub(f'"{name}": [^,]+', f'"{name}": {number}', text))
                 self.untouched("brick", "run", "plan")
         self.write_plan(None, "[" * 300_000)
-        self.untouched("brick", "run", "plan", says="plan.json")
+        self.untouched("brick", "run", "plan", expected_text="plan.json")
 
-    def test_what_sweeps_say(self):
+    def test_evidence_of_sweeps(self):
         plan = self.plan()
         self.run_covol("brick", "run", "plan")
         path = self.out / "plan/sweep-01/brick-00000.json"
@@ -314,17 +315,17 @@ class Plans(Stranger):
             for value in values:
                 with self.subTest(name=name, value=value):
                     path.write_text(json.dumps(facts | {name: value}))
-                    self.untouched("brick", "join", "plan", "-o", "x.vdb", says="brick-00000.json")
+                    self.untouched("brick", "join", "plan", "-o", "x.vdb", expected_text="brick-00000.json")
         for text in ("", "[]", "[" * 100_000, "{}", "nonsense"):
             path.write_text(text)
-            self.untouched("brick", "join", "plan", "-o", "x.vdb", says="brick-00000.json")
+            self.untouched("brick", "join", "plan", "-o", "x.vdb", expected_text="brick-00000.json")
         self.assertTrue(plan["bricks"])
 
     def test_links_lead_nowhere(self):
         self.plan()
         (self.out / "elsewhere").mkdir()
         (self.out / "plan/sweep-01").symlink_to(self.out / "elsewhere")
-        self.untouched("brick", "run", "plan", code=4, says="expected a folder, got a link")
+        self.untouched("brick", "run", "plan", code=4, expected_text="expected a folder, got a link")
 
 
 class Checkpoints(Stranger):
@@ -345,9 +346,9 @@ class Checkpoints(Stranger):
         folder.mkdir()
         for text in ("", ESC, "{" * 100_000, json.dumps({"version": "1", "options": {"json": "stolen"}})):
             (folder / "job.txt").write_text(text)
-            self.untouched(*words, says="other options")
+            self.untouched(*words, expected_text="other options")
         (folder / "job.txt").unlink()
-        os.mkfifo(folder / "job.txt")  # nobody writes to it
+        os.mkfifo(folder / "job.txt")  # a pipe without a writer
         done = subprocess.run([COVOL, *words], cwd=self.out, capture_output=True, timeout=60)
         self.assertEqual(done.returncode, 3, done.stderr)
 
@@ -367,10 +368,10 @@ class Configurations(Stranger):
                 given = ["./" + name, "ball.xyz"]
                 subprocess.run([COVOL, *words, "--points", *given, "--save-config", "c.toml"], cwd=self.out, check=True)
                 subprocess.run([COVOL, "segment", "--config", "c.toml", "--quiet", "--save-config", "d.toml", "--json", "r.json"], cwd=self.out, check=True)
-                # The line below the head is the same where every value is.
+                # The line below the head is the same in both files.
                 self.assertEqual((self.out / "c.toml").read_bytes(), (self.out / "d.toml").read_bytes())
-                said = json.loads((self.out / "r.json").read_bytes().decode(errors="replace"))["options"]["points"]
-                self.assertEqual(len(said), 2)
+                printed = json.loads((self.out / "r.json").read_bytes().decode(errors="replace"))["options"]["points"]
+                self.assertEqual(len(printed), 2)
                 before = self.state()
                 for shell in ("sh", "bash"):
                     subprocess.run([shell, "-c", ". ./c.toml"], cwd=self.out, capture_output=True, stdin=subprocess.DEVNULL, timeout=30)
@@ -406,7 +407,7 @@ class Configurations(Stranger):
             with self.subTest(text):
                 self.assertEqual(self.read(text)["points"], ["ball.xyz", "b.xyz"])
 
-    def test_mistakes_are_told_with_their_line(self):
+    def test_mistakes_are_reported_with_their_line(self):
         for text in ('\npoints = "ball.xyz', 'points = "a\\qb"', "points = [", "points = [[1]]", "[segment", "points = [1 2]", "= 3", '\npoints = "a" x\n= 1',
                      'points = "\\u0000"', 'points = "\\ud800"', "points = []", "[[[segment]]]", 'points = """a"""', "config = other.toml", "save-config = stolen"):
             with self.subTest(text):
@@ -432,12 +433,12 @@ class Configurations(Stranger):
 class Names(Stranger):
     def checked(self, *words, code=0, page=None):
         done = subprocess.run([COVOL, *map(str, words)], cwd=self.out, capture_output=True, timeout=300)
-        said = (done.stdout + done.stderr).decode()
-        self.assertEqual(done.returncode, code, said)
-        self.assertIsNone(STEERS.search(said), said)
+        printed = (done.stdout + done.stderr).decode()
+        self.assertEqual(done.returncode, code, printed)
+        self.assertIsNone(STEERS.search(printed), printed)
         if page:
             self.assertIsNone(STEERS.search((self.out / page).read_text().replace("\t", "")))
-        return said
+        return printed
 
     def test_structures(self):
         name = f"a{ESC}\n\u202eb/../x".replace("/", "_")
@@ -485,8 +486,8 @@ class Names(Stranger):
         grid.name = f"g{ESC}\nfake: line"
         grid["covol_unit"] = ESC
         vdb.write(str(self.out / "g.vdb"), [grid])
-        said = self.checked("info", "g.vdb")
-        self.assertEqual(len(said.splitlines()), 1)
+        printed = self.checked("info", "g.vdb")
+        self.assertEqual(len(printed.splitlines()), 1)
         self.checked("check", "g.vdb")
         self.checked("info", "g.vdb", "--json", "-")
         self.checked("report", "g.vdb", "-o", "g.html", page="g.html")

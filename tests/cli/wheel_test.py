@@ -1,8 +1,8 @@
-"""The wheel that tools/packaging/wheel.py makes: valid, and after `pip install` used without anything of this build.
+"""The wheel that tools/packaging/wheel.py makes: valid, and after `pip install` independent of this build.
 
     COVOL_BUILD=build COVOL=build/bin/covol python3 -m unittest tests/cli/wheel_test.py
 
-COVOL_OTHER_PYTHONS names further Pythons, with numpy, that it is installed into, parted by colons.
+COVOL_OTHER_PYTHONS names further Pythons with numpy, separated by colons, into which it is installed.
 """
 import ast
 import base64
@@ -100,14 +100,14 @@ class Wheel(unittest.TestCase):
                 self.assertRegex(run(home / "bin/covol", "--version", env=environment), r"^covol \d")
                 folder = self.work / f"used{n}"
                 folder.mkdir()
-                # What the build's own program makes of the same job.
+                # The result of the build's own program for the same job.
                 run(COVOL, "phantom", "sphere", "--size", 40, "--count", 120, "-o", "p.nrrd", "--points", "p.csv", cwd=folder)
                 run(COVOL, "segment", "p.nrrd", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--mask", "s.nrrd", "--json", "s.json",
                     cwd=folder)
-                said = json.loads(run(home / "bin/python", USED, cwd=folder, env=environment))
-                self.assertTrue(pathlib.Path(said["package"]).is_relative_to(home), said)
-                self.assertEqual([name for name, fine in said["checks"].items() if not fine], [])
-                self.assertGreater(len(said["checks"]), 25)
+                output = json.loads(run(home / "bin/python", USED, cwd=folder, env=environment))
+                self.assertTrue(pathlib.Path(output["package"]).is_relative_to(home), output)
+                self.assertEqual([name for name, fine in output["checks"].items() if not fine], [])
+                self.assertGreater(len(output["checks"]), 25)
                 run(home / "bin/pip", "uninstall", "--quiet", "--yes", "covol", env=environment)
                 self.assertFalse((home / "bin/covol").exists())
 

@@ -1,7 +1,7 @@
 """Uses the installed wheel in a folder where the program has made p.nrrd, p.csv, s.vdb, s.ply, s.nrrd and s.json of one job.
 
-Prints {"package": folder, "checks": {what: whether it holds}} as JSON. The files are read here by other code than the package's where
-the two are compared.
+Prints {"package": folder, "checks": {what: whether it holds}} as JSON. For comparisons the files are read here by other code than
+the package's.
 """
 import json
 import logging
@@ -45,7 +45,7 @@ checks["image"] = image.shape == (40, 40, 40) and image.dtype == voxels.dtype ==
 checks["image geometry"] = np.allclose(image.world_to_index(image.index_to_world([[1, 2, 3]])), [[1, 2, 3]])
 checks["points"] = len(marks) == 120 and marks.array.shape == (120, 3) and marks.space == "world"
 
-# By files, then by arrays: the program's own result, to the bit.
+# From files and from arrays: exactly the program's own result.
 by_files = covol.segment("p.nrrd", "p.csv")
 by_arrays = covol.segment(voxels, np.asarray(marks), spacing=image.spacing, origin=image.origin, direction=image.direction)
 data = pathlib.Path("s.ply").read_bytes()
@@ -93,7 +93,7 @@ checks["phantom"] = phantom.shape == truth.shape == (32, 32, 32) and places.shap
 covol.save_mask("labels.nii.gz", np.where(truth > 0, 300, 0), phantom)
 checks["save_mask"] = covol.read_image("labels.nii.gz").array.max() == 300
 
-# A time-lapse: a frame that is none, the body a voxel further along z, and again with marks of its own.
+# A time-lapse: one frame is invalid, the body moves along z by one voxel per frame, and the last frame has marks of its own.
 where = dict(spacing=image.spacing, origin=image.origin)
 further = [np.roll(voxels, n, axis=0) for n in (1, 2)]
 places, step = np.asarray(marks), np.array([0, 0, image.spacing[2]])
@@ -118,7 +118,7 @@ seeds = list(covol.timelapse([voxels], {"points": np.asarray(marks), "inside": [
 checks["seeds of a time-lapse"] = [e.code for e in seeds] == ["unsupported"]
 checks["read_study"] = error(covol.read_study, "none")[0] == "unsupported"
 
-# Progress, its exceptions, Ctrl-C, the log.
+# Progress, exceptions from its callback, Ctrl-C, the log.
 lines = []
 handler = logging.Handler()
 handler.emit = lambda record: lines.append((record.levelno, record.getMessage()))

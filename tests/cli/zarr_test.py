@@ -1,4 +1,4 @@
-"""OME-Zarr and Zarr: what zarr-python and a writer of Zarr 3 from its specification made, voxel by voxel.
+"""OME-Zarr and Zarr: stores of zarr-python, and of a writer of Zarr 3 made from its specification, compared voxel by voxel.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/zarr_test.py
 """
@@ -25,7 +25,7 @@ CHUNKS = (5, 8, 16)
 
 
 def pixels(kind, shape=SHAPE, seed=1):
-    """Random numbers that a float of 32 bits holds."""
+    """Random numbers that are exact in 32-bit floats."""
     rng = np.random.default_rng(seed)
     dtype = np.dtype(kind)
     if dtype.kind == "f":
@@ -64,7 +64,7 @@ def pack(data, codecs):
 
 def write_zarr3(folder, array, chunk, codecs=(), big=False, order=None, shard=None, index_location="end", checked=True,
                 key="default", separator=None, skip=(), fill=0, names=None):
-    """Zarr 3 core and its codecs, by the specification. `skip`: places of chunks that are not written."""
+    """Zarr 3 core and its codecs, by the specification. `skip`: positions of chunks that are not written."""
     folder.mkdir(parents=True)
     endian = "big" if big else "little"
     stored = array.astype(array.dtype.newbyteorder(">" if big else "<"))
@@ -132,14 +132,14 @@ def dataset(path, scale, translation=None):
 
 
 def ball(centre, radius, low, high):
-    """Grey values of a ball on the voxels low..high-1 of a cube."""
+    """Grey values of a ball at the voxels low..high-1 of a cube."""
     i = np.arange(low, high) - centre
     r = np.sqrt(i[:, None, None] ** 2 + i[None, :, None] ** 2 + i[None, None, :] ** 2)
     return (200 * np.clip(radius - r + 0.5, 0, 1)).astype(np.uint8)
 
 
 def write_marks(path, centre, radius, count=100):
-    """Evenly on a sphere."""
+    """Points evenly spread on a sphere."""
     golden = math.pi * (3 - math.sqrt(5))
     lines = []
     for m in range(count):
@@ -242,7 +242,7 @@ class Version2(Case):
 
 
 class Version3(Case):
-    """A writer from the specification, covol reads."""
+    """Stores of a writer made from the specification, read by covol."""
 
     CODECS = {"none": [], "gzip": [{"name": "gzip", "configuration": {"level": 5}}],
               "zstd": [{"name": "zstd", "configuration": {"level": 3, "checksum": False}}],
@@ -399,7 +399,7 @@ class Pyramids(Case):
 
 class Lazy(Case):
     def test_a_ball_in_a_large_store(self):
-        """1024^3 voxels, all missing but a few chunks around a ball: segment reads those around its marks."""
+        """1024^3 voxels, all missing except for a few chunks around a ball: segment reads only those around its marks."""
         n, size, centre, radius = 1024, 64, 500, 30
         array = zarr.open(str(self.path("large.zarr")), mode="w", shape=(n, n, n), chunks=(size,) * 3, dtype="u1", fill_value=0)
         low, high = centre - 40, centre + 40
@@ -417,7 +417,7 @@ class Lazy(Case):
         text = self.run_covol("check", "large.zarr", "--spacing", "1,1,1")
         self.assertIn("of 4096 chunks 27 were read", text.stdout + text.stderr)
 
-        # what stands in a chunk that is needed shows when it is read
+        # the content of a needed chunk is checked when it is read
         (self.path("large.zarr") / "7.7.7").write_bytes(b"\0" * 30)
         error = self.run_covol("segment", "large.zarr", "--spacing", "1,1,1", "--points", "marks.xyz", "-o", "b.vdb", code=3).stderr
         self.assertIn("large.zarr/7.7.7", error)

@@ -1,4 +1,5 @@
-// Uses the public headers alone: a sphere goes through start, surface, mesh and measure, and an error comes across.
+// Uses only the public headers: a sphere passes through start, surface, mesh and measure, and an exception crosses the
+// library boundary.
 #include <cmath>
 #include <cstdio>
 #include <string>

@@ -1,5 +1,5 @@
-# cmake -DCOVOL_BUILD=... -DCONSUMER=... -DWORK=... -P run.cmake: installs covol, then configures, builds and runs an
-# outside project against it.
+# cmake -DCOVOL_BUILD=... -DCONSUMER=... -DWORK=... -P run.cmake: installs covol, then configures, builds and runs a
+# separate project that uses it.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result)
   if(NOT result EQUAL 0)

@@ -13,15 +13,15 @@ using namespace covol::test;
 
 namespace {
 
-/// A plane across `axis` on its way along `sign` from u0's zero level to the plane where d = 0.
+/// A plane across `axis` that moves along `sign` from u0's zero level to the plane where d = 0.
 struct PlaneRun {
     double h, from, to;
     int axis, sign;
-    double ramp;  ///< half of the start's, voxels
+    double ramp;  ///< half width of the start's ramp, voxels
 
     [[nodiscard]] double along(const Vec3& x) const { return sign * x[axis]; }
 
-    /// Mean position along the way after `time`, in `steps` steps.
+    /// Mean position along the path after `time`, in `steps` steps.
     [[nodiscard]] double position(double time, int steps) const {
         Domain domain = cube_domain(static_cast<int>(std::lround(3.0 / h)), h);
         for (int a = 0; a < 3; ++a)
@@ -57,8 +57,8 @@ struct PlaneRun {
 
 TEST_CASE("a plane runs at unit speed in each of the six directions") {
     // One implicit upwind step spreads a jump over a geometric distribution with mean c = τ/h, variance c(1+c) and
-    // third cumulant c(1+c)(1+2c). After many steps the middle of the profile, its median, therefore lags behind the
-    // mean by (1+2c)/6 voxels, and by less as long as the start's ramp of six voxels is not smeared out.
+    // third cumulant c(1+c)(1+2c). After many steps the median of the profile therefore lags behind the mean by
+    // (1+2c)/6 voxels, and by less as long as the start's ramp of six voxels is not smeared out.
     constexpr double way = 0.5;
     for (const double courant : {0.25, 1.0})
         for (int axis = 0; axis < 3; ++axis)
@@ -72,10 +72,10 @@ TEST_CASE("a plane runs at unit speed in each of the six directions") {
             }
 }
 
-// Of a step the lag is that from the beginning: (1+2c)/6 voxels for every h, which is first order.
+// The lag after a step is that of the beginning: (1+2c)/6 voxels for every h, which is first order.
 TEST_CASE("a plane arrives on time, first order in h, and stays") {
     const auto [power, fraction] =
-        GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));  // of the time step, share * h^power
+        GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));  // of the time step, fraction * h^power
     for (const double h : {0.1, 0.05, 0.025}) {
         const PlaneRun run{h, -0.613, 0.4, 0, 1, 0.5};
         const double way = run.to - run.from, tau = fraction * std::pow(h, power);
@@ -104,9 +104,9 @@ TEST_CASE("a plane that starts as a distance arrives on time and stays") {
     }
 }
 
-// The scheme's own error: its one-sided differences see a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
+// The scheme's own error: its one-sided differences give a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
 TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
-    const auto [power, fraction, maximum] =  // of the time step, share * h^power, and of the error, voxels
+    const auto [power, fraction, maximum] =  // of the time step, fraction * h^power, and of the error, voxels
         GENERATE(table<double, double, double>({{1, 1, 0.5}, {2, 1, 0.6}, {2, 0.25, 0.6}}));
     double previous = 0;
     for (const int n : {24, 48, 96}) {

@@ -26,7 +26,7 @@ double radius_error(const Domain& domain, const DenseField& u, double radius) {
     return sum / static_cast<double>(crossings.size());
 }
 
-/// Observed order of the last halving of h.
+/// @return the observed order of the last halving of h
 double print_order(const char* what, double h, double error, double previous) {
     std::printf("%s: h = %.4f, error %.2e = %.3f h", what, h, error, error / h);
     if (previous == 0) {
@@ -93,7 +93,7 @@ double tracked_error(int n, double fraction) {
     return radius_error(domain, to_dense(domain, *u), kEnd);
 }
 
-// Values frozen on the band's border hold the surface back when sqrt(δτ) comes near the band's width, hence τ ~ h².
+// Values frozen on the band's border slow the surface if sqrt(δτ) approaches the band's width, hence τ ~ h².
 TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or better") {
     const double fraction = GENERATE(1.0, 0.25);
     double previous = 0;

@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using covol::Image;
 
-// A damaged chunk is found when its first voxel is asked for.
+// A damaged chunk is detected when its first voxel is read.
 void touch(const Image& image) {
     covol::VoxelBox box = image.held();
     for (int a = 0; a < 3; ++a) box.max[a] = std::min(box.max[a], box.min[a] + 31);
@@ -80,7 +80,7 @@ DamagedFile::DamagedFile(const std::string& end) {
     const auto reader = kReaders.find(end);
     if (reader == kReaders.end()) throw std::invalid_argument("no reader for '" + end + "'");
     reader_ = reader->second;
-    // In memory where the system has such a folder.
+    // In a memory file system if there is one.
     std::string name =
         (fs::exists("/dev/shm") ? "/dev/shm" : fs::temp_directory_path().string()) + "/covol-fuzz-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for files in " + name);

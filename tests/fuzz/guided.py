@@ -1,8 +1,9 @@
 """Runs the readers under libFuzzer, each from small valid files; tests/fuzz/run.sh builds what it needs and calls it.
 
-A finding is a crash, a sanitizer's report, an exception that is no covol::Error, and, read by itself, more than --limit seconds
-for a file, a single allocation above 64 MB and ten times the largest file, or 512 MB of memory (the sanitizer's own with it). Findings are kept in --keep; the corpus that was found stays in
---corpus, where one is named, for the next time. Standard library, numpy, pydicom, h5py.
+A finding is a crash, a sanitizer's report, an exception that is no covol::Error, and, if the file is read in a process of its own,
+more than --limit seconds, a single allocation above 64 MB and ten times the largest file, or 512 MB of memory (including the
+sanitizer's own). Findings are kept in --keep; the corpus is kept in --corpus, if given, for the next time. Standard library,
+numpy, pydicom, h5py.
 """
 import argparse
 import concurrent.futures
@@ -24,7 +25,7 @@ import mutate
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "cli"))
-LARGEST = 1 << 16  # bytes of a file
+LARGEST = 1 << 16  # bytes per file
 
 
 def fiji_roi():
@@ -156,7 +157,7 @@ def seeds_of(covol, folder):
 
 
 def add_kept(seeds, path):
-    """What was found worth keeping before: tests/fuzz/corpus.tar.xz."""
+    """The files that previous runs kept: tests/fuzz/corpus.tar.xz."""
     if not path.is_file():
         return
     with tarfile.open(path) as archive:
@@ -165,17 +166,17 @@ def add_kept(seeds, path):
 
 
 def run_once(words, environment, work):
-    """@return seconds of computing, its children's too, and what it says"""
-    with tempfile.TemporaryFile("w+", errors="replace") as said:
-        process = subprocess.Popen(words, env=environment, cwd=work, stdout=subprocess.DEVNULL, stderr=said)
+    """@return CPU seconds, including its children, and the output"""
+    with tempfile.TemporaryFile("w+", errors="replace") as output:
+        process = subprocess.Popen(words, env=environment, cwd=work, stdout=subprocess.DEVNULL, stderr=output)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        return usage.ru_utime + usage.ru_stime, said.read()
+        output.seek(0)
+        return usage.ru_utime + usage.ru_stime, output.read()
 
 
 def fuzz(program, end, seeds, seconds, limit, keep, corpus):
-    """@return executions, seconds of computing, edges covered at first and at last, findings (paths)"""
+    """@return executions, CPU seconds, edges covered at first and at last, findings (paths)"""
     with tempfile.TemporaryDirectory(prefix="covol-fuzz-") as name:
         work = pathlib.Path(name)
         begin = work / "seeds"
@@ -185,22 +186,22 @@ def fuzz(program, end, seeds, seconds, limit, keep, corpus):
         (known := corpus / end if corpus else work / "corpus").mkdir(parents=True, exist_ok=True)
         (found := work / "found").mkdir()
         largest = max(LARGEST, 2 * max(map(len, seeds)))
-        most = 64 + 10 * largest // 2**20
+        maximum = 64 + 10 * largest // 2**20
         words = [program, known, begin, f"-max_len={largest}", f"-timeout={limit}", "-fork=1", "-ignore_crashes=1", "-ignore_ooms=1",
-                 "-ignore_timeouts=1", f"-artifact_prefix={found}/", f"-malloc_limit_mb={most}", "-rss_limit_mb=2048"]
+                 "-ignore_timeouts=1", f"-artifact_prefix={found}/", f"-malloc_limit_mb={maximum}", "-rss_limit_mb=2048"]
         environment = os.environ | {"COVOL_FUZZ_FORMAT": end, "ASAN_OPTIONS": "allocator_may_return_null=0:detect_leaks=0:handle_abort=1",
                                     "UBSAN_OPTIONS": "print_stacktrace=1"}
         executions, computed, covered = 0, 0.0, []
-        # A clock that others share says little: it goes on until the fuzzer has had these seconds for itself.
+        # Wall clock time is meaningless on a shared machine: fuzzing continues until the fuzzer has used these seconds of CPU time.
         while (left := seconds - computed) > 0.02 * seconds:
-            took, said = run_once([str(word) for word in [*words, f"-max_total_time={max(1, int(left))}"]], environment, work)
-            states = re.findall(r"^#(\d+): cov: (\d+)", said, re.MULTILINE)
+            took, output = run_once([str(word) for word in [*words, f"-max_total_time={max(1, int(left))}"]], environment, work)
+            states = re.findall(r"^#(\d+): cov: (\d+)", output, re.MULTILINE)
             if not states:
-                sys.exit(f"{end}: the fuzzer did not run:\n{said[-2000:]}")
+                sys.exit(f"{end}: the fuzzer did not run:\n{output[-2000:]}")
             executions, computed = executions + int(states[-1][0]), computed + took
             covered += [int(edges) for _, edges in states]
-        # A process that has read thousands of damaged files holds what libraries lost of each, and a busy machine is slow.
-        alone = [program, f"-timeout={limit}", f"-malloc_limit_mb={most}", "-rss_limit_mb=512"]
+        # Findings are repeated in a process of their own: after thousands of damaged files a process holds leaked memory, and a busy machine is slow.
+        alone = [program, f"-timeout={limit}", f"-malloc_limit_mb={maximum}", "-rss_limit_mb=512"]
         findings = []
         for path in sorted(found.iterdir()):
             if not path.name.startswith("crash-") and subprocess.run([*alone, path], env=environment, cwd=work, capture_output=True).returncode == 0:
@@ -212,8 +213,8 @@ def fuzz(program, end, seeds, seconds, limit, keep, corpus):
         return executions, computed, covered[0], covered[-1], findings
 
 
-def pack(program, seeds, corpus, most, target):
-    """The smallest files that reach all edges which the corpus does, `most` for each format, as one archive: tests/cli/corpus_test.py."""
+def pack(program, seeds, corpus, maximum, target):
+    """The smallest files that reach the same edges as the corpus, a limited number for each format, as one archive: tests/cli/corpus_test.py."""
     with tempfile.TemporaryDirectory(prefix="covol-pack-") as name, tarfile.open(target, "w:xz", preset=9 | lzma.PRESET_EXTREME) as archive:
         for end in sorted(seeds):
             (merged := pathlib.Path(name) / end).mkdir()
@@ -223,7 +224,7 @@ def pack(program, seeds, corpus, most, target):
             folders = [begin] + [corpus / end] * (corpus / end).is_dir()
             subprocess.run([program, "-merge=1", merged, *folders], env=os.environ | {"COVOL_FUZZ_FORMAT": end}, cwd=name, check=True,
                            capture_output=True)
-            for n, path in enumerate(sorted(merged.iterdir(), key=lambda path: (path.stat().st_size, path.name))[:most]):
+            for n, path in enumerate(sorted(merged.iterdir(), key=lambda path: (path.stat().st_size, path.name))[:maximum]):
                 entry = tarfile.TarInfo(f"{end}/{n:03}")
                 entry.size = path.stat().st_size
                 archive.addfile(entry, io.BytesIO(path.read_bytes()))
@@ -247,7 +248,7 @@ def main():
         seeds = seeds_of(os.path.abspath(options.covol), pathlib.Path(name))
         add_kept(seeds, HERE / "corpus.tar.xz")
         if options.pack:
-            return pack(options.program.resolve(), seeds, options.corpus.resolve(), options.pack_most, options.pack)
+            return pack(options.program.resolve(), seeds, options.corpus.resolve(), options.pack_max, options.pack)
         chosen = options.formats.split(",") if options.formats else sorted(seeds)
         if unknown := set(chosen) - set(seeds):
             parser.error(f"--formats: no reader for {', '.join(sorted(unknown))}; there are {', '.join(sorted(seeds))}")

@@ -1,5 +1,5 @@
 #pragma once
-// ITK's generated header knows only the compiler that the library was built with: to it clang is gcc.
+// ITK's generated header supports only the compiler with which the library was built: clang is presented to it as gcc.
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wbuiltin-macro-redefined"
 #pragma push_macro("__clang__")

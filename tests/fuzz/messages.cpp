@@ -1,4 +1,4 @@
-// Messages of a page and lines of a journal: whatever a text holds, it is an action or an error, and what was read is
+// Messages of a page and lines of a journal: any text is either an action or an error, and an action that was read is
 // written as a text that reads as the same action.
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What `covol mark` takes from a browser, requests and messages, under libFuzzer with clang's address and
+# Fuzzes what `covol mark` receives from a browser, requests and messages, under libFuzzer with clang's address and
 # undefined-behaviour sanitizers.
 #
 #   bash tests/fuzz/messages.sh [SECONDS of each, 60]

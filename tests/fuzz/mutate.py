@@ -1,10 +1,10 @@
-"""Damaged files of every format against the real program: none may crash it, hang it or make it take memory.
+"""Damaged files of every format against the real program: none may crash it, hang it or make it use too much memory.
 
     python3 tests/fuzz/mutate.py --covol BUILD/bin/covol [--seconds 60] [--seed 1] [--formats tif,vdb] [--keep FOLDER]
 
-Files that covol wrote, and those of --more, are changed at random: bytes and bits, numbers of headers set to the ends of
-their types, digits of texts, blocks that go, come twice or trade places, a cut end. Each is read by `info` and by a command
-that reads all of it. A finding is an end by a signal or with exit code 1, more than --limit seconds, or more memory than the
+Files that covol wrote, and those of --more, are changed at random: bytes and bits, numbers in headers set to the limits of their
+types, digits in texts, blocks that are removed, duplicated or swapped, truncation. Each is read by `info` and by a command that
+reads all of it. A finding is a termination by a signal or exit code 1, more than --limit seconds, or more memory than the
 undamaged file takes plus 64 MB plus ten times its size. Findings are kept, and the exit code is 1.
 """
 import argparse
@@ -29,7 +29,7 @@ NUMBERS = [b"0", b"-1", b"1e308", b"nan", b"2147483648", b"4294967295", b"922337
 
 
 def seeds_of(covol, folder):
-    """Small files, as covol writes them: format -> path."""
+    """Small files as covol writes them: format -> path."""
     def run(*words):
         subprocess.run([covol, *map(str, words), "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     run("phantom", "sphere", "--size", 16, "--count", 300, "-o", "seed.nrrd", "--points", "seed.ply")
@@ -52,7 +52,7 @@ def mutate(data, rng):
     for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
         if not data:
             break
-        # Most of what steers a reader stands at the beginning, or at the end.
+        # The bytes that matter most to a reader are at the beginning or at the end.
         length = len(data)
         at = rng.choice((rng.randrange(length), rng.randrange(min(length, 400)), length - 1 - rng.randrange(min(length, 400))))
         kind = rng.randrange(9)
@@ -70,7 +70,7 @@ def mutate(data, rng):
         elif kind == 6:
             block = bytes(data[at:at + rng.choice((1, 8, 100, 5000))])
             data[at:at] = block * rng.choice((1, 2, 20))
-        else:  # a number of a text
+        else:  # a number in a text
             text = at
             while text < len(data) and not 48 <= data[text] <= 57:
                 text += 1

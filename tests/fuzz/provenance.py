@@ -1,12 +1,12 @@
-"""Files of strangers against the real program: provenance, plans, checkpoints, configurations, reports and names.
+"""Untrusted files against the real program: provenance, plans, checkpoints, configurations, reports and names.
 
     /usr/bin/python3 tests/fuzz/provenance.py --covol BUILD/bin/covol [--cases N | --seconds S] [--seed 1] [--keep FOLDER]
 
-Each case changes fields of what covol itself wrote to values that try to be options, paths, commands of a shell, numbers out of
-range, deep lists or control characters, and runs the command that reads it. A finding is: a file that was created, changed or left
-over where the command line names none; an end by a signal or with exit code 1; a run that a signal does not end; a control character
-on a stream or in a file's name. A job that only takes long is ended by SIGTERM, and is none. Findings are kept with their case's
-number, which with --seed and --from repeats them; the exit code is 1.
+Each case changes fields of files that covol itself wrote to values that look like options, paths, commands of a shell, numbers out
+of range, deep lists or control characters, and runs the command that reads it. A finding is: a file that was created, changed or
+left over although the command line does not name it; termination by a signal or exit code 1; a run that a signal does not end; a
+control character on a stream or in a file's name. A job that only takes long is ended by SIGTERM, and is no finding. Findings are
+kept with their case's number, with which --seed and --from repeat them; the exit code is 1.
 """
 import argparse
 import json
@@ -25,11 +25,11 @@ import pyopenvdb as vdb
 STEERS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 GOOD = {0, 2, 3, 4, 5, 6}
 LONG = 20       # seconds, then SIGTERM
-PATIENCE = 20   # seconds, then it hangs
+PATIENCE = 20   # seconds, after which it counts as hanging
 
 
 class Sandbox:
-    """inputs/ (where commands run), elsewhere/ (which nothing may touch), home/ and tmp/."""
+    """inputs/ (where commands run), elsewhere/ (which nothing may modify), home/ and tmp/."""
 
     def __init__(self, covol, root):
         self.covol, self.root = str(pathlib.Path(covol).resolve()), root
@@ -55,7 +55,7 @@ class Sandbox:
         subprocess.run([self.covol, *words, "--quiet"], cwd=self.here, env=self.environment, check=True, stdout=subprocess.DEVNULL)
 
     def interrupted_states(self):
-        """A folder of checkpoints, as a run leaves it that is stopped."""
+        """A folder of checkpoints, as a run that was stopped leaves it."""
         run = subprocess.Popen([self.covol, *self.job[:-1], "100000", "--tolerance", "0", "-o", "long.vdb", "--checkpoint", "states", "--checkpoint-every", "0"],
                                cwd=self.here, env=self.environment, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 60
@@ -79,7 +79,7 @@ class Sandbox:
                 path.write_bytes(data)
 
     def differences(self, before, allowed):
-        """What was created, changed or removed beside `allowed`, regular expressions of paths below the root."""
+        """Paths below the root that were created, changed or removed, except those that match `allowed`, regular expressions."""
         after = self.state()
         return [name for name in sorted({*before, *after})
                 if before.get(name, b"?") != after.get(name, b"?") and not any(re.fullmatch(one, name, re.S) for one in allowed)]
@@ -98,7 +98,7 @@ class Sandbox:
 
 
 class Values:
-    """What a stranger may write."""
+    """Values that an attacker may write."""
 
     def __init__(self, rng, elsewhere):
         self.rng = rng
@@ -132,7 +132,7 @@ class Values:
         return {self.text(): self.any(depth + 1)}
 
     def changed(self, json_value):
-        """The value with something in it changed, added or taken away."""
+        """The value with some part changed, added or removed."""
         rng = self.rng
         if isinstance(json_value, dict) and json_value and rng.random() < 0.9:
             result = dict(json_value)
@@ -183,7 +183,7 @@ def provenance(box, values, rng):
         for _ in range(rng.randrange(1, 4)):
             value = values.changed(value)
         changed[key] = json.dumps(value) if rng.random() < 0.93 else values.damaged(json.dumps(value))
-    if rng.random() < 0.5 and "covol_options" in changed:  # an option that the file says was given
+    if rng.random() < 0.5 and "covol_options" in changed:  # an option that the file states as given
         try:
             changed["covol_given"] = json.dumps(sorted({*json.loads(changed.get("covol_given", facts["covol_given"])), *json.loads(changed["covol_options"])} - {"command"}))
         except (TypeError, ValueError):
@@ -196,7 +196,7 @@ def provenance(box, values, rng):
         if rng.random() < 0.1:
             grid.name = values.text().replace("\0", "") or "g"
     vdb.write(str(box.here / "t.vdb"), grids, facts | changed)
-    for name in ("ball.xyz", "ball.nrrd"):  # a file with a name that the metadata may have
+    for name in ("ball.xyz", "ball.nrrd"):  # a file with a name that the metadata may contain
         if rng.random() < 0.2:
             shutil.copy(box.here / name, box.here / rng.choice(["--json=stolen", "-o", "$(touch stolen)", "a=b", "\x1b[31m"]))
     yield ["rerun", "t.vdb", "--memory-limit", "600M"], []
@@ -259,18 +259,18 @@ def config(box, values, rng):
         kind = rng.randrange(3)
         if kind == 0:
             text = values.damaged(text)
-        elif kind == 1:  # a text in quotes of TOML
+        elif kind == 1:  # a quoted TOML string
             name = rng.choice(["points", "image", "init", "theta", "delta", "exterior-seed", "segment.theta", "quiet", "mesh", "[x]\nname", values.text().replace("\n", "")])
             text += f"\n{name} = {rng.choice((json.dumps(values.text()), str(rng.choice(values.numbers)), json.dumps([values.text(), values.text()])))}\n"
         else:
             text = re.sub(r'"[^"\n]*"', lambda m: json.dumps(values.text()) if rng.random() < 0.4 else m[0], text)
-    # A configuration is its user's own and may name what is written, as a command line may: this one names none.
+    # A configuration belongs to the user and may name outputs, as a command line may: they are removed here.
     text = "\n".join(line for line in text.splitlines() if not re.match(r"\W*(segment\W+)?(json|checkpoint|resume|output|mesh|mask|report|density|fields|table|usda|evidence|keep-failed)\b", line))
     (box.here / "c.toml").write_text(text, errors="replace")
     yield ["segment", "--config", "c.toml", "-o", "c.vdb", "--save-config", "again.toml", "--memory-limit", "600M"], ["inputs/(c\\.vdb|again\\.toml)"]
     for shell in ("sh", "bash"):
         subprocess.run([shell, "-c", ". ./again.toml"], cwd=box.here, capture_output=True, stdin=subprocess.DEVNULL, timeout=60)
-    yield ["info", "ball.nrrd"], ["inputs/(c\\.vdb|again\\.toml)"]  # and looks at what the shell did
+    yield ["info", "ball.nrrd"], ["inputs/(c\\.vdb|again\\.toml)"]  # and then the effects of the shell are checked
 
 
 def names(box, values, rng):
@@ -302,7 +302,7 @@ KINDS = [provenance, provenance, provenance, plan, plan, facts, states, config, 
 
 
 def run(box, words):
-    """@return what is wrong, or nothing; whether it was ended"""
+    """@return a description of the problem, or nothing; whether the run had to be ended"""
     process = subprocess.Popen([box.covol, *words], cwd=box.here, env=box.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     ended = False
     try:
@@ -316,16 +316,16 @@ def run(box, words):
             process.kill()
             process.communicate()
             return "does not end", ended
-    code, said = process.returncode, (out + error).decode(errors="surrogateescape")
+    code, output = process.returncode, (out + error).decode(errors="surrogateescape")
     if code < 0 or (code not in GOOD and not (ended and code == 130)):
-        return f"exit code {code}: {said[-300:]!r}", ended
-    if found := STEERS.search(said) or re.search("[\udc80-\udcff]", said):
-        return f"a control character on a stream: {said[max(0, found.start() - 60):found.start() + 20]!r}", ended
+        return f"exit code {code}: {output[-300:]!r}", ended
+    if found := STEERS.search(output) or re.search("[\udc80-\udcff]", output):
+        return f"a control character on a stream: {output[max(0, found.start() - 60):found.start() + 20]!r}", ended
     return "", ended
 
 
 def case(box, number, seed):
-    """@return the findings, how many runs, how many of them were ended"""
+    """@return the findings, the number of runs, and how many of them had to be ended"""
     rng = random.Random(f"{seed}-{number}")
     values = Values(rng, box.elsewhere)
     kind = rng.choice(KINDS)

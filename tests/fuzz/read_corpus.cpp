@@ -1,9 +1,9 @@
-// Reads each file of a corpus, FOLDER/FORMAT/*, as DamagedFile says: tests/cli/corpus_test.py unpacks it.
+// Reads each file of a corpus, FOLDER/FORMAT/*, with DamagedFile; tests/cli/corpus_test.py unpacks the corpus.
 //
 //   read_corpus FOLDER
 //
-// The name of a file is written before it is read, so that the last one is what a crash or a hang belongs to. Exit code
-// 1 where one takes more memory than 64 MB and ten times its size, or throws what is no covol::Error.
+// The name of a file is printed before it is read, so that the last name is that of the file that crashed or hung. Exit
+// code 1 if a file needs more memory than 64 MB and ten times its size, or throws anything but a covol::Error.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A number of /proc/self/status, in bytes.
+/// A number in /proc/self/status, in bytes.
 std::uint64_t status_of(const std::string& key) {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
@@ -36,12 +36,12 @@ std::vector<fs::path> sorted(const fs::path& folder) {
     return paths;
 }
 
-/// @return whether it was read as it should
+/// @return whether the file was read within the limits
 bool read(const DamagedFile& file, const fs::path& path) {
     std::ifstream stream(path, std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
     std::cout << path.string() << std::endl;
-    std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
+    std::ofstream("/proc/self/clear_refs") << 5;  // resets the peak
     const std::uint64_t before = status_of("VmRSS");
     try {
         file.read(bytes);
@@ -66,5 +66,5 @@ int main(int argc, char** argv) {
         for (const fs::path& path : sorted(format)) good = read(file, path) && good;
     }
     std::cout.flush();
-    std::_Exit(good ? 0 : 1);  // HDF5's library complains at its end of what damaged headers left in it
+    std::_Exit(good ? 0 : 1);  // HDF5's library prints errors at exit because of damaged headers
 }

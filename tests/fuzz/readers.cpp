@@ -1,7 +1,7 @@
-// Each reader under a fuzzer that is guided by coverage (clang's libFuzzer): tests/fuzz/run.sh builds and runs it.
+// Each reader under a coverage-guided fuzzer (clang's libFuzzer): tests/fuzz/run.sh builds and runs it.
 //
-// COVOL_FUZZ_FORMAT says how the file's name ends, and thereby which reader gets it. Everything that is thrown and no
-// covol::Error, and whatever a sanitizer finds, is a finding.
+// COVOL_FUZZ_FORMAT is the end of the file's name, which selects the reader. Exceptions other than covol::Error, and
+// reports of a sanitizer, are findings.
 #include <pthread.h>
 #include <sanitizer/common_interface_defs.h>
 
@@ -12,8 +12,8 @@
 
 namespace {
 
-// A copy of the process that a sanitizer ends is a file that is refused (io/child.h): it has the fuzzer's handler from
-// this process, which would keep the file as a finding.
+// If a sanitizer ends the forked copy of this process (io/child.h), the file counts as refused; but the copy inherits
+// the fuzzer's handler, which would record a finding.
 void end_copies_without_a_finding() { __sanitizer_set_death_callback(nullptr); }
 
 }  // namespace

@@ -1,7 +1,7 @@
-// The rules for requests under a fuzzer that is guided by coverage (clang's libFuzzer).
+// The rules for requests under a coverage-guided fuzzer (clang's libFuzzer).
 //
-// The input is the head of a request as a client would write it: a first line and fields. A finding is what a sanitizer
-// finds, and an answer to a request that breaks a rule.
+// The input is the head of a request as a client would write it: a first line and fields. Findings are reports of a
+// sanitizer, and accepted requests that violate a rule.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
@@ -72,21 +72,21 @@ void check_request(const Request& request) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const std::string_view text(reinterpret_cast<const char*>(data), size);
     const RequestHead head = head_of(text);
-    const Judgement judgement = judge(head, rules());
+    const Decision judgement = judge(head, rules());
     switch (judgement.kind) {
-        case Judgement::Kind::Refuse:
+        case Decision::Kind::Refuse:
             require(judgement.status >= 400 && judgement.status < 500 && !judgement.why.empty());
             break;
-        case Judgement::Kind::SetCookie: require(parse_target(head.target)->query.at("token") == rules().token); break;
-        case Judgement::Kind::Live:
+        case Decision::Kind::SetCookie: require(parse_target(head.target)->query.at("token") == rules().token); break;
+        case Decision::Kind::Live:
             require(head.is_upgrade && text.find("http://") != std::string_view::npos);
             [[fallthrough]];
-        case Judgement::Kind::Post:
-            require(judgement.kind != Judgement::Kind::Post ||
+        case Decision::Kind::Post:
+            require(judgement.kind != Decision::Kind::Post ||
                     (judgement.body_bytes >= 1 && judgement.body_bytes <= 1000 &&
                      text.find("http://") != std::string_view::npos));
             [[fallthrough]];
-        case Judgement::Kind::Get:
+        case Decision::Kind::Get:
             require(text.find("covol_mark_8000=fedcba9876543210") != std::string_view::npos);
             check_request(judgement.request);
             break;

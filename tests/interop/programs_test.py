@@ -1,9 +1,9 @@
-"""ImageJ, MeshLab and CloudCompare open what covol writes, and agree on place, size and orientation.
+"""ImageJ, MeshLab and CloudCompare open the files that covol writes, and agree on position, size and orientation.
 
     COVOL=build/bin/covol python3 -m unittest tests/interop/programs_test.py
 
-Each test is skipped where its program, or xvfb-run, is not installed (tests/run.sh installs them). VTK, with whose readers
-ParaView opens files, meshio, nibabel and tifffile: tests/cli/readers_test.py; Blender: tests/cli/blender_test.py.
+Each test is skipped if its program, or xvfb-run, is not installed (tests/run.sh installs them). VTK (whose readers ParaView uses),
+meshio, nibabel and tifffile are tested in tests/cli/readers_test.py, Blender in tests/cli/blender_test.py.
 """
 import math
 import pathlib
@@ -27,7 +27,7 @@ except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
 IMAGEJ = pathlib.Path("/usr/share/java/ij.jar")
-DISPLAY = shutil.which("xvfb-run")  # these programs draw, if only to a screen in memory
+DISPLAY = shutil.which("xvfb-run")  # these programs need a screen, if only a virtual one
 
 
 def needs(program, package):
@@ -37,7 +37,7 @@ def needs(program, package):
 
 @unittest.skipIf(MISSING, MISSING)
 class Programs(cli_test.Case):
-    """A turned ellipsoid as a level set, on the lattice of an image."""
+    """A rotated ellipsoid as a level set, on the lattice of an image."""
 
     @classmethod
     def setUpClass(cls):
@@ -61,7 +61,7 @@ class Programs(cli_test.Case):
         return 4 / 3 * math.pi * RADII.prod() * abs(np.linalg.det(self.lattice.steps))
 
     def covariance(self):
-        """Of places within the body."""
+        """Random positions within the body."""
         axes = self.lattice.steps @ AXES
         return axes @ np.diag(RADII ** 2 / 5) @ axes.T
 
@@ -86,16 +86,16 @@ class ImageJ(Programs):
 
     @needs(IMAGEJ, "imagej")
     def test_masks(self):
-        """Slice by slice: how much is inside, and its centre in calibrated units."""
+        """For each slice: the area inside, and its centre in calibrated units."""
         levels = level(indices())
         for name in ("mask.tif", "mask.ome.tif"):
             with self.subTest(name):
                 self.run_covol("mask", self.body, "--like", self.stack, "-o", name, "--quiet")
                 inside = tifffile.imread(self.out / name) > 0
                 self.assertTrue((inside == (levels < 0))[np.abs(levels) > 0.1].all())
-                told, *slices = self.imagej(self.MACRO, self.out / name)
-                unit, numbers = told[0], told[-7:]  # there may be no unit
-                if name == "mask.tif":  # of OME's XML ImageJ alone takes nothing
+                reported, *slices = self.imagej(self.MACRO, self.out / name)
+                unit, numbers = reported[0], reported[-7:]  # the unit may be missing
+                if name == "mask.tif":  # plain ImageJ ignores OME's XML
                     self.assertIn(unit, ("µm", "um", "micron"))
                     np.testing.assert_allclose([float(n) for n in numbers[:3]], self.lattice.spacing, rtol=1e-6)
                 self.assertEqual([int(n) for n in numbers[3:6]], [SIZE[2], SIZE[0], SIZE[1]])
@@ -105,12 +105,12 @@ class ImageJ(Programs):
                     self.assertAlmostEqual(float(mean), count / inside[k].size, places=6)
                     if count and name == "mask.tif":
                         j, i = np.argwhere(inside[k]).mean(0)
-                        place = self.lattice.world((i, j, k))[:2] + 0.5 * self.lattice.spacing[:2]  # ImageJ counts from corners
+                        place = self.lattice.world((i, j, k))[:2] + 0.5 * self.lattice.spacing[:2]  # ImageJ counts from pixel corners
                         np.testing.assert_allclose([float(x), float(y)], place, atol=0.01 * self.lattice.spacing.min())
 
     @needs(IMAGEJ, "imagej")
     def test_suggested_places(self):
-        """Of a body whose upper half has neither marks nor edges."""
+        """Suggestions for a body whose upper half has neither marks nor edges."""
         half = (level(indices()) < 0) & (indices()[..., 2] < CENTRE[2])
         files.write_imagej(self.out / "half.tif", np.where(half, 200, 20).astype(np.uint8), self.lattice)
         angles = np.random.default_rng(1).normal(size=(300, 3))
@@ -129,7 +129,7 @@ class ImageJ(Programs):
             getSelectionCoordinates(x, y);
             for (n = 0; n < nResults; n++) print(x[n], y[n], getResult("Slice", n));
         """
-        # It prints its table of results, too.
+        # ImageJ prints its results table, too.
         rows = self.imagej(macro, f"{self.stack}|{self.out / 'places.roi'}")[-len(suggested):]
         self.assertEqual(len(rows), len(suggested), rows)
         for row, place in zip(rows, suggested):
@@ -144,15 +144,15 @@ class MeshLab(Programs):
         (self.out / "measure.mlx").write_text('<!DOCTYPE FilterScript>\n<FilterScript><filter name="Compute Geometric Measures"/></FilterScript>\n')
         covariance = self.covariance()
         inertia = self.volume() * (np.trace(covariance) * np.eye(3) - covariance)
-        for name in self.mesh_files("ply", "stl", "off"):  # Debian's MeshLab ends at any OBJ, by an assertion of its own
+        for name in self.mesh_files("ply", "stl", "off"):  # Debian's MeshLab fails an assertion of its own with every OBJ
             with self.subTest(name):
-                told = self.run_program("meshlabserver", "-i", name, "-s", "measure.mlx")
+                reported = self.run_program("meshlabserver", "-i", name, "-s", "measure.mlx")
                 number = r"\s*(-?[\d.]+)"
-                volume = float(re.search("Mesh Volume  is" + number, told).group(1))
+                volume = float(re.search("Mesh Volume  is" + number, reported).group(1))
                 self.assertAlmostEqual(volume / self.volume(), 1, delta=0.01)
-                centre = [float(v) for v in re.search("Center of Mass  is" + 3 * number, told).groups()]
+                centre = [float(v) for v in re.search("Center of Mass  is" + 3 * number, reported).groups()]
                 np.testing.assert_allclose(centre, self.lattice.world(CENTRE), atol=0.02 * self.lattice.spacing.min())
-                rows = re.findall(r"\|" + 3 * number + r" \|", told.split("Inertia Tensor is")[1])[:3]
+                rows = re.findall(r"\|" + 3 * number + r" \|", reported.split("Inertia Tensor is")[1])[:3]
                 np.testing.assert_allclose(np.array(rows, float), inertia, atol=0.02 * np.abs(inertia).max())
 
 

@@ -1,4 +1,4 @@
-"""The core, linked alone, asks for none of the libraries that readers and writers need.
+"""The core, linked alone, depends on none of the libraries that readers and writers need.
 
     python3 tests/lint/core_test.py LIBRARY
 """

@@ -1,4 +1,4 @@
-"""Every source, function and test that docs/method.md names is there.
+"""Every source, function and test that docs/method.md names exists.
 
     python3 tests/lint/docs_test.py SOURCE_DIR
 """

@@ -1,21 +1,21 @@
-"""The library speaks of options, the command line of flags: no file of lib/ names a flag, and what lib/ names is an option. An option
-has one row in one table, and its name stands nowhere else unless somebody uses it.
+"""The library has options, the command line has flags: no file of lib/ names a flag, and every name of an option in lib/ is that
+of an option. An option has one row in one table, and its name occurs elsewhere only if it is used there.
 
-    python3 tests/lint/flags_test.py SOURCE_DIR           says what is wrong
-    python3 tests/lint/flags_test.py SOURCE_DIR NAME...   lists the places where an option's name stands
+    python3 tests/lint/flags_test.py SOURCE_DIR           prints what is wrong
+    python3 tests/lint/flags_test.py SOURCE_DIR NAME...   lists the places where an option's name occurs
 """
 import pathlib
 import re
 import sys
 
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)+\'|//[^\n]*|/\*.*?\*/', re.S)
-FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # "--" alone is put before a name
+FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # a single "--" precedes a name
 FIELD = re.compile(r"`([a-z_]+)(?=`| = )|(?:^|, )([a-z_]{2,}) = ")
 ROW = re.compile(r'Option\{\s*"([a-z_]+)",\s*&')
-# Flags that belong to no struct of options.
+# Flags that do not belong to a struct of options.
 BY_HAND = {"checkpoint", "checkpoint_every", "contours", "guess", "inside", "outside", "resume", "structure_column"}
-# Options of every kind that nothing names but their row: the rest is made from it. Others are named where one depends on another, where a
-# report has a result of the same name, and in messages about what would help.
+# Options of every kind that are named only in their row, from which everything else is generated. Other options are named elsewhere if they depend on
+# each other, if a report has a result of the same name, and in messages that recommend them.
 PLAIN = ("guess_weight", "epsilon", "edge_epsilon", "solver_tolerance", "coarse_levels", "guess_radius", "hole_distance", "contour_curve",
          "points_scale", "points_channels", "painted_outside", "correct_level_shift", "zoom", "seed")
 
@@ -37,7 +37,7 @@ def options(root):
 
 
 def places(root, names):
-    """Where a string in the sources is an option's name, or has its flag: (name, file:line)."""
+    """Strings in the sources that are an option's name or contain its flag: (name, file:line)."""
     flags = {name: re.compile(rf"--{name.replace('_', '-')}(?![a-z-])") for name in names}
     for path in sources(root, "lib", "tools"):
         text = path.read_text()
@@ -72,7 +72,7 @@ def findings(root):
 
 
 def self_test():
-    """The patterns find what they are for."""
+    """Checks that the patterns match what they should."""
     found = list(tokens('a = "x // y";  // z\nb = \'"\'; /* q */ c("k");'))
     assert found == [(1, "x // y", True), (1, "// z", False), (2, "/* q */", False), (2, "k", True)], found
     for text in ("give --roi", " with --", "--spacing sx", "(--roi)"):

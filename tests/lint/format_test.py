@@ -1,5 +1,5 @@
-"""Every C++ source is formatted as .clang-format says. Exit 77, skipped, where clang-format 14 is not there: other versions
-differ in details.
+"""Every C++ source is formatted according to .clang-format. Exit code 77 (skipped) if clang-format 14 is not installed: other
+versions differ in details.
 
     python3 tests/lint/format_test.py SOURCE_DIR [--write]
 """

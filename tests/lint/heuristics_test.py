@@ -1,4 +1,4 @@
-"""Heuristic constants stand in heuristics.h, each with unit, meaning and a row in docs/heuristics.md; no others come beside them.
+"""Heuristic constants are in heuristics.h, each with unit, meaning and a row in docs/heuristics.md, and nowhere else.
 
     python3 tests/lint/heuristics_test.py SOURCE_DIR
 """
@@ -10,24 +10,24 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
 from heuristics import read_heuristics  # noqa: E402
 
-# A constant of floating point in a .cpp of a folder that has a heuristics.h. Those that are none: tolerances of solvers, mathematics.
+# Floating-point constants in a .cpp of a folder that has a heuristics.h. Those that are not heuristic: tolerances of solvers, mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMostLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
-    "segment/choices.cpp:kMostReach",
+    "segment/choices.cpp:kMaxReach",
     "contours/contour_curve.cpp:kLongestPiece", "contours/section_field.cpp:kClosest", "contours/section_field.cpp:kSettled", "contours/slice_field.cpp:kSeedPiece",
     "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
-    "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
-    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
-    "guidance/border_profile.cpp:kNothing", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
-    "inference/appearance.cpp:kEnough", "inference/appearance.cpp:kFeatureSigmas", "inference/candidate.cpp:kCells", "inference/candidate.cpp:kFarCells",
-    "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMostCells",
+    "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMaxCells",
+    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kNoStep",
+    "guidance/border_profile.cpp:kIgnoredWeight", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kMinSigma", "holes/holes.cpp:kP95OfSpacing",
+    "inference/appearance.cpp:kConverged", "inference/appearance.cpp:kFeatureSigmas", "inference/candidate.cpp:kCells", "inference/candidate.cpp:kFarCells",
+    "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMaxCells",
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
-    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMostCaps",
-    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kNowhere", "tagging/tagging.cpp:kBall",
+    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
+    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kOutsideDomain", "tagging/tagging.cpp:kBall",
 }
 
 

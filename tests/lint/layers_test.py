@@ -1,4 +1,4 @@
-"""Rules that the compiler does not check: includes go down only, public headers stay light, lib/ keeps quiet.
+"""Rules that the compiler does not check: includes go down only, public headers include little, lib/ prints nothing.
 
     python3 tests/lint/layers_test.py SOURCE_DIR
 """
@@ -29,8 +29,8 @@ LAYERS = [
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}
-MOST_FILES, MOST_LINES = 20, 500
-# The modules of segment(), in the same way; segment/pipeline.cpp is above them all.
+MAX_FILES, MAX_LINES = 20, 500
+# The modules of segment(), in the same form; segment/pipeline.cpp is above them all.
 PIPELINE = [
     ["heuristics", "options", "problem", "step", "vanished"],
     ["choices"],
@@ -49,7 +49,7 @@ HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|Ope
 LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
-# Readers and writers, which the core does without: COVOL_IO.
+# Readers and writers, which the core does not use: COVOL_IO.
 READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
 ROW = re.compile(r"^\| (\d+) \| `([\w/]+)` \| .", re.M)  # of the table in docs/architecture.md
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
@@ -60,7 +60,7 @@ def without_comments(text):
 
 
 def folder_of(path, root):
-    """Of a source or a header; None for what has no place in LAYERS."""
+    """The level of a source or a header; None if it is not in LAYERS."""
     if path.parent.name == "covol":
         return FOLDER.get(path.stem)
     folder = path.parent.relative_to(root / "lib/src").as_posix()
@@ -68,7 +68,7 @@ def folder_of(path, root):
 
 
 def misplaced(path, include, root):
-    """Says why this file may not include that header; None where it may."""
+    """The reason why this file may not include that header; None if it may."""
     own = folder_of(path, root)
     folder, name = include.rsplit("/", 1) if "/" in include else ("", include)
     other = FOLDER.get(name) if folder == "covol" else folder if folder in LEVEL else None
@@ -100,11 +100,11 @@ def findings(root):
             yield f"docs/architecture.md: {folder}: expected level {LEVEL.get(folder)}, got {shown.get(folder)}"
     for folder in LEVEL:
         count = sum(path.is_file() for path in (root / "lib/src" / folder).glob("*"))
-        if not 0 < count <= MOST_FILES:
-            yield f"lib/src/{folder}: expected 1 to {MOST_FILES} files, got {count}"
+        if not 0 < count <= MAX_FILES:
+            yield f"lib/src/{folder}: expected 1 to {MAX_FILES} files, got {count}"
     for path in public + sources:
-        if (lines := path.read_text().count("\n")) > MOST_LINES:
-            yield f"{path.relative_to(root)}: {lines} lines, expected {MOST_LINES} at most"
+        if (lines := path.read_text().count("\n")) > MAX_LINES:
+            yield f"{path.relative_to(root)}: {lines} lines, expected {MAX_LINES} at most"
         for number, line in enumerate(without_comments(path.read_text()).splitlines(), 1):
             where = f"{path.relative_to(root)}:{number}"
             include = INCLUDE.search(line)
@@ -119,7 +119,7 @@ def findings(root):
 
 
 def self_test():
-    """The patterns find what they are for."""
+    """Checks that the patterns match what they should."""
     assert HEAVY.search('#include <openvdb/openvdb.h>') and not HEAVY.search("#include <openvdb/version.h>")
     for loud in ('std::cout << 1;', 'printf("x");', "std::exit(1);", "fprintf(stderr, 1);", "abort();"):
         assert LOUD.search(loud), loud
@@ -128,7 +128,7 @@ def self_test():
     assert not misplaced(fields, "segment/problem", root) and not misplaced(solve, "segment/solve/flow", root) and not misplaced(edge, "grid/halo", root)
     assert misplaced(fields, "segment/solve/flow", root) and misplaced(solve, "segment/none", root)
     assert misplaced(edge, "segment/problem", root) and misplaced(edge, "covol/pipeline", root) and misplaced(edge, "nowhere/x", root)
-    assert misplaced(edge, "redistance/redistance", root)  # of the same level, in another room
+    assert misplaced(edge, "redistance/redistance", root)  # same level, another folder
     for quiet in ('std::snprintf(text, 3, "x");', "run.exit_code(3);", "std::fprintf(file, 1);"):
         assert not LOUD.search(quiet), quiet
 

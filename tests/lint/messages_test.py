@@ -1,22 +1,22 @@
-"""No message begins with the name of a function: people read them, who know files and options.
+"""No message begins with the name of a function, because users know files and options, but no functions.
 
     python3 tests/lint/messages_test.py SOURCE_DIR [--write]
 
-A leading name of one word is told by its underscore, or by KNOWN; options lead where they are what is wrong. --write takes the
-names away where that leaves an expression whole, and tells the other places.
+A function's name at the beginning is recognised by its underscore, or by KNOWN; names of options are allowed there. --write
+removes the names if the remaining expression is valid, and prints the other places.
 """
 import pathlib
 import re
 import sys
 
-# Functions of one word that once led messages; commands of the program lead where they are what was asked for.
+# Functions without an underscore that once began messages; commands of the program may begin them if they were requested.
 KNOWN = ("carried", "covering", "decimate", "densify", "orient", "placed", "rasterize", "separate", "offset")
 NAME = r"(?P<name>[a-z]+(?:_[a-z]+)+|" + "|".join(KNOWN) + r")"
 LEADING = re.compile('"' + NAME + ": ")
-ALONE = re.compile('"' + NAME + r': "\s*(?:\+|<<)\s*')  # and what follows is another operand
+ALONE = re.compile('"' + NAME + r': "\s*(?:\+|<<)\s*')  # and if another operand follows
 OPTION = re.compile(r'(?:Option\{|require(?:_valid)?\(|\.require\(|field\()\s*"([a-z_]+)"')
 CODE = re.compile(r"^\s*(?://|\*)")
-# The server's own settings, which no one types.
+# The server's own settings, which are not options.
 SETTINGS = ("frame_origins", "page_policy", "live_path", "most_message_bytes", "most_connections", "messages_per_second",
             "message_burst", "live_idle", "get_threads")
 

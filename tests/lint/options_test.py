@@ -1,9 +1,9 @@
 """The tables of options in docs/commands are those of the program.
 
-    python3 tests/lint/options_test.py BUILD/bin/covol SOURCE_DIR           says which pages differ
+    python3 tests/lint/options_test.py BUILD/bin/covol SOURCE_DIR           prints which pages differ
     python3 tests/lint/options_test.py BUILD/bin/covol SOURCE_DIR --write   fills them in
 
-A page has a place for each table: what stands between the lines <!-- options: COMMAND --> and <!-- end of options --> is written by
+A page has a place for each table: the text between the lines <!-- options: COMMAND --> and <!-- end of options --> is written by
 this script. "common" are the options that every command takes, "commands" is the list of commands.
 """
 import json
@@ -22,7 +22,7 @@ def code(text):
 
 
 def prose(text):
-    """Help is written for a terminal: what markdown would take for markup is escaped."""
+    """Help is written for a terminal: characters with a meaning in Markdown are escaped."""
     return re.sub(r"([<>*_\[\]])", r"\\\1", cell(text))
 
 

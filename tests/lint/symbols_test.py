@@ -1,4 +1,4 @@
-"""The shared library gives programs the functions of its public headers, and nothing of what it is made of.
+"""The shared library exports the functions of its public headers, and none of its internals.
 
     python3 tests/lint/symbols_test.py LIBRARY [NM]
 """
@@ -6,16 +6,16 @@ import re
 import subprocess
 import sys
 
-# Code of headers that say default visibility themselves: the same in every library that uses them.
+# Code from headers that request default visibility themselves: the same in every library that uses them.
 FOREIGN = re.compile(r"^(std|__gnu_cxx|openvdb|tbb|boost|itk)::|^(guard variable|typeinfo|typeinfo name|vtable|VTT) for "
                      r"((std|__gnu_cxx|openvdb|tbb|boost|itk)::|void \(\*\)\()")
 ABOUT = re.compile(r"^(?:(?:guard variable|typeinfo|typeinfo name|vtable|VTT) for |(?:non-)?virtual thunk to )")
-# A lower-case namespace inside of covol is internal: covol::detail, covol::pipeline. Classes have capitals.
+# A lower-case namespace within covol is internal: covol::detail, covol::pipeline. Names of classes begin with a capital.
 INTERNAL = re.compile(r"\bcovol::[a-z_]\w*::")
 
 
 def without_arguments(name):
-    """`covol::f` of `T covol::f<...>(...)`: template arguments, parameters and the return type are left out."""
+    """`covol::f` from `T covol::f<...>(...)`: template arguments, parameters and the return type are removed."""
     while True:
         shorter = re.sub(r"\([^()]*\)|<[^<>]*>|\[[^\[\]]*\]|\{[^{}]*\}", "", name.replace("(anonymous namespace)", "anonymous"))
         if shorter == name:

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# clang-tidy over lib and tools, with the checks of .clang-tidy; takes half an hour of one core, so it is no part of the
-# tests. With names it looks at the sources whose path holds one of them: bash tests/lint/tidy.sh evolve redistance
+# Runs clang-tidy on lib and tools, with the checks of .clang-tidy; it needs half an hour on one core and is therefore
+# not part of the tests. With arguments it checks the sources whose path contains one of them: bash tests/lint/tidy.sh
+# evolve redistance
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

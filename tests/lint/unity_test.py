@@ -2,8 +2,8 @@
 
     python3 tests/lint/unity_test.py SOURCE_DIR
 
-Overloads may share a name, and aliases what they stand for. What the compiler alone sees, a function that hides others of its
-name, a first build finds: `cmake --preset default -DCOVOL_UNITY=ON`.
+Overloads may have the same name, and aliases may denote the same type. A function that hides others of its name is only detected
+by the compiler: `cmake --preset default -DCOVOL_UNITY=ON`.
 """
 import collections
 import pathlib
@@ -12,7 +12,7 @@ import sys
 
 FOLDERS = ["lib/src", "tools/covol"]
 NOISE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'', re.S)
-PATTERNS = [  # at the top of an unnamed namespace, where the body of anything is {}
+PATTERNS = [  # at the top level of an unnamed namespace, in which every body has been replaced by {}
     re.compile(r"\b(?:class|struct|enum(?:\s+class)?|union)\s+(?P<name>\w+)[^;(){}]*\{\}"),
     re.compile(r"\busing\s+(?P<name>\w+)\s*=(?P<more>[^;]*)"),
     re.compile(r"\b(?P<name>\w+)\s*\((?P<more>[^;{}]*)\)\s*(?:const|noexcept|->[^{};]*)?\s*\{\}"),
@@ -21,7 +21,7 @@ PATTERNS = [  # at the top of an unnamed namespace, where the body of anything i
 
 
 def inner(text, begin):
-    """What is between the brace before `begin` and the one that closes it; bodies inside become {}."""
+    """The text between the brace before `begin` and the matching one, with inner bodies replaced by {}."""
     out, depth = [], 1
     for c in text[begin:]:
         depth += {"{": 1, "}": -1}.get(c, 0)
@@ -33,7 +33,7 @@ def inner(text, begin):
 
 
 def names(source):
-    """Of what a source's unnamed namespaces define: (name, what may tell two of that name apart)."""
+    """The definitions in a source's unnamed namespaces: (name, properties that may distinguish two of that name)."""
     text = NOISE.sub(lambda m: "" if m.group().startswith("/") else '""', source)
     for space in re.finditer(r"namespace\s*\{", text):
         body = inner(text, space.end())

@@ -1,5 +1,5 @@
-"""segment() is made of functions of values: what came in and what was chosen is never written to, and nothing that is told to people
-decides what is done.
+"""segment() consists of pure functions: inputs and choices are never modified, and nothing that is only reported to users affects
+the computation.
 
     python3 tests/lint/values_test.py SOURCE_DIR
 """
@@ -8,12 +8,12 @@ import re
 import sys
 
 FOLDERS = ("segment", "bricks")
-# Types of what came in and what was chosen: a function takes them to read, or by value.
+# Types of inputs and choices: functions take them by const reference or by value.
 WRITTEN_TO = re.compile(r"(?<!const )(?<!struct )(?<!class )\b(?:covol::)?(?:pipeline::)?(?:Problem|Choices|Resolved|\w*Options)\s*[&*]")
-# Fields for people in a condition, or looked up in.
+# Report fields that are used in a condition, or searched.
 READ_BACK = re.compile(r"\.(?:automatic|warnings)\s*(?:\.(?:contains|count|find|erase|empty|at)\b|\[)"
                        r"|\b(?:if|while)\s*\((?:[^()]|\([^()]*\))*\b(?:reason|why_not|summary)\b")
-# Which module may look at a log: the one that keeps it.
+# The only module that may read a log: the one that keeps it.
 KEEPER = "segment/step.cpp"
 
 
@@ -22,7 +22,7 @@ def without_comments(text):
 
 
 def problems_of(text):
-    """(line number, what is wrong) of the text of one source."""
+    """(line number, what is wrong) in the text of a source."""
     for number, line in enumerate(without_comments(text).splitlines(), 1):
         if WRITTEN_TO.search(line):
             yield number, "takes or keeps values that it could write to"

@@ -2,11 +2,11 @@
 
     /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1] [--only N ...] [--preset ci]
 
-Clones the repository's last commit into FOLDER, builds its unit tests there, and then changes one operator or constant at a
-time, builds the tests of that module, and runs them. A fault that does not compile is drawn again. Prints a line for each
-and, at the end, those that no test found: gaps, or changes that mean nothing (a bound that is never met with equality).
-Each fault has a number, and is drawn by itself: --only 7 31 has these two again, as long as their files are the same.
-With --preset asan the sanitizers look, too, and the tests of the binary are left out.
+Clones the repository's last commit into FOLDER, builds its unit tests there, and then changes one operator or constant at a time,
+builds the tests of that module, and runs them. A fault that does not compile is replaced by another one. Prints a line for each
+fault and, at the end, those that no test found: gaps in the tests, or changes without effect (a bound that is never met with
+equality). Each fault depends only on its number: --only 7 31 repeats these two, as long as their files are unchanged. With
+--preset asan the sanitizers find faults, too, and the tests of the program are left out.
 """
 import argparse
 import functools
@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# Files, and the programs of their tests. Half of the faults go into kernels, half into readers.
+# Files, and the programs of their tests. Half of the faults are made in kernels, half in readers.
 KERNELS = {
     "scheme/scheme_kernels.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
     "scheme/scheme.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
@@ -64,14 +64,14 @@ FAULTS = [
     (r"\btrue\b", "false"), (r"\bfalse\b", "true"), (r" \+= ", " -= "), (r"if \(!", "if ("),
 ]
 SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory|reserve")
-SECONDS = 120  # of all cores together, of a test: faults make loops endless. A busy machine changes nothing about it.
-BYTES = 12 << 30  # of addresses: others make sizes absurd
-WAITING = 3600  # seconds of a test that does not end and computes nothing, either, also where it was stopped for a while
+SECONDS = 120  # CPU time limit of a test: faults cause endless loops. Unlike wall clock time, it does not depend on other load.
+BYTES = 12 << 30  # of address space: other faults cause absurd sizes
+WAITING = 3600  # seconds of wall clock time for a test that neither ends nor computes, including times at which it was stopped
 
 
 @functools.cache
 def faults_in(path):
-    """(line, column, old, new) of each place where one of the faults can be made."""
+    """(line, column, old, new) of each position at which one of the faults can be made."""
     found, text = [], path.read_text().splitlines()
     for number, line in enumerate(text):
         if SKIPPED.search(line):
@@ -91,7 +91,7 @@ class Build:
         if not self.source.exists():
             subprocess.run(["git", "clone", "-q", ROOT, self.source], check=True)
         subprocess.run(["cmake", "--preset", self.preset], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
-        # Of a run that was stopped in the middle.
+        # Removes the fault of a run that was interrupted.
         subprocess.run(["git", "-C", self.source, "checkout", "-q", "--", "lib"], check=True)
         for name in (*KERNELS, *READERS):
             (self.source / "lib/src" / name).touch()
@@ -111,7 +111,7 @@ class Build:
 
     def limit(self):
         resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-        if self.preset != "asan":  # which has addresses of its own by the terabyte
+        if self.preset != "asan":  # asan reserves terabytes of address space
             resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
     def passes(self, test):
@@ -125,7 +125,7 @@ class Build:
             return False
 
     def try_fault(self, name, tests, fault):
-        """@return the test that found it, "" where none did, None where it does not compile"""
+        """@return the test that found it, "" if none did, None if it does not compile"""
         path = self.source / "lib/src" / name
         original = path.read_text()
         lines = original.splitlines(keepends=True)
@@ -150,7 +150,7 @@ def draws(sources, seed, n):
 
 
 def fault_of(build, seed, n):
-    """@return fault number n, in words, and the test that found it"""
+    """@return a description of fault number n, and the test that found it"""
     sources = build.source / "lib/src"
     earlier = {next(draws(sources, seed, before)) for before in range(1, n)}
     for name, fault in draws(sources, seed, n):

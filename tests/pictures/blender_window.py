@@ -1,8 +1,8 @@
-"""Runs inside a Blender with a window: the add-on's result, as a person sees it after Find the surface.
+"""Runs inside a Blender with a window: the add-on's result, as a user sees it after Find the surface.
 
     blender --factory-startup --enable-event-simulate --python tests/pictures/blender_window.py -- ADDON.zip IMAGE MARKS.xyz FOLDER
 
-Writes FOLDER/screen.png. What is set by hand here a person clicks.
+Writes FOLDER/screen.png. The script sets what a user would click.
 """
 import pathlib
 import sys
@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Matrix
 
 archive, image, points, folder = (pathlib.Path(word) for word in sys.argv[sys.argv.index("--") + 1:])
-STEP = 0.5  # seconds, in which Blender draws
+STEP = 0.5  # seconds, for Blender to draw
 
 
 def find():

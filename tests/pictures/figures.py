@@ -1,4 +1,4 @@
-"""Pictures of what covol gives to programs that Debian does not have, and of pages in a browser: pages of HTML with planes of images,
+"""Pictures of covol's data for programs that Debian does not have, and of pages in a browser: HTML pages with planes of images,
 surfaces drawn by VTK, and text, as headless Chromium shows them."""
 import base64
 import html
@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "tests/cli"), str(ROOT / "tools/napari")]
 
 BLUE, YELLOW, WHITE = (68, 119, 170), (255, 220, 60), (255, 255, 255)
 COLORS = (BLUE, (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119))
-# The family is named: whose width sans-serif has depends on what else is installed, and so would the width of a picture.
+# The font is named explicitly: the width of the default sans-serif depends on the installed fonts, and so would the width of a picture.
 STYLE = """body { margin: 0; padding: 10px; font: 13px/1.35 "DejaVu Sans", sans-serif; color: #222; background: #fff; width: max-content }
 .row { display: flex; gap: 8px; align-items: flex-start } .column { display: flex; flex-direction: column; gap: 8px }
 figure { margin: 0 } figcaption { padding: 2px 0 } img { display: block } pre { margin: 0; font: 12px/1.4 "DejaVu Sans Mono", monospace }
@@ -33,7 +33,7 @@ table { border-collapse: collapse } td, th { padding: 1px 8px 1px 0; text-align:
 
 
 class Browser:
-    """Chromium without a window."""
+    """A headless Chromium."""
 
     def __enter__(self):
         from mark_page_case import start_chromium
@@ -51,7 +51,7 @@ def page(body):
 
 
 def photograph(driver, path):
-    """The page as it is, as wide and as high as its body."""
+    """The page as displayed, with the width and height of its body."""
     width, height = driver.execute_script("const r = document.body.getBoundingClientRect(); return [Math.ceil(r.right), Math.ceil(r.bottom)]")
     shot = Image.open(io.BytesIO(driver.get_screenshot_as_png())).convert("RGB")
     if shot.width < width or shot.height < height:
@@ -74,7 +74,7 @@ def shown(picture, caption=""):
 
 
 def plane(voxels, axis, index, spacing, scale=1.0, labels=None, color=BLUE, opacity=0.45, marks=(), mark_color=WHITE):
-    """A plane of voxels (z, y, x) in true proportions, with labels over it; marks: (z, y, x) in voxels, of which those beside it are drawn."""
+    """A plane of voxels (z, y, x) in true proportions, overlaid with labels; marks: (z, y, x) in voxels, of which those near the plane are drawn."""
     grey = np.take(voxels, index, axis).astype(float)
     low, high = np.percentile(voxels, (1, 99.7))
     pixels = np.repeat(np.clip((grey - low) / (high - low), 0, 1)[..., None] * 255, 3, axis=2)
@@ -94,9 +94,9 @@ def plane(voxels, axis, index, spacing, scale=1.0, labels=None, color=BLUE, opac
 
 
 def scene(parts, size, points=(), point_color=WHITE, towards=(0.35, 1.0, -0.55), up=(0, 0, -1), zoom=1.5):
-    """Surfaces, (vertices, faces, colour), and points by VTK, on white."""
+    """Draws surfaces, (vertices, faces, colour), and points by VTK, on white."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - what the renderer draws with
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - needed for rendering
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
     from vtkmodules.vtkFiltersCore import vtkGlyph3D, vtkPolyDataNormals
@@ -157,7 +157,7 @@ def scene(parts, size, points=(), point_color=WHITE, towards=(0.35, 1.0, -0.55),
 
 
 def read_ply(path):
-    """By VTK's reader, which 3D Slicer and ParaView have."""
+    """Reads a mesh by VTK's reader, which 3D Slicer and ParaView use."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOPLY import vtkPLYReader
     reader = vtkPLYReader()
@@ -168,7 +168,7 @@ def read_ply(path):
 
 
 def napari(work, path):
-    """The layers that the plugin gives to napari: labels, surface, suggested points."""
+    """The layers that the plugin passes to napari: labels, surface, suggested points."""
     from covol_napari import layers
     volume = tifffile.imread(work.stack)
     spacing = work.spacing[::-1]
@@ -201,7 +201,7 @@ def three_planes(volume, labels, spacing, scale, marks=(), color=BLUE):
 
 
 def slicer(work, path):
-    """The segmentation and the model that the module gives to 3D Slicer, as its readers take them."""
+    """The segmentation and the model that the module passes to 3D Slicer, as read by its readers."""
     home = work.new_folder()
     work.covol("convert", work.stack, home / "volume.nrrd", "--quiet")
     work.covol("segment", home / "volume.nrrd", "--points", work.marks_file, "--voxel-size", 3, "-o", home / "cell.vdb", "--mask", home / "cell.seg.nrrd",
@@ -219,11 +219,11 @@ def slicer(work, path):
 
 
 def itksnap(work, path):
-    """Slices that were painted for ITK-SNAP, and the segmentation with its label descriptions that comes back."""
+    """Slices painted as in ITK-SNAP, and the resulting segmentation with its label descriptions."""
     home = work.new_folder()
     work.covol("convert", work.stack, home / "image.nii.gz", "--quiet")
     job = ["segment", home / "image.nii.gz", "--voxel-size", 3, "--quiet"]
-    # The hand that paints: a surface through the marks, of which every sixth slice is kept.
+    # In place of a person's painting: a surface through the marks, of which every sixth slice is kept.
     work.covol(*job, "--points", work.marks_file, "-o", home / "hand.vdb", "--mask", home / "hand.nii.gz")
     painted = nibabel.load(home / "hand.nii.gz")
     voxels = np.asarray(painted.dataobj).copy()
@@ -241,7 +241,7 @@ def itksnap(work, path):
 
 
 def cluster(work, path):
-    """Bricks by Snakemake: what it says, and the plan's bricks over the surface that was joined."""
+    """Bricks by Snakemake: its output, and the plan's bricks over the joined surface."""
     home = work.new_folder()
     work.covol("phantom", "torus", "--size", 128, "--count", 6000, "-o", home / "torus.nrrd", "--points", home / "torus.xyz", "--quiet")
     work.covol("brick", "plan", "segment", home / "torus.nrrd", "--points", home / "torus.xyz", "--model", "paper", "--brick-voxels", 60000,
@@ -255,16 +255,16 @@ def cluster(work, path):
     voxels = (vertices[faces].mean(axis=1) - plan["origin"]) / plan["voxel_size"]
     of = lambda brick: np.all((voxels >= np.array(brick["min"]) - 0.5) & (voxels < np.array(brick["max"]) + 0.5), axis=1)
     parts = [(vertices, faces[of(brick)], COLORS[n % len(COLORS)]) for n, brick in enumerate(plan["bricks"])]
-    said = (done.stdout + done.stderr).splitlines()
-    table = said[said.index("Job stats:"):]
-    lines = table[:table.index("")] + [""] + [line for line in said if re.match(r"\d+ of \d+ steps", line)][-3:] + [""]
-    lines += [line for line in said if re.match(r"covol: (neighbouring bricks|bricks|surface|points to surface|wrote)", line)]
+    output = (done.stdout + done.stderr).splitlines()
+    table = output[output.index("Job stats:"):]
+    lines = table[:table.index("")] + [""] + [line for line in output if re.match(r"\d+ of \d+ steps", line)][-3:] + [""]
+    lines += [line for line in output if re.match(r"covol: (neighbouring bricks|bricks|surface|points to surface|wrote)", line)]
     torus = shown(scene(parts, (320, 330), towards=(0.3, 0.8, -0.9), up=(0, 0, 1), zoom=1.25), "surface.ply, coloured here by bricks")
     compose(work, f"<div class=row>{torus}<pre>{html.escape(chr(10).join(lines))}</pre></div>", path)
 
 
 def notebook(work, path):
-    """Two output cells: the page of covol.mark(), and a result's own table."""
+    """Two output cells: the page of covol.mark(), and the table of a result."""
     import http.server
     import threading
 
@@ -294,7 +294,7 @@ def notebook(work, path):
             wait.until(lambda _: driver.execute_script(
                 "const m = window.covolMark; return Boolean(m && m.state.get('link') === 'open' && m.study.structures.length "
                 "&& m.study.structures[0].result && m.panels.every((p) => p.slice))"))
-            time.sleep(3)  # the view in 3D
+            time.sleep(3)  # for the 3D view
             driver.switch_to.default_content()
             photograph(driver, path)
     finally:

@@ -1,4 +1,4 @@
-"""Each page of docs/in shows its picture, and the picture is what tests/pictures/make.py makes now, if not to the bit.
+"""Each page of docs/in shows its picture, and the picture is approximately what tests/pictures/make.py makes now.
 
     COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 -m unittest tests/pictures/made_test.py
 """
@@ -17,11 +17,11 @@ sys.path.insert(0, str(HERE))
 import make  # noqa: E402
 
 DOCS = HERE.parents[1] / "docs"
-COARSE = (48, 32)  # in which letters and noise do not count
+COARSE = (48, 32)  # at which letters and noise have no effect
 
 
 def look(path):
-    """Its size, and its grey values in few cells."""
+    """Its size, and its grey values averaged over a few cells."""
     with Image.open(path) as picture:
         return picture.size, np.asarray(picture.convert("L").resize(COARSE, Image.Resampling.BOX), float)
 
@@ -33,13 +33,13 @@ class Made(unittest.TestCase):
         for name in pages:
             self.assertEqual(re.findall(r"pictures/(in_\w+)\.png", (DOCS / f"in/{name}.md").read_text()), [f"in_{name}"])
 
-    def test_a_picture_that_is_none_is_said(self):
+    def test_an_unknown_picture_is_reported(self):
         done = subprocess.run([sys.executable, HERE / "make.py", "out", "houdini"], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertIn("no such picture: houdini", done.stderr)
 
     def distances(self, name):
-        """Of the picture made now from each of docs: the mean difference of grey values in coarse cells; none if the size differs."""
+        """Mean difference of grey values, averaged over coarse cells, between the new picture and each picture of docs, if the sizes are equal."""
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run([sys.executable, HERE / "make.py", folder, name], capture_output=True, text=True, timeout=600)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
@@ -48,7 +48,7 @@ class Made(unittest.TestCase):
         return {other: np.abs(seen - grey).mean() if np.allclose(size, kept[name][0], rtol=0.1) else np.inf for other, (_, grey) in kept.items()}
 
     def compare(self, name):
-        """Its size and its look are those of the picture in docs: nearer to it by far than to any other."""
+        """The new picture has the size of that in docs, and is far more similar to it than to any other."""
         if absent := make.missing(name):
             self.skipTest(f"SKIPPED: {', '.join(absent)} not installed; see tests/run.sh")
         for _ in range(3):  # on a busy machine a window may not be painted when it is captured; a stale picture differs each time

@@ -1,9 +1,10 @@
-"""The pictures of docs/in, each made from what its page describes: of the program's own window where Debian has it, else of what covol
-gives to it.
+"""The pictures of docs/in, each made according to the description on its page: of the program's own window if Debian has the
+program, otherwise of covol's data for it.
 
     COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 tests/pictures/make.py docs/pictures [NAME...]
 
-Needs xvfb-run, and what NEEDS names for each picture. tests/pictures/made_test.py makes them anew and compares them with those of docs.
+Needs xvfb-run, and the programs in NEEDS for each picture. tests/pictures/made_test.py makes the pictures again and compares them
+with those of docs.
 """
 import importlib
 import os
@@ -11,7 +12,7 @@ import pathlib
 import shutil
 import sys
 
-NEEDS = {  # of each picture: the module that makes it, and the programs that take part
+NEEDS = {  # for each picture: the module that makes it, and the programs that it needs
     "fiji": ("windows", ("java", "imagej")),
     "blender": ("windows", ("blender",)),
     "napari": ("figures", ("chromium", "chromedriver")),
@@ -21,7 +22,7 @@ NEEDS = {  # of each picture: the module that makes it, and the programs that ta
     "notebook": ("figures", ("chromium", "chromedriver")),
 }
 SCREEN = "1100x700x24"
-MOST_BYTES = 200_000  # of a picture
+MAX_BYTES = 200_000  # per picture
 
 
 def missing(name):
@@ -29,21 +30,21 @@ def missing(name):
 
 
 def make_small(path):
-    """With as many colours as fit into MOST_BYTES."""
+    """Saves a picture with as many colours as fit into MAX_BYTES."""
     from PIL import Image
     whole = Image.open(path).convert("RGB")
     for colors in (256, 128, 64, 32):
         whole.quantize(colors, method=Image.Quantize.MAXCOVERAGE, kmeans=8, dither=Image.Dither.NONE).save(path, optimize=True)
-        if path.stat().st_size <= MOST_BYTES:
+        if path.stat().st_size <= MAX_BYTES:
             return
-    raise RuntimeError(f"{path}: larger than {MOST_BYTES} bytes")
+    raise RuntimeError(f"{path}: larger than {MAX_BYTES} bytes")
 
 
 def main(folder, names):
     unknown = set(names) - set(NEEDS)
     if unknown:
         sys.exit(f"no such picture: {', '.join(sorted(unknown))}; expected {', '.join(NEEDS)}")
-    if "COVOL_SCREEN" not in os.environ:  # never that of a person, whose windows would be in the way
+    if "COVOL_SCREEN" not in os.environ:  # never the user's own screen, whose windows would be in the way
         os.environ["COVOL_SCREEN"] = SCREEN
         os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", f"-screen 0 {SCREEN}", sys.executable, *sys.argv])
     from work import Work

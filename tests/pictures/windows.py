@@ -1,4 +1,4 @@
-"""Pictures of the windows of programs that Debian has, with covol's plugins in them. They need a screen, if only one in memory."""
+"""Pictures of the windows of programs that Debian has, with covol's plugins in them. They need a screen, which may be virtual."""
 import os
 import shutil
 import subprocess
@@ -54,7 +54,7 @@ def blender(work, path):
     subprocess.run([sys.executable, ROOT / "tools/plugins/pack.py", "blender", "--output", home], check=True, capture_output=True)
     [archive] = home.glob("covol_blender-*.zip")
     np.savetxt(home / "marks.xyz", work.marks)
-    stack = shutil.copy(work.stack, home)  # its path is seen
+    stack = shutil.copy(work.stack, home)  # the window shows the file's path
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(home / "scripts"), "COVOL": str(work.program)}
     done = subprocess.run(["blender", "--factory-startup", "--enable-event-simulate", "--python-exit-code", "1", "-p", "0", "0", "1100", "700",
                            "--python", ROOT / "tests/pictures/blender_window.py", "--", archive, stack, home / "marks.xyz", home],

@@ -1,4 +1,4 @@
-"""What the makers of pictures share: the sample stack and its marks, a folder, the program, and drawing."""
+"""Common to the scripts that make pictures: the sample stack and its marks, a folder, the program, and drawing."""
 import csv
 import os
 import pathlib
@@ -14,7 +14,7 @@ DATA = ROOT / "houdini_free_examples/data"
 
 
 class Work:
-    """A folder that goes when the pictures are made."""
+    """A folder that is removed when the pictures are done."""
 
     def __init__(self):
         self.program = pathlib.Path(os.environ.get("COVOL", "build/bin/covol")).resolve()
@@ -41,6 +41,6 @@ class Work:
 
 
 def crop(picture):
-    """Without the black of a screen that has no desktop."""
+    """Without the black area of a screen that has no desktop."""
     picture = picture.convert("RGB")
     return picture.crop(ImageChops.difference(picture, Image.new("RGB", picture.size)).getbbox())

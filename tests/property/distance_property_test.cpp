@@ -17,7 +17,7 @@ std::vector<Vec3> random_cloud(unsigned seed) {
     switch (seed % 4) {
         case 0: return sphere_cloud(count, 6.0, seed);
         case 1: return box_cloud(count, {{-7, -7, -7}, {7, 7, 7}}, seed);
-        case 2: return box_cloud(count, {{-7, -7, 1}, {7, 7, 1.001}}, seed);  // a sheet
+        case 2: return box_cloud(count, {{-7, -7, 1}, {7, 7, 1.001}}, seed);  // a thin sheet
         default: return box_cloud(count, {{-9, -9, -9}, {-3, 9, 9}}, seed);   // partly outside the domain
     }
 }

@@ -7,7 +7,7 @@
 #include "support/both_solvers.h"
 #include "support/shapes.h"
 
-// Facts about evolve() that hold for any field, on seeded random ones.
+// Properties of evolve() that hold for any fields, on seeded random ones.
 
 using namespace covol;
 using namespace covol::test;
@@ -58,7 +58,7 @@ TEST_CASE("min u0 <= u <= max u0 for every time step") {
         }
 }
 
-// Sums in another order may round a coefficient (16 bits) to the next unit.
+// Sums in a different order may round a coefficient (16 bits) to the next unit.
 constexpr double kRounding = 4e-4;  // h
 
 TEST_CASE("evolve() is the dense reference on random fields") {
@@ -69,7 +69,7 @@ TEST_CASE("evolve() is the dense reference on random fields") {
             p.options.attraction_range = 5 * kH;
             p.options.image_yields = 0.6;
         }
-        if (seed % 3 == 0) {  // frozen voxels inside
+        if (seed % 3 == 0) {  // frozen voxels inside the band
             const Function holes = random_waves(seed + 3000, 1.0);
             p.active = active_where(p.domain, p.u, [&](const Vec3& x) { return holes(x) < 0.3; });
         }
@@ -114,7 +114,7 @@ TEST_CASE("a shift by whole voxels shifts the result, wherever the leaves begin"
 }
 
 TEST_CASE("evolve() in a band is the dense double-precision solver on the zero level set") {
-    // Everything on: points in part of a sphere, an edge elsewhere, clamped start, frozen values outside the band.
+    // All options: points in part of a sphere, an edge elsewhere, a clamped start, frozen values outside the band.
     constexpr int n = 36;
     const Domain domain = cube_domain(n, kH, -7);
     const double radius = 3.0, start = 3.25;
@@ -154,7 +154,7 @@ TEST_CASE("evolve() in a band is the dense double-precision solver on the zero l
             seed, exact.count, moved, exact.max, exact.mean, usual.max, usual.mean);
         INFO("seed " << seed);
         CHECK(exact.count > 1000);
-        CHECK(moved > 0.8);  // else there is nothing to compare
+        CHECK(moved > 0.8);  // otherwise there is nothing to compare
         CHECK(exact.max < 1e-3);
         CHECK(usual.mean < 1e-3);
         CHECK(usual.max < 1e-2);

@@ -1,4 +1,4 @@
-"""A body whose place, size and orientation show: an ellipsoid of three different axes, turned; in voxels of a lattice."""
+"""A body that reveals its position, size and orientation: a rotated ellipsoid with three different axes, in voxels of a lattice."""
 import numpy as np
 import pyopenvdb
 
@@ -7,7 +7,7 @@ RADII, CENTRE = np.array([4.4, 3.3, 2.6]), np.array([6.3, 5.6, 4.4])
 
 
 def rotation(rng):
-    """Uniform, by a unit quaternion."""
+    """A uniform random rotation, from a unit quaternion."""
     w, x, y, z = (q := rng.normal(size=4)) / np.linalg.norm(q)
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -18,7 +18,7 @@ AXES = rotation(np.random.default_rng(5))  # of the body, in voxels
 
 
 def level(index):
-    """Of the body, in voxels: negative inside, about a distance."""
+    """Approximate distance to the body, in voxels: negative inside."""
     q = (np.asarray(index) - CENTRE) @ AXES / RADII
     r = np.linalg.norm(q, axis=-1)
     return (r - 1) * r / np.maximum(np.linalg.norm(q / RADII, axis=-1), 1e-9)
@@ -30,12 +30,12 @@ def indices():
 
 
 def image():
-    """[z, y, x]: the body, on a ramp that tells every voxel from its neighbours."""
+    """[z, y, x]: the body, on a ramp so that neighbouring voxels differ."""
     return (np.where(level(indices()) < 0, 150, 10) + indices() @ (1, 2, 3)).astype(np.uint8)
 
 
 def mesh_of_body():
-    """An icosahedron's faces, cut in four 4 times, on the body; in voxels."""
+    """An icosahedron's faces, subdivided 4 times and projected onto the body; in voxels."""
     golden = (1 + 5 ** 0.5) / 2
     vertices = [np.roll((0, a, b * golden), n) for n in range(3) for a in (-1, 1) for b in (-1, 1)]
     vertices = [v / np.linalg.norm(v) for v in vertices]
@@ -57,11 +57,11 @@ def mesh_of_body():
 
 
 MESH = mesh_of_body()
-VOXELS_OF_BODY = 0.7  # of the lattice's thinnest direction: edge of the level set's voxels
+VOXELS_OF_BODY = 0.7  # voxel size of the level set, relative to the lattice's smallest spacing
 
 
 def write_body(path, lattice):
-    """The body as a level set in the world of a lattice, about a round place near it: its vertices have single precision."""
+    """The body as a level set in the world of a lattice, relative to a round position near it: its vertices have single precision."""
     vertices, faces = MESH
     h = VOXELS_OF_BODY * np.linalg.svd(lattice.steps, compute_uv=False)[-1]
     near = np.round(lattice.world(CENTRE) / h)

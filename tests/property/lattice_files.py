@@ -1,7 +1,7 @@
 """Images on any lattice, written and read without covol: the formats' own libraries, else byte by byte.
 
-Each writer takes a path, voxels [z, y, x] of bytes, and a Lattice of the kind that it names; each reader gives the voxels
-and the lattice again.
+Each writer takes a path, voxels [z, y, x] of bytes, and a Lattice of the kind in its name; each reader returns the voxels and the
+lattice.
 """
 import dataclasses
 import re
@@ -26,7 +26,7 @@ PER_MM = {"nm": 1e6, "um": 1e3, "mm": 1.0, "cm": 0.1, "m": 1e-3, "angstrom": 1e7
 
 @dataclasses.dataclass
 class Lattice:
-    """Voxel (i, j, k) lies at origin + steps @ (i, j, k), LPS, in `unit` ("" where it is not known)."""
+    """Voxel (i, j, k) has the position origin + steps @ (i, j, k), LPS, in `unit` ("" if unknown)."""
     steps: np.ndarray
     origin: np.ndarray
     unit: str = ""
@@ -42,16 +42,16 @@ class Lattice:
         return np.linalg.norm(self.steps, axis=0)
 
     def upright(self, origin=True):
-        """The same spacing along the world's axes, for formats that hold no directions."""
+        """The same spacing along the world's axes, for formats that store no directions."""
         return Lattice(np.diag(self.spacing), self.origin if origin else np.zeros(3), self.unit)
 
     def rotated(self):
-        """The nearest right-angled axes of the same spacing."""
+        """The nearest orthogonal axes with the same spacing."""
         u, _, v = np.linalg.svd(self.steps / self.spacing)
         return Lattice(u @ v * self.spacing, self.origin, self.unit)
 
     def tilted(self):
-        """Axes of a stack of slices: i and j at right angles, k as it was."""
+        """Axes of a stack of slices: i and j are orthogonal, k is unchanged."""
         i, j, k = (self.steps / self.spacing).T
         j = j - i * (i @ j)
         return Lattice(np.stack([i, j / np.linalg.norm(j), k], 1) * self.spacing, self.origin, self.unit)
@@ -233,11 +233,11 @@ def write_imagej(path, data, lattice):
 
 def read_imagej(path):
     with tifffile.TiffFile(str(path)) as tiff:
-        told = tiff.imagej_metadata
+        stated = tiff.imagej_metadata
         x, y = (tiff.pages[0].tags[name].value for name in ("XResolution", "YResolution"))
-        spacing = np.array([x[1] / x[0], y[1] / y[0], float(told.get("spacing", 1))])
-        origin = -np.array([float(told.get(f"{a}origin", 0)) for a in "xyz"]) * spacing
-        unit = {"micron": "um", "\\u00B5m": "um", "pixel": ""}.get(told.get("unit", ""), told.get("unit", ""))
+        spacing = np.array([x[1] / x[0], y[1] / y[0], float(stated.get("spacing", 1))])
+        origin = -np.array([float(stated.get(f"{a}origin", 0)) for a in "xyz"]) * spacing
+        unit = {"micron": "um", "\\u00B5m": "um", "pixel": ""}.get(stated.get("unit", ""), stated.get("unit", ""))
         return tiff.asarray().reshape((-1, *tiff.pages[0].shape)), Lattice(np.diag(spacing), origin, unit)
 
 
@@ -273,8 +273,8 @@ def write_ome_zarr(path, data, lattice):
 
 def read_ome_zarr(path):
     group = zarr.open_group(str(path), "r")
-    told = group.attrs["multiscales"][0]
-    level = told["datasets"][0]
+    stated = group.attrs["multiscales"][0]
+    level = stated["datasets"][0]
     spacing, origin = np.ones(3), np.zeros(3)
     for step in level["coordinateTransformations"]:
         if step["type"] == "scale":
@@ -282,7 +282,7 @@ def read_ome_zarr(path):
         else:
             origin = np.array(step["translation"][::-1])
     return (np.asarray(group[level["path"]]),
-            Lattice(np.diag(spacing), origin, {v: k for k, v in LONG.items()}.get(told["axes"][0].get("unit"), "")))
+            Lattice(np.diag(spacing), origin, {v: k for k, v in LONG.items()}.get(stated["axes"][0].get("unit"), "")))
 
 
 def write_hdf5(path, data, lattice):
@@ -340,7 +340,7 @@ def read_mrc(path):
 def write_vdb(path, data, lattice):
     grid = pyopenvdb.FloatGrid()
     grid.copyFromArray(data.transpose(2, 1, 0).astype(np.float32), tolerance=-1)
-    matrix = np.eye(4)  # rows: OpenVDB multiplies from the left
+    matrix = np.eye(4)  # rows: OpenVDB multiplies vectors from the left
     matrix[:3, :3], matrix[3, :3] = lattice.steps.T, lattice.origin
     grid.transform = pyopenvdb.createLinearTransform(matrix.tolist())
     grid.name = "density"

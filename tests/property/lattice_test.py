@@ -1,12 +1,11 @@
-"""Any affine map from voxels to the world is a lattice: read from every format that can hold it, and written back.
+"""Any affine map from voxels to the world is a lattice: read from every format that can represent it, and written back.
 
     COVOL=build/bin/covol PYTHONPATH=build/python python3 -m pytest tests/property/lattice_test.py
     COVOL_LATTICES=1000 ...            # so many instead of 30
     COVOL_LATTICES=1000:250:500 ...    # of a thousand those from 250 to 499
 
-Each lattice is drawn by its number alone: spacings, rotation, order of axes, mirrors, shear, place, unit. Formats that hold
-no shear, or no directions, get the nearest lattice that they hold. Files are written and read without covol by
-lattice_files.py.
+Each lattice depends only on its number: spacings, rotation, order of axes, mirrors, shear, position, unit. Formats that store no
+shear, or no directions, get the nearest lattice that they can store. Files are written and read without covol by lattice_files.py.
 """
 import collections
 import os
@@ -28,14 +27,14 @@ from lattice_files import Lattice  # noqa: E402
 PROGRAM = os.environ.get("COVOL", "build/bin/covol")
 COUNT, FIRST, LAST = [*map(int, os.environ.get("COVOL_LATTICES", "30").split(":")), 0, 0][:3]
 
-MOST_VOXELS, LEAST_VOLUME = 2.0 ** 32, 0.05  # docs/formats.md: origins, sheared lattices
+MAX_VOXELS, MIN_VOLUME = 2.0 ** 32, 0.05  # docs/formats.md: origins, sheared lattices
 
 
 def draw(number):
     rng = np.random.default_rng([46, number])
     spacing = 10 ** rng.uniform(-2, 3) * rng.uniform(1, 5, 3)
     steps = np.eye(3)
-    if rng.random() < 0.5:  # shear, rarely as far as what must be refused
+    if rng.random() < 0.5:  # shear, which rarely is so strong that it must be refused
         steps += np.triu(rng.normal(0, 0.7, (3, 3)), 1)
         steps /= np.linalg.norm(steps, axis=0)
     steps = steps[:, rng.permutation(3)] * rng.choice([-1, 1], 3)
@@ -46,7 +45,7 @@ def draw(number):
     return Lattice(steps * spacing, origin, str(rng.choice(["um", "mm", "m", "nm", "cm"])))
 
 
-# By name: what the file is called, how it is written and read without covol, the lattice that it can hold, and its units.
+# By name: end of the file's name, writer and reader without covol, the lattices that it can store, and its units.
 Format = collections.namedtuple("Format", "ending write read hold units")
 ANY, UPRIGHT, SPACING = (lambda g: g), Lattice.upright, (lambda g: g.upright(origin=False))
 FORMATS = {
@@ -66,7 +65,7 @@ FORMATS = {
     "MRC": Format(".mrc", files.write_mrc, files.read_mrc, UPRIGHT, ("angstrom",)),
     "OpenVDB": Format(".vdb", files.write_vdb, files.read_vdb, ANY, ("",)),
 }
-# What masks are written as, by the lattices that the file holds.
+# Format in which masks are written, by the lattices that the file stores.
 MASKS = {
     ".nrrd": (files.read_nrrd, ANY), ".mha": (files.read_metaimage, ANY), ".nii.gz": (files.read_nifti, ANY),
     ".tif": (files.read_imagej, UPRIGHT), ".zarr": (files.read_ome_zarr, UPRIGHT), ".ome.tif": (files.read_ome_tiff, SPACING),
@@ -74,35 +73,35 @@ MASKS = {
 
 
 def held(lattice, hold):
-    """Whether a format that holds `hold` of a lattice holds all of it."""
+    """Whether a format that stores `hold` of a lattice stores all of it."""
     other = hold(lattice)
     return np.allclose(other.steps, lattice.steps, rtol=0, atol=1e-9 * lattice.spacing.max()) and \
         np.allclose(other.origin, lattice.origin)
 
 
 def refusal(lattice):
-    """What the message of a lattice that must not be read says; else None."""
-    if abs(np.linalg.det(lattice.steps / lattice.spacing)) < LEAST_VOLUME:
+    """Part of the error message for a lattice that must not be read, otherwise None."""
+    if abs(np.linalg.det(lattice.steps / lattice.spacing)) < MIN_VOLUME:
         return "nearly parallel"
-    if np.abs(lattice.origin).max() > MOST_VOXELS * lattice.spacing.min():
+    if np.abs(lattice.origin).max() > MAX_VOXELS * lattice.spacing.min():
         return "farther away voxels cannot be told apart"
     return None
 
 
 def shift(a, b):
-    """How far two lattices that are the same map the image's corners apart, in voxels."""
+    """Largest distance, in voxels, between the images' corners under two lattices that should be equal."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (SIZE - 1)
     return np.abs(b.index(a.world(corners)) - corners).max()
 
 
 def moments(data, lattice):
-    """Volume, centroid and covariance of what is bright."""
+    """Volume, centroid and covariance of the bright voxels."""
     places = lattice.world(np.argwhere(data.transpose(2, 1, 0) >= 140))
     return len(places) * abs(np.linalg.det(lattice.steps)), places.mean(0), np.cov(places.T)
 
 
 def same_body(found, truth):
-    """Differences in voxels of the true lattice: of volume (its cube root), centroid, covariance (its root)."""
+    """Differences in voxels of the true lattice: of volume (cube root), centroid, covariance (square root)."""
     volume, centroid, covariance = moments(*found)
     true_volume, true_centroid, true_covariance = moments(*truth)
     inverse = np.linalg.inv(truth[1].steps)
@@ -127,7 +126,7 @@ class Trial:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
 
     def run(self):
-        """"read", "refused", or what the mask was written as."""
+        """"read", "refused", or the format in which the mask was written."""
         self.format.write(self.path, image(), self.lattice)
         truth, lattice = self.format.read(self.path)
         assert np.array_equal(np.sort(truth.ravel()), np.sort(image().ravel()))
@@ -142,10 +141,10 @@ class Trial:
         if self.format.units != ("",):
             assert found.unit == lattice.unit, (found.unit, lattice.unit)
         differences = same_body((np.asarray(read.array), found), (truth, lattice))
-        # libtiff has TIFF's resolution in single precision, and ImageJ tells the origin in voxels.
+        # libtiff has TIFF's resolution in single precision, and ImageJ stores the origin in voxels.
         far = 1.2e-7 * np.abs(lattice.origin / lattice.spacing).max() if self.name == "ImageJ" else 0
         assert max(differences) < 0.01 + far, differences
-        # Voxel by voxel, whatever the order and direction of axes is.
+        # Voxel by voxel, whatever the order and direction of axes.
         places = lattice.index(found.world(indices()))
         at = np.round(places).astype(int)
         assert np.abs(places - at).max() < 0.01 + far

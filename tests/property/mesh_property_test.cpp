@@ -1,4 +1,4 @@
-// Meshes of random solids: closed, 2-manifold, outward, free of self-intersections, without slivers, of the level set's
+// Meshes of random solids: closed, 2-manifold, outward, free of self-intersections and slivers, with the level set's
 // topology.
 #include <catch2/catch.hpp>
 #include <cstdio>
@@ -25,7 +25,7 @@ void check_proper(const TriangleMesh& mesh, const MeshMeasures& expected) {
     CHECK(count_self_intersections(mesh) == 0);
 }
 
-/// The least value for each kind of solid.
+/// The minimum for each kind of solid.
 class Worst {
 public:
     void add(const std::string& kind, double value) {
@@ -55,7 +55,7 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         const MeshDeviation deviation = measure_deviation(*solid.level_set, mesh);
         const RelaxReport report = relax_mesh(mesh, *solid.level_set);
         check_proper(mesh, before);
-        // Parts thinner than the lattice resolves have no room for triangles as large as voxels.
+        // Parts thinner than the lattice resolves have no space for triangles as large as voxels.
         if (solid.resolved)
             CHECK(report.smallest_angle >= 20);
         else

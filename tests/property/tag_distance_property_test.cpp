@@ -1,4 +1,4 @@
-// The choice of D on real clouds, and the leak test at that D. Needs the folder of COVOL_DATA.
+// The choice of D on real clouds, and the leak test at that D. Needs COVOL_DATA.
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>

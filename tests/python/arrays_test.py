@@ -1,4 +1,4 @@
-"""Arrays of any strides and kind mean the same image, and are not copied where they need not be."""
+"""Arrays with any strides and number type give the same image, and are copied only if necessary."""
 import numpy as np
 import pytest
 
@@ -6,21 +6,21 @@ import covol
 
 
 def segment(array, like):
-    """Some steps of a flow that the image's edges move."""
+    """Some steps of a flow that depends on the image's edges."""
     return covol.segment(array, spacing=like.spacing, origin=like.origin, voxel_size="2vx", init="sphere:0,0,0,0.75",
                          coarse_levels=0, max_steps=4, delta="0.5vx").mask
 
 
 @pytest.fixture(scope="module")
 def expected(sphere):
-    """Of the sphere's voxels, 0 to 127, which every kind of number holds."""
+    """The voxels of the sphere, 0 to 127, which every number type represents."""
     mask = segment(sphere[0].array // 2, sphere[0])
-    assert not np.array_equal(mask, segment(np.roll(sphere[0].array, 3, 0), sphere[0]))  # the image has a say
+    assert not np.array_equal(mask, segment(np.roll(sphere[0].array, 3, 0), sphere[0]))  # the image has an effect
     return mask
 
 
 def strided(array, kind):
-    """The same values, laid out otherwise."""
+    """The same values with other strides and byte orders."""
     if kind == "fortran":
         return np.asfortranarray(array)
     if kind == "negative":
@@ -107,5 +107,5 @@ def test_results_are_arrays(solved, sphere):
     assert again.measure() == mesh.measure() and again.measure()["closed"]
     normals = mesh.normals
     outward = ((mesh.vertices - mesh.vertices.mean(0)) * normals).sum(1)
-    assert outward.min() > 0  # of a sphere
+    assert outward.min() > 0  # for a sphere
 

@@ -1,4 +1,4 @@
-"""How calls run: progress, Ctrl-C, other threads, errors."""
+"""How calls behave: progress, Ctrl-C, other threads, errors."""
 import json
 import logging
 import os
@@ -16,7 +16,7 @@ import covol
 
 
 def work(**more):
-    """Takes some seconds: a sphere in noise that flows."""
+    """A job that takes some seconds: a flow to a sphere in noise."""
     image, points, _ = covol.phantom("sphere", 128, 3000)
     return covol.segment(image, points, init="tag", max_steps=5000, tolerance=1e-12, tau=0.001, **more)
 
@@ -70,7 +70,7 @@ def test_ctrl_c():
 
 
 def test_other_threads_go_on():
-    """A thread that counts is not held up by one that computes."""
+    """A thread that counts is not blocked by one that computes."""
     counts, stop = [0], threading.Event()
     longest = [0.0]
 

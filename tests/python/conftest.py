@@ -1,4 +1,4 @@
-"""What the tests of the module covol share."""
+"""Common to the tests of the module covol."""
 import os
 import pathlib
 

@@ -1,4 +1,4 @@
-"""Files that others may have made are read in a program of covol's own, whatever else this process does."""
+"""Untrusted files are read in a separate program of covol, whatever this process does meanwhile."""
 import pathlib
 import shutil
 import subprocess
@@ -52,7 +52,7 @@ def write_dicom(folder, array):
 
 
 def test_busy_threads_stall_no_reader(tmp_path):
-    """A copy of a process waits for ever for a lock that another thread held, malloc's for one."""
+    """A forked copy of a process would wait forever for a lock that another thread holds, such as malloc's."""
     array = np.random.default_rng(1).integers(0, 200, SHAPE).astype(np.uint8)
     files = [tmp_path / "ascii.nrrd", tmp_path / "series", tmp_path / "voxels.h5"]
     for path, write in zip(files, (write_nrrd, write_dicom, write_hdf5)):
@@ -61,7 +61,7 @@ def test_busy_threads_stall_no_reader(tmp_path):
 
     def work():
         while not done.is_set():
-            np.sort(np.random.default_rng(2).random(20000))  # without the GIL
+            np.sort(np.random.default_rng(2).random(20000))  # releases the GIL
             "".join(str(n) for n in range(500))
 
     threads = [threading.Thread(target=work) for _ in range(8)]
@@ -78,10 +78,10 @@ def test_busy_threads_stall_no_reader(tmp_path):
         done.set()
         for thread in threads:
             thread.join()
-    assert slowest < 50  # a stall ends after 100 s; each takes a second at most
+    assert slowest < 50  # a deadlock ends after 100 s; otherwise each takes at most a second
 
 
-def test_a_module_without_its_compiled_part_says_how_to_build_it(tmp_path):
+def test_a_module_without_its_compiled_part_states_how_to_build_it(tmp_path):
     """As in the folder of a build of the program alone."""
     (tmp_path / "covol").mkdir()
     for file in pathlib.Path(covol.__file__).parent.glob("*.py"):

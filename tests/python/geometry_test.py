@@ -1,4 +1,4 @@
-"""Where voxels and points lie: as SimpleITK and nibabel have it, against files that nibabel and the program write."""
+"""Positions of voxels and points, according to SimpleITK and nibabel, against files that nibabel and the program write."""
 import subprocess
 
 import nibabel
@@ -12,7 +12,7 @@ SPACING, ORIGIN = (0.5, 0.75, 1.25), (10.0, -20.0, 30.0)
 
 
 def rotation():
-    """About x, y and z; its columns are unit vectors at right angles."""
+    """A rotation about x, y and z; its columns are orthonormal."""
     a, b, c = 0.4, -0.3, 0.7
     x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
@@ -21,13 +21,13 @@ def rotation():
 
 
 def to_world(ijk, spacing, origin, direction):
-    """TransformContinuousIndexToPhysicalPoint of SimpleITK: its own formula, not covol's."""
+    """SimpleITK's TransformContinuousIndexToPhysicalPoint: ITK's formula, independent of covol."""
     return np.asarray(origin) + (np.asarray(ijk) * spacing) @ np.asarray(direction).T
 
 
 @pytest.fixture(scope="module")
 def ellipsoid():
-    """A body in an image of 30 x 40 x 50 voxels (z, y, x) that lies turned in the world; marks in voxels (i, j, k) and there."""
+    """A body in an image of 30 x 40 x 50 voxels (z, y, x) that is rotated in the world; marks in voxels (i, j, k) and in the world."""
     direction = rotation()
     k, j, i = np.mgrid[0:30, 0:40, 0:50]
     center, radii = np.array([27.0, 18.0, 14.0]), np.array([16.0, 11.0, 8.0])
@@ -67,7 +67,7 @@ def test_points_in_voxels(ellipsoid):
     for given, space, order in [(marks, "index", "xyz"), (marks[:, ::-1], "index", "zyx"), (marks + 1, "index1", "xyz"),
                                 (marks * SPACING, "local", "xyz"), (world * (-1, -1, 1), "ras", "xyz")]:
         mask = covol.segment(image, given, points_space=space, points_order=order, **where).mask
-        assert (mask != expected).mean() < 1e-4, (space, order)  # rounding of positions alone
+        assert (mask != expected).mean() < 1e-4, (space, order)  # only positions are rounded
 
 
 def test_nibabel(tmp_path, ellipsoid, program):
@@ -81,7 +81,7 @@ def test_nibabel(tmp_path, ellipsoid, program):
         (nifti, {}), (image, {"affine": affine}), (tmp_path / "image.nii.gz", {}), (nibabel.load(tmp_path / "image.nii.gz"), {})]]
     assert dice(masks[0], labels) > 0.97
     for mask in masks[1:]:
-        assert (mask != masks[0]).mean() < 5e-4  # NIfTI keeps floats
+        assert (mask != masks[0]).mean() < 5e-4  # NIfTI stores floats
     read = covol.read_image(tmp_path / "image.nii.gz")
     assert np.array_equal(read.array, image) and np.allclose(read.affine, affine, atol=1e-5)
     covol.save_mask(tmp_path / "mask.nii.gz", masks[0], read)
@@ -96,7 +96,7 @@ def test_affine_and_back(ellipsoid):
     img = covol.Image(image, spacing=SPACING, origin=ORIGIN, direction=direction)
     spacing, origin, turned = covol.from_affine(img.affine)
     assert np.allclose(spacing, SPACING) and np.allclose(origin, ORIGIN) and np.allclose(turned, direction)
-    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])  # left-handed: allowed in NIfTI
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])  # left-handed, which NIfTI allows
     assert covol.segment(image, affine=mirrored, init="sphere:27,-18,14,6").mask[14, 18, 27] == 1
 
 

@@ -1,4 +1,4 @@
-"""What the module computes: measured, and the same as the program's results on the same files."""
+"""Results of the module: their accuracy, and agreement with the program's results for the same files."""
 import json
 import os
 import pathlib
@@ -48,7 +48,7 @@ def test_the_program_gives_the_same(tmp_path, program, kind, options):
         assert result.report[part] == theirs[part]
     assert result.warnings == theirs.get("warnings", [])
     assert any("not steady" in line for line in result.warnings) == (options.get("max_steps") == 2)
-    # arrays in memory are the same job
+    # arrays in memory give the same result
     read, marks = covol.read_image(image), covol.read_points(points)
     again = covol.segment(np.array(read.array), marks.array, spacing=read.spacing, origin=read.origin, **options)
     assert np.array_equal(again.mask, result.mask)
@@ -62,7 +62,7 @@ def test_a_real_stack(tmp_path, program):
     result = covol.segment(stack, marks, voxel_size=3)
     assert np.array_equal(result.mask, covol.read_image(tmp_path / "e.nrrd").array)
     held_out = covol.read_points(check).to_world(result.image)
-    assert covol.distances(held_out, result)["mean"] < 1.0  # voxels; docs/commands/segment.md says 0.74
+    assert covol.distances(held_out, result)["mean"] < 1.0  # voxels; docs/commands/segment.md states 0.74
     found = result.suggest(2)
     theirs = json.loads((tmp_path / "e.json").read_text())["evidence"]["suggestions"]
     assert len(found) == 2 and [(s.slice, s.area) for s in found] == [(s["slice"], s["area"]) for s in theirs]
@@ -98,7 +98,7 @@ def test_a_cloud_in_a_national_grid(tmp_path):
 
 
 def test_every_flag_is_an_option(program):
-    """Names are those of the flags, so that docs/commands tells of both; what is no option here is known."""
+    """Keywords have the names of the flags, so that docs/commands describes both; the flags without a keyword are listed here."""
     flags = {}
     for command in described(program)["commands"]:
         if command["name"] in ("segment", "reconstruct"):
@@ -113,11 +113,11 @@ def test_every_flag_is_an_option(program):
              "spacing"}
     files = {"output", "mask", "rtstruct", "mesh", "density", "fields", "table", "evidence", "suggest", "suggestions", "structure_column", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
-             "report", "keep_failed", "usda", "compression", "study"}  # of reading and writing, which are functions of their own
+             "report", "keep_failed", "usda", "compression", "study"}  # for reading and writing, which are separate functions
     later = {"brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
-    for name, default in ours.items():  # where help shows a number, it is the default here
+    for name, default in ours.items():  # a number shown in the help is also the default here
         shown = flags[name]["default"]
         try:
             number = float(shown)
@@ -139,7 +139,7 @@ def test_mesh_and_mask(tmp_path, solved, sphere):
     assert covol.compare(tmp_path / "s.nrrd", solved)["dice"] > 0.99
     assert np.array_equal(covol.mesh(tmp_path / "s.vdb").vertices, covol.mesh(solved.surface).vertices)
     solved.mesh.save(tmp_path / "up.ply", y_up=True)
-    solved.mesh.save(tmp_path / "up.glb")  # y-up by its format, and read so
+    solved.mesh.save(tmp_path / "up.glb")  # y-up according to its format, and read as such
     solved.surface.save(tmp_path / "half.vdb", half=True)
     assert (tmp_path / "half.vdb").stat().st_size < (tmp_path / "s.vdb").stat().st_size
     rotated = solved.mesh.vertices[:, [0, 2, 1]] * (1, 1, -1)
@@ -155,7 +155,7 @@ def image_of(labels, like):
 
 
 def test_contours_paint_and_guesses(sphere):
-    """Other kinds of marks reach the library."""
+    """Other kinds of marks are passed to the library."""
     image, points, labels = sphere
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     lines = []
@@ -225,15 +225,15 @@ def test_several_structures(tmp_path, program):
         assert result.report["fit"]["points_to_surface"]["bias"] > 0.05 and result.report["fit"]["marks_off"]["count"] > 0
     (overlap,) = found.overlaps
     assert overlap["structures"] == ("left", "right") and overlap["volume"] > 10
-    # the program, with the same files
+    # the program with the same files
     covol.save_mask(tmp_path / "i.nrrd", np.asarray(image.array, np.uint8), image)
     for name, marks in points.items():
         np.savetxt(tmp_path / f"{name}.xyz", marks, "%.17g")
     run(program, "segment", tmp_path / "i.nrrd", "--points", *(f"{name}={tmp_path / name}.xyz" for name in points), "--rho", 0,
         "-o", tmp_path / "s.vdb", "--mesh", tmp_path / "s.ply", "--mask", tmp_path / "m.nrrd", "--json", tmp_path / "r.json")
     assert np.array_equal(covol.read_image(tmp_path / "m.nrrd").array, found.mask)
-    told = json.loads((tmp_path / "r.json").read_text())["structures"]
-    assert [s["fit"] for s in told] == [r.report["fit"] for r in found.values()]
+    reported = json.loads((tmp_path / "r.json").read_text())["structures"]
+    assert [s["fit"] for s in reported] == [r.report["fit"] for r in found.values()]
 
 
 def test_structures_from_paint_seeds_and_names():
@@ -260,22 +260,22 @@ def test_timelapse():
     frames = [np.roll(image.array, n, axis=0) for n in range(3)]  # by a voxel along z
     geometry = {"spacing": image.spacing, "origin": image.origin}
     first = {"left": points["left"]}
-    asked = []
+    requested = []
 
     def read():
         for frame in (frames[0], np.zeros((0, 3, 3)), *frames[1:]):
-            asked.append(len(asked))
+            requested.append(len(requested))
             yield frame
 
     found = covol.timelapse(read(), {**first, "right": points["right"]}, **geometry)
     next(found)
-    assert asked == [0]
+    assert requested == [0]
     failed, second, third = found
     assert isinstance(failed, covol.Error) and list(third) == ["left", "right"]
     heights = [r["left"].mesh.vertices[:, 2].mean() for r in (second, third)]
     assert heights[1] - heights[0] == pytest.approx(0.5, abs=0.2)
     assert second["left"].report["input"]["points"]["count"] == 0
-    # of one structure, with marks of a later frame
+    # one structure, with marks for a later frame
     alone = list(covol.timelapse([frames[0], (frames[1], points["left"] + (0, 0, 0.5))], points["left"], rho=0, **geometry))
     assert [r.report["input"]["points"]["count"] for r in alone] == [1000, 1000]
     assert alone[1].mesh.vertices[:, 2].mean() == pytest.approx(0.5, abs=0.1)

@@ -1,4 +1,4 @@
-"""covol.mark(): a study beside a notebook, and what it says of itself."""
+"""covol.mark(): a study next to a notebook, and its representation there."""
 import json
 import os
 import pathlib

@@ -1,4 +1,4 @@
-"""The plugin of napari, as far as it can be tested without napari: its manifest, and what becomes of layers."""
+"""The napari plugin, as far as it can be tested without napari: its manifest, and the conversion of layers."""
 import ast
 import pathlib
 import re
@@ -24,7 +24,7 @@ def manifest():
 
 
 def test_manifest_rules():
-    """What npe2 asks of a manifest: names, ids of commands, where they lead."""
+    """The requirements of npe2 for a manifest: names, ids of commands, their functions."""
     m = manifest()
     assert re.fullmatch(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?", m["name"])
     assert 3 <= len(m["display_name"]) <= 90 and m["display_name"] == m["display_name"].strip()
@@ -69,7 +69,7 @@ def test_transforms():
 
 @pytest.fixture(scope="module")
 def scene():
-    """A ball in an image layer that is scaled, turned and moved, with marks in a layer of their own."""
+    """A ball in an image layer that is scaled, rotated and moved, with marks in a layer with a transform of its own."""
     k, j, i = np.mgrid[0:24, 0:36, 0:40]
     r = np.sqrt(((k - 12) * 1.5)**2 + (j - 18)**2 + (i - 20)**2)  # world units: a ball of radius 12
     labels = (r < 12).astype(np.uint8)
@@ -133,7 +133,7 @@ def test_what_is_no_image(layer):
 
 
 def test_a_sheared_image(scene):
-    """Its ball is an ellipsoid in the world, and the mask is on its own voxels again."""
+    """The ball is an ellipsoid in the world, and the mask has the layer's voxels."""
     image, labels, voxels, _ = scene
     sheared = Layer(data=image.data, scale=[3, 2, 2], shear=[0.5, 0, 0])
     points = Layer(data=voxels, scale=[3, 2, 2], shear=[0.5, 0, 0])
@@ -144,7 +144,7 @@ def test_a_sheared_image(scene):
 
 
 class Viewer:
-    """What layers.show() uses of napari's viewer, by its documentation: `layers`, add_labels(), add_surface(), add_points()."""
+    """The members of napari's viewer that layers.show() uses, by its documentation: `layers`, add_labels(), add_surface(), add_points()."""
 
     def __init__(self):
         self.layers = []

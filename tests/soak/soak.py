@@ -1,11 +1,11 @@
-"""Many jobs: in one process without growth, eight at once, five kinds killed at random moments over their old outputs, and
-random ones that are killed or interrupted.
+"""Many jobs: in one process without growth of memory, eight at once, five kinds killed at random times while they replace old
+outputs, and random ones that are killed or interrupted.
 
     COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 tests/soak/soak.py [--jobs 2000] [--kills 100]
         [--minutes 20] [--seed 1] [--only one_process|eight_at_once|old_or_new|random_kills]
 
-Prints what it did, a line for each part, and ends with exit code 1 where anything went wrong. Needs numpy, for the first
-part the Python module (left out, with a word, where it is not there).
+Prints a line for each part, and ends with exit code 1 if anything went wrong. Needs numpy, and for the first part the Python
+module (otherwise that part is left out, with a message).
 """
 import argparse
 import gc
@@ -24,9 +24,9 @@ import warnings
 import numpy as np
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
-ALLOWED = {0, 3, 130}  # done, refused, interrupted
-LOADING = 0.4          # seconds, of the program's libraries on a busy machine
-GROWTH = 24 << 20      # of all jobs together, after the first tenth of them: pools of threads and pages settle
+ALLOWED = {0, 3, 130}  # success, refused, interrupted
+LOADING = 0.4          # seconds to load the program's libraries on a busy machine
+GROWTH = 24 << 20      # for all jobs together after the first tenth, during which thread pools and memory settle
 
 
 def resident():
@@ -51,7 +51,7 @@ def one_process(jobs, seed):
             else:
                 covol.segment(image, points[:3 if n % 2 else 200])
         except covol.Error:
-            pass  # refused marks are a job, too
+            pass  # a job with refused marks counts, too
         if n % max(1, jobs // 20) == 0:
             gc.collect()
             held.append(resident())
@@ -61,7 +61,7 @@ def one_process(jobs, seed):
 
 
 class Folder:
-    """A few inputs, and random jobs on them."""
+    """A few inputs, and random jobs that use them."""
 
     def __init__(self, folder, seed):
         self.path, self.generator = pathlib.Path(folder), random.Random(seed)
@@ -75,7 +75,7 @@ class Folder:
                                     stderr=errors)
 
     def job(self, n):
-        """@return words, outputs"""
+        """@return arguments, outputs"""
         r, shape = self.generator, self.generator.choice(("sphere", "torus"))
         out = f"o{n}"
         marks = ["--points", f"{shape}.xyz"]
@@ -95,7 +95,7 @@ class Folder:
         return words, [f"{out}{ending}" for ending in endings]
 
     def problems(self, code, words, outputs):
-        """Of a job that is over."""
+        """Problems after a job that has ended."""
         there = [name for name in outputs if (self.path / name).exists()]
         if code not in ALLOWED | {-signal.SIGKILL}:
             return [f"exit code {code}: covol {' '.join(map(str, words))}"]
@@ -124,7 +124,7 @@ def eight_at_once(seed):
 
 
 class Kind:
-    """One kind of job, with two choices of options that write different things over each other."""
+    """One kind of job, with two choices of options that replace each other's outputs by different ones."""
 
     def __init__(self, folder, words, choices, outputs):
         self.folder, self.words, self.choices, self.outputs = folder, words, choices, outputs
@@ -141,7 +141,7 @@ class Kind:
         return self.folder.run(*self.words, *self.choices[choice])
 
     def state(self):
-        """Of each output, a folder of files too; of a report the surface, for it holds times."""
+        """A digest of each output, including folders; of a report only the surface, because a report contains times."""
         def digest(path):
             if path.suffix == ".json" and path.parent == self.folder.path:
                 return json.dumps(json.loads(path.read_bytes())["surface"], sort_keys=True)
@@ -155,7 +155,7 @@ class Kind:
 
 
 def old_or_new(kills, seed):
-    """Each job is killed at a moment of its own time, at random, and begins the next time over what it left."""
+    """Each job is killed at a random time within its duration, and then starts again over what it left."""
     with tempfile.TemporaryDirectory(prefix="covol_soak_") as path:
         folder, wrong, lines = Folder(path, seed), [], []
         for words, choices, outputs in (
@@ -174,12 +174,12 @@ def old_or_new(kills, seed):
                 time.sleep(folder.generator.uniform(0, kind.seconds))
                 run.kill()
                 code = run.wait()
-                folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()  # clears up after it
+                folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()  # removes what it left
                 hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
                 state = kind.state()
                 if hidden or state not in kind.sets:
                     wrong.append(f"{words[0]}, kill {killed}: left {hidden}, {state}")
-                    kind.start(last).wait()  # from here on again
+                    kind.start(last).wait()  # restores the outputs before
                     state = kind.state()
                 killed += code != 0
                 new += state == kind.sets[1 - last] and code != 0
@@ -206,13 +206,13 @@ def random_kills(minutes, seed):
             if how not in (None, signal.SIGKILL) and time.monotonic() - begin > 10:
                 wrong.append(f"{how.name} took {time.monotonic() - begin:.1f} s: {words}")
             ended[code] = ended.get(code, 0) + 1
-            # The next run in the folder clears up after one that was killed, and completes the set that it had begun.
+            # The next run in the folder removes what a killed one left, and completes the set of files that it had begun to publish.
             folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()
             (folder.path / "next.nrrd").unlink()
             there = [name for name in outputs if (folder.path / name).exists()]
             if code == -signal.SIGKILL and there not in ([], outputs):
                 wrong.append(f"killed, and left {there} of {outputs}")
-            # Before main() a signal ends a process that has touched nothing yet.
+            # Before main() a signal ends a process that has not touched any file.
             early = how is not None and code == -how and waited < LOADING and not there
             if not early:
                 wrong += folder.problems(code, words, outputs)

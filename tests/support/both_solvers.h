@@ -6,19 +6,19 @@
 #include "support/dense_reference.h"
 #include "support/shapes.h"
 
-// One problem, put to covol::evolve() and to the dense reference.
+// One problem, solved by covol::evolve() and by the dense reference.
 namespace covol::test {
 
 struct Problem {
     Domain domain;
-    DenseField u;  ///< where the step starts; rounded() for a comparison between the two
+    DenseField u;  ///< where the step starts; rounded() to compare the two
     std::vector<char> active;
     DenseField distance;  ///< empty: none
     DenseField edge;      ///< empty: none
     DenseOptions options;
 };
 
-/// Every voxel of a cube active, with the given start.
+/// A cube whose voxels are all active, with the given start.
 inline Problem whole_cube(int n, double h, const Function& u, int first = 0) {
     Problem p;
     p.domain = cube_domain(n, h, first);
@@ -45,7 +45,7 @@ inline DenseField run_dense(const Problem& p, int steps) {
     return u;
 }
 
-/// evolve()'s options for a run of exactly `steps` steps, solved far below float's precision.
+/// Options of evolve() for exactly `steps` steps, solved far below float's precision.
 inline EvolveOptions evolve_options(const DenseOptions& o, int steps) {
     EvolveOptions e;
     e.theta = o.theta;

@@ -10,7 +10,7 @@
 
 #include "covol/domain.h"
 
-// Point clouds for tests, and facts about grids.
+// Point clouds for tests, and properties of grids.
 namespace covol::test {
 
 /// Random points on a sphere.
@@ -52,7 +52,7 @@ inline float value_at(const FloatGrid& grid, const Vec3& world) {
     return grid.tree().getValue({int(std::lround(at[0])), int(std::lround(at[1])), int(std::lround(at[2]))});
 }
 
-/// Same topology, same bits.
+/// Same topology and bitwise equal values.
 inline bool identical(const FloatGrid& a, const FloatGrid& b) {
     if (!a.tree().hasSameTopology(b.tree())) return false;
     auto other = b.tree().cbeginLeaf();
@@ -61,7 +61,7 @@ inline bool identical(const FloatGrid& a, const FloatGrid& b) {
     return true;
 }
 
-/// Voxels with a value below 0, tiles included.
+/// Number of voxels with a value below 0, including tiles.
 inline double negative_volume(const FloatGrid& grid) {
     double n = 0;
     for (auto value = grid.tree().cbeginValueAll(); value; ++value)

@@ -10,7 +10,7 @@ namespace {
 double norm(const Gradient& g) { return std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]); }
 double regularised(double x, double epsilon) { return std::sqrt(epsilon * epsilon + x * x); }
 
-constexpr int kSweepsOfTrial = 500;  // of over-relaxation
+constexpr int kTrialSweeps = 500;  // with over-relaxation
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
@@ -29,20 +29,20 @@ Matrix inverse(const Matrix& m) {
 
 /// A tetrahedron next to a voxel's centre p, in units of h: its other corners are q and two vertices of their face.
 struct Tetrahedron {
-    std::array<int, 3> q;                      // as an offset in voxels
+    std::array<int, 3> q;                      // offset in voxels
     std::array<std::array<int, 3>, 2> vertex;  // each component 0 or 1: the vertex at p + vertex - 1/2
-    Matrix gradient;                           // takes (u_q - u_p, u_a - u_p, u_b - u_p) to h ∇u
+    Matrix gradient;                           // maps (u_q - u_p, u_a - u_p, u_b - u_p) to h ∇u
 };
 
-/// The four edges of each of the six faces. The gradient of the linear function through four points solves
-/// (x_c - x_p) . ∇u = u_c - u_p for the three other corners c.
+/// One for each of the four edges of each of the six faces. The gradient of the linear function through four points
+/// solves (x_c - x_p) . ∇u = u_c - u_p for the three other corners c.
 std::array<Tetrahedron, 24> make_tetrahedra() {
     std::array<Tetrahedron, 24> all;
     int l = 0;
     for (const auto& q : kFaces) {
         const int axis = q[0] != 0 ? 0 : q[1] != 0 ? 1 : 2;
         const int s = (axis + 1) % 3, t = (axis + 2) % 3;
-        constexpr int around[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};  // the face's corners in a circle
+        constexpr int around[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};  // the face's corners in cyclic order
         for (int edge = 0; edge < 4; ++edge) {
             Tetrahedron& tetrahedron = all[l++];
             tetrahedron.q = q;
@@ -132,7 +132,7 @@ Curvature curvature(const std::array<Gradient, 24>& gradients, const DenseOption
 
 double difference(const DenseField& field, std::size_t p, std::size_t q) {
     const double d = field[q] - field[p];
-    return std::isnan(d) ? 0.0 : d;  // not known at p or q
+    return std::isnan(d) ? 0.0 : d;  // unknown at p or q
 }
 
 bool inside(const DenseField& u, int i, int j, int k) {
@@ -151,13 +151,14 @@ std::array<std::array<int, 3>, 26> voxels_around() {
 }
 
 /// The six of kFaces first.
-const std::array<std::array<int, 3>, 26> kAround = voxels_around();
+const std::array<std::array<int, 3>, 26> kNeighbours26 = voxels_around();
 
 std::vector<std::ptrdiff_t> offsets(const DenseField& u, bool all_26) {
     std::vector<std::ptrdiff_t> result;
-    for (std::size_t q = 0; q < (all_26 ? kAround.size() : kFaces.size()); ++q)
-        result.push_back(static_cast<std::ptrdiff_t>(u.index(kAround[q][0], kAround[q][1], kAround[q][2])) -
-                         static_cast<std::ptrdiff_t>(u.index(0, 0, 0)));
+    for (std::size_t q = 0; q < (all_26 ? kNeighbours26.size() : kFaces.size()); ++q)
+        result.push_back(
+            static_cast<std::ptrdiff_t>(u.index(kNeighbours26[q][0], kNeighbours26[q][1], kNeighbours26[q][2])) -
+            static_cast<std::ptrdiff_t>(u.index(0, 0, 0)));
     return result;
 }
 
@@ -268,7 +269,8 @@ DenseSystem assemble(const DenseField& u, const std::vector<char>& active, const
                 system.voxel.push_back(p);
                 system.right_side.push_back(u[p]);
                 for (std::size_t q = 0; q < v.size(); ++q) {
-                    const bool flows = inside(u, i + kAround[q][0], j + kAround[q][1], k + kAround[q][2]);
+                    const bool flows =
+                        inside(u, i + kNeighbours26[q][0], j + kNeighbours26[q][1], k + kNeighbours26[q][2]);
                     const double a = advection * std::min(v[q], 0.0) - (q < 6 ? diffusion * c.m * c.w[q] : 0.0);
                     system.a.push_back(flows ? a : 0.0);
                 }
@@ -285,7 +287,7 @@ int solve(const DenseSystem& system, DenseField& u, const DenseOptions& options)
         largest_value = std::max(largest_value, std::abs(system.right_side[row]));
     }
     const double rounding = 1e-12 * largest_value;
-    // The best factor for the diffusion of a regular row; rows at kinks of u are larger, but few.
+    // The optimal factor for the diffusion of a regular row; rows at kinks of u are larger, but few.
     const double row_sum = 4 * options.tau * options.delta / (u.h() * u.h()), jacobi = row_sum / (1 + row_sum);
     double omega = 2 / (1 + std::sqrt(1 - jacobi * jacobi));
     double first = 0;
@@ -304,8 +306,8 @@ int solve(const DenseSystem& system, DenseField& u, const DenseOptions& options)
             u.mirror_ghosts();
             return sweep;
         }
-        // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
-        if (omega > 1 && (residual > 100 * first || sweep == kSweepsOfTrial)) {
+        // Over-relaxation may diverge if advection dominates; Gauss-Seidel converges for every M-matrix.
+        if (omega > 1 && (residual > 100 * first || sweep == kTrialSweeps)) {
             omega = 1;
             for (std::size_t row = 0; row < rows; ++row) u[system.voxel[row]] = system.right_side[row];
         }

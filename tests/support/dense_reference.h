@@ -3,9 +3,10 @@
 #include <cstddef>
 #include <vector>
 
-// The scheme of covol, Eqs. (14)-(22), once more: naive, dense and in double precision. It shares no code with
-// covol, so that what both compute is what the equations say. Voxels are cells of edge h; an inactive voxel keeps its
-// value; the domain's boundary is homogeneous Neumann, by a layer of ghost voxels that mirror the layer inside.
+// A second implementation of covol's scheme, Eqs. (14)-(22): naive, dense and in double precision. It has no code in
+// common with covol, so that agreement of the two confirms the equations. Voxels are cells of edge h; an inactive voxel
+// keeps its value; the domain's boundary is homogeneous Neumann, by a layer of ghost voxels that mirror the layer
+// inside.
 namespace covol::test {
 
 /// Values at voxels 0 <= (i,j,k) < size, and one layer of ghosts around them.
@@ -26,9 +27,9 @@ public:
     [[nodiscard]] double at(int i, int j, int k) const { return values_[index(i, j, k)]; }
     [[nodiscard]] double& operator[](std::size_t index) { return values_[index]; }
     [[nodiscard]] double operator[](std::size_t index) const { return values_[index]; }
-    /// Of the padded array.
+    /// The size of the padded array.
     [[nodiscard]] std::size_t size() const { return values_.size(); }
-    /// Sets each ghost to the voxel that it mirrors.
+    /// Sets each ghost to the value of the voxel that it mirrors.
     void mirror_ghosts();
 
 private:
@@ -37,8 +38,8 @@ private:
     std::vector<double> values_;
 };
 
-/// The paper as printed, one switch for each error that covol corrects. Tests switch one on to show which identity
-/// it breaks. The printed text is not quoted here; each switch is the form that its correction implies.
+/// The paper as printed, with one switch for each error that covol corrects. Tests set one of them to show which
+/// identity it violates. The printed text is not quoted here; each switch is the form that its correction implies.
 struct PrintedForm {
     bool bottom_velocity = false;  ///< the point term of v at the -z face has the sign of the other faces' formulas
     bool root = false;             ///< √(ε²+|∇u_T|) instead of √(ε²+|∇u_T|²)
@@ -47,7 +48,7 @@ struct PrintedForm {
     bool gradient_norm = false;    ///< M takes the mean of |∇u_T|_ε, so that ε enters twice
 };
 
-/// As covol::EvolveOptions, but explicit: no field has a meaning such as "one voxel".
+/// Like covol::EvolveOptions, but explicit: no value has a symbolic meaning such as "one voxel".
 struct DenseOptions {
     double theta = 0.0;
     double rho = 0.0;
@@ -57,7 +58,7 @@ struct DenseOptions {
     double edge_epsilon = 1e-3;     ///< slope of g per voxel
     double attraction_range = 0.0;  ///< 0: unlimited
     double image_yields = 0.0;
-    /// a solve ends when no Gauss-Seidel correction exceeds this share of the first sweep's
+    /// a solve ends when no Gauss-Seidel correction exceeds this fraction of the first sweep's
     double solver_tolerance = 1e-10;
     int max_sweeps = 100000;
     PrintedForm printed;
@@ -75,18 +76,18 @@ using Gradient = std::array<double, 3>;
 /// @pre u's ghosts are mirrored.
 [[nodiscard]] std::array<Gradient, 24> tetrahedron_gradients(const DenseField& u, int i, int j, int k);
 
-/// 1 up to range/2, a smooth step down to 0 at range; 1 everywhere when range is 0.
+/// 1 up to range/2, then a smooth step to 0 at range; 1 everywhere if range is 0.
 [[nodiscard]] double attraction_taper(double distance, double range);
 /// The integral of attraction_taper from 0 to distance.
 [[nodiscard]] double attraction_potential(double distance, double range);
 
-/// The fields of Eq. (3), null where the weight is 0. NaN: not known there, no pull across that voxel's faces.
+/// The fields of Eq. (3), null if the weight is 0. NaN: unknown there, no pull across that voxel's faces.
 struct DenseFields {
     const DenseField* distance = nullptr;
     const DenseField* edge = nullptr;
 };
 
-/// One time step's matrix: u_p + Σ_q a_pq (u_q - u_p) = u_p of the step before.
+/// The matrix of one time step: u_p + Σ_q a_pq (u_q - u_p) = u_p of the step before.
 struct DenseSystem {
     std::vector<std::ptrdiff_t> neighbour;  ///< offset of each q from p in a DenseField; six unless printed.neighbours
     std::vector<std::size_t> voxel;         ///< the active voxels, by their position in a DenseField
@@ -94,20 +95,20 @@ struct DenseSystem {
     std::vector<double> right_side;         ///< for each of `voxel`
 };
 
-/// @param active  by position in a DenseField: not 0 where u may change. Ghosts are never active.
+/// @param active  by position in a DenseField: nonzero if u may change there. Ghosts are never active.
 [[nodiscard]] DenseSystem assemble(const DenseField& u, const std::vector<char>& active, const DenseFields& fields,
                                    const DenseOptions& options);
 
-/// Successive over-relaxation in lexicographic order, options.tau and delta choosing the factor. Returns the number of
-/// sweeps, max_sweeps + 1 when that was not enough.
+/// Successive over-relaxation in lexicographic order, with the factor chosen from options.tau and delta. Returns the
+/// number of sweeps, or max_sweeps + 1 if that was not enough.
 int solve(const DenseSystem& system, DenseField& u, const DenseOptions& options);
 
-/// `steps` time steps; returns the mean number of sweeps in a step.
-/// @throws std::runtime_error when a solve does not converge.
+/// `steps` time steps; returns the mean number of sweeps in a step. @throws std::runtime_error if a solve does not
+/// converge.
 double dense_evolve(DenseField& u, const std::vector<char>& active, const DenseFields& fields,
                     const DenseOptions& options, int steps);
 
-/// Every voxel, no ghost.
+/// All voxels, but no ghosts.
 [[nodiscard]] std::vector<char> all_active(const DenseField& u);
 
 /// The implicit heat equation over `time`, in `steps` steps of backward Euler.

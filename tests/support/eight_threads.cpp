@@ -1,4 +1,4 @@
-// Every test program may use eight threads, also where there are fewer cores: tests compare bits of 1, 2 and 8.
+// Allows every test program eight threads, even on fewer cores: tests compare results of 1, 2 and 8 bit by bit.
 #include <tbb/global_control.h>
 
 namespace {

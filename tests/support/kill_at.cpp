@@ -1,5 +1,5 @@
-/// Preloaded into a program, or part of it: kills it before its KILL_AT-th call (from 1) of those that put files in
-/// place, as a power cut or the system's out-of-memory killer would. 0 or unset: never.
+/// Preloaded into a program, or linked into it: kills it before its KILL_AT-th call (from 1) of those that put files in
+/// place, as a power failure or the out-of-memory killer would. 0 or unset: never.
 #include <dlfcn.h>
 #include <sys/types.h>
 
@@ -31,7 +31,7 @@ int pass_on(const char* name, Arguments... arguments) {
 }  // namespace
 
 extern "C" {
-/// Counts anew.
+/// Restarts the count.
 void covol_kill_before(long number) {
     counted().calls = 0;
     counted().last = number;

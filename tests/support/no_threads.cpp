@@ -1,5 +1,5 @@
-/// Preloaded into a program: its FAIL_FROM-th call (from 1) that makes a thread or starts a process fails, and all
-/// after it, as where a limit of processes is reached. 0 or unset: none.
+/// Preloaded into a program: its FAIL_FROM-th call (from 1) that creates a thread or a process fails, and so do all
+/// later ones, as if a limit of processes were reached. 0 or unset: none.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <spawn.h>

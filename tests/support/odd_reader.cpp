@@ -1,4 +1,4 @@
-/// A reading program for io/child_test.cpp: the text of a piece says what it does.
+/// A reading program for io/child_test.cpp: the text of a piece determines its behaviour.
 #include <fcntl.h>
 #include <unistd.h>
 

@@ -13,13 +13,14 @@
 #include "covol/domain.h"
 #include "covol/surface.h"
 
-// Level sets of random solids of several kinds, hard on purpose: thin parts, parts that touch, values at or next to 0.
+// Level sets of random solids of several kinds, which are difficult on purpose: thin parts, parts that touch, values at
+// or next to 0.
 namespace covol::test {
 
 struct RandomSolid {
     std::string name;
     FloatGridPtr level_set;
-    bool resolved = true;  ///< no part is so thin that the lattice misses some of it
+    bool resolved = true;  ///< no part is so thin that the lattice misses any of it
 };
 
 class SolidMaker {
@@ -47,7 +48,7 @@ public:
     }
 
 private:
-    using Shape = std::function<double(const Vec3&)>;  ///< of the index, voxels
+    using Shape = std::function<double(const Vec3&)>;  ///< of the index, in voxels
 
     double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
     int pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
@@ -67,7 +68,7 @@ private:
                 middle_[2] + uniform(-reach, reach)};
     }
 
-    /// A sum of plane waves of these lengths in voxels, over the root mean square of its slope.
+    /// A sum of plane waves with these lengths in voxels, divided by the root mean square of its slope.
     Shape waves(double shortest, double longest) {
         struct Wave {
             Vec3 k;
@@ -99,7 +100,7 @@ private:
         const double r = thin ? uniform(0.4, 1.3) : uniform(2, 6), size = uniform(3, 8);
         switch (pick(0, 3)) {
             case 0: return [=](const Vec3& p) { return norm(minus(p, c)) - size; };
-            case 1: {  // a box, turned
+            case 1: {  // a rotated box
                 Vec3 e = direction();
                 const double along = dot(e, d);
                 for (int a = 0; a < 3; ++a) e[a] -= along * d[a];
@@ -180,7 +181,7 @@ private:
         return grid;
     }
 
-    /// A solid that reaches beyond some of a box's faces, which lie anywhere between the layers of voxels.
+    /// A solid that extends beyond some faces of a box, which lie at arbitrary positions between the layers of voxels.
     FloatGridPtr clipped() {
         const Shape shape = pick(0, 1) == 0 ? csg(false) : within(16, waves(12, 40));
         WorldBox box = domain_.world_box();

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <fstream>
 
-/// Memory that this program has now, in bytes.
+/// Resident memory of this program, in bytes.
 inline std::uint64_t resident_bytes() {
     std::uint64_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages >> pages;

@@ -11,7 +11,7 @@
 
 #include "covol/error.h"
 
-/// A folder of its own for one test, gone when the test ends.
+/// A folder for one test, which is removed when the test ends.
 class Scratch {
 public:
     Scratch() {
@@ -45,7 +45,7 @@ inline std::string bytes_of(const std::string& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The message of the covol::Error that `call` throws; empty when it throws none.
+/// The message of the covol::Error that `call` throws; empty if it throws none.
 inline std::string message_of(const std::function<void()>& call) {
     try {
         call();
@@ -55,7 +55,7 @@ inline std::string message_of(const std::function<void()>& call) {
     return {};
 }
 
-/// The code of the covol::Error that `call` throws; its message begins with `begin`. Anything else is an exception.
+/// The code of the covol::Error that `call` throws; its message begins with `begin`. Other exceptions are passed on.
 inline covol::Errc code_of(const std::function<void()>& call, const std::string& begin = "") {
     try {
         call();
@@ -73,7 +73,8 @@ struct FuzzCounts {
     int flipped = 0;
 };
 
-/// Reads truncated and bit-flipped versions of a good file; whatever is not a covol::Error goes through to the test.
+/// Reads truncated and bit-flipped versions of a good file; exceptions other than covol::Error are passed on to the
+/// test.
 inline FuzzCounts fuzz(const Scratch& scratch, const std::string& good,
                        const std::function<void(const std::string&)>& read, int tries = 60,
                        std::size_t header_bytes = 400) {

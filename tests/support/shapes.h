@@ -57,13 +57,13 @@ inline DenseField sample(const Domain& d, const Function& f) {
     return field;
 }
 
-/// The values rounded to float, as covol's grids hold them: a fair start for a comparison.
+/// The values rounded to float, as in covol's grids: the same start for a comparison.
 inline DenseField rounded(DenseField field) {
     for (std::size_t p = 0; p < field.size(); ++p) field[p] = static_cast<float>(field[p]);
     return field;
 }
 
-/// Not 0 where keep(world) holds, as dense_evolve takes it.
+/// Nonzero if keep(world) holds, in the form that dense_evolve() takes.
 inline std::vector<char> active_where(const Domain& d, const DenseField& shape,
                                       const std::function<bool(const Vec3&)>& keep) {
     std::vector<char> active(shape.size(), 0);
@@ -71,7 +71,7 @@ inline std::vector<char> active_where(const Domain& d, const DenseField& shape,
     return active;
 }
 
-/// Every voxel of the domain gets its value, but only `active` ones are active; NaN is never active.
+/// Every voxel of the domain gets its value, but only those in `active` are active; NaN is never active.
 inline FloatGridPtr to_grid(const Domain& d, const DenseField& field, const std::vector<char>& active, const char* name,
                             float background) {
     FloatGridPtr grid = make_grid(d, background, name);
@@ -101,7 +101,8 @@ inline DenseField to_dense(const Domain& d, const FloatGrid& grid) {
     return field;
 }
 
-/// u0 as tag_interior() and the other starts leave it: clamp(signed distance, ±3h), active where |distance| < width.
+/// u0 in the form that tag_interior() and the other starts return: clamp(signed distance, ±3h), active if |distance| <
+/// width.
 inline FloatGridPtr start_grid(const Domain& d, const Function& signed_distance, double width) {
     const double w = 3 * d.voxel_size;
     const DenseField u = sample(d, [&](const Vec3& x) { return clamp_to(signed_distance(x), w); });
@@ -109,7 +110,7 @@ inline FloatGridPtr start_grid(const Domain& d, const Function& signed_distance,
     return to_grid(d, u, active, "band", static_cast<float>(w));
 }
 
-/// Where u crosses zero on the edge from voxel (i,j,k) to the next along `axis`, linear in between.
+/// A zero crossing of u on the edge from voxel (i,j,k) to the next along `axis`, by linear interpolation.
 struct Crossing {
     Index3 voxel;
     int axis;
@@ -133,7 +134,7 @@ inline std::vector<Crossing> zero_crossings(const Domain& d, const DenseField& u
     return crossings;
 }
 
-/// Distance between the zero level sets of a and b in voxels: at each zero crossing of a, b there over |∇a|.
+/// Distance between the zero level sets of a and b in voxels: at each zero crossing of a, the value of b over |∇a|.
 struct LevelSetDifference {
     double mean = 0, max = 0;
     std::size_t count = 0;
@@ -161,7 +162,7 @@ inline LevelSetDifference zero_level_difference(const Domain& d, const DenseFiel
     return result;
 }
 
-/// Largest difference over the voxels, ghosts left out.
+/// Largest difference over the voxels, without ghosts.
 inline double max_difference(const DenseField& a, const DenseField& b) {
     double worst = 0;
     for (int i = 0; i < a.nx(); ++i)
@@ -202,10 +203,10 @@ inline std::vector<Symmetry> all_symmetries() {
 
 inline Symmetry mirror(int axis) { return {{0, 1, 2}, {axis == 0, axis == 1, axis == 2}}; }
 
-/// A smooth random function: a sum of a few plane waves, about ±1, no shorter than `shortest`.
+/// A smooth random function: a sum of a few plane waves with values of about ±1 and wavelengths of at least `shortest`.
 inline Function random_waves(std::uint32_t seed, double shortest) {
     std::mt19937 generator(seed);
-    const auto uniform = [&] { return generator() / 4294967296.0; };  // the same on every standard library
+    const auto uniform = [&] { return generator() / 4294967296.0; };  // the same with every standard library
     struct Wave {
         Vec3 k;
         double phase;

@@ -7,14 +7,14 @@
 
 #include "covol/domain.h"
 
-// Points of known surfaces with their outward normals: what the clouds' modules are to find out.
+// Points of known surfaces with their outward normals, as the truth for the modules for clouds.
 namespace covol::test {
 
 using SignedDistance = std::function<double(const Vec3&)>;  ///< negative inside
 
 struct SurfaceSample {
     std::vector<Vec3> points, normals;
-    double area = 0;  ///< of the surface, from the share of the box that is close to it
+    double area = 0;  ///< of the surface, from the fraction of the box that is close to it
     [[nodiscard]] double spacing() const { return std::sqrt(area / double(points.size())); }
 };
 
@@ -35,9 +35,9 @@ inline Vec3 normal_of(const SignedDistance& f, const Vec3& x) {
     return unit(g);
 }
 
-/// Random points of the surface in the box, evenly spread: those of a thin layer around it, moved onto it.
+/// Random points of the surface in the box, evenly spread: points in a thin layer around it, projected onto it.
 inline SurfaceSample sample_surface(const SignedDistance& f, const WorldBox& box, std::size_t count, unsigned seed) {
-    constexpr double kLayer = 0.01;  // half its thickness: small beside every shape here
+    constexpr double kLayer = 0.01;  // half of the layer's thickness: small compared with every shape here
     std::mt19937 random(seed);
     SurfaceSample sample;
     double tries = 0, volume = 1;
@@ -55,7 +55,7 @@ inline SurfaceSample sample_surface(const SignedDistance& f, const WorldBox& box
     return sample;
 }
 
-/// Moves each point along its normal by a normal deviate.
+/// Moves each point along its normal by a normally distributed distance.
 inline void add_noise(SurfaceSample& sample, double sigma, unsigned seed) {
     std::mt19937 random(seed);
     std::normal_distribution<double> off(0, sigma);
@@ -77,14 +77,14 @@ inline Solid3 ball(double radius) {
     return {[radius](const Vec3& p) { return norm(p) - radius; }, {{-r, -r, -r}, {r, r, r}}};
 }
 
-/// Around z.
+/// A torus around the z axis.
 inline Solid3 torus(double around, double tube) {
     const double r = around + tube + 0.02, z = tube + 0.02;
     return {[around, tube](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - around, p[2]) - tube; },
             {{-r, -r, -z}, {r, r, z}}};
 }
 
-/// A ball with a cavity in its middle.
+/// A ball with a cavity in its centre.
 inline Solid3 shell(double outer, double inner) {
     const double r = outer + 0.02;
     return {[outer, inner](const Vec3& p) { return std::max(norm(p) - outer, inner - norm(p)); },
@@ -106,14 +106,14 @@ inline Solid3 block(const Vec3& half) {
             {{-half[0] - 0.02, -half[1] - 0.02, -half[2] - 0.02}, {half[0] + 0.02, half[1] + 0.02, half[2] + 0.02}}};
 }
 
-/// All within `radius` of the segment from a to b.
+/// Distance to a capsule: all points within `radius` of the segment from a to b.
 inline double capsule(const Vec3& p, const Vec3& a, const Vec3& b, double radius) {
     const Vec3 along = sum(b, scaled(-1, a)), to = sum(p, scaled(-1, a));
     const double t = std::clamp(dot(to, along) / dot(along, along), 0.0, 1.0);
     return norm(sum(to, scaled(-t, along))) - radius;
 }
 
-/// A lying body on four legs.
+/// A horizontal body on four legs.
 inline Solid3 table(double leg) {
     const auto distance = [leg](const Vec3& p) {
         double minimum = capsule(p, {-0.5, 0, 0}, {0.5, 0, 0}, 0.3);

@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "cli/thread_limit.h"
+#include "cli/system/thread_limit.h"
 #include "commands/commands.h"
 
 namespace covol::tool {
@@ -40,7 +40,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     const int code = covol::tool::run(argc, argv);
-    // Libraries are not closed: that of HDF5 complains there of objects that a damaged file has left in disorder.
+    // Libraries are not finalised: HDF5 would report errors about objects that a damaged file left in an invalid state.
     std::fflush(nullptr);
     std::_Exit(code);
 }

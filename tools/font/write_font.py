@@ -1,5 +1,5 @@
-"""Writes lib/src/render/draw/font_data.cpp: outlines of the letters that pictures need, from DejaVu Sans Condensed (Debian: fonts-dejavu-core,
-fonts-dejavu-extra; python3-fonttools). To be run when a letter is wanted that is not there:
+"""Writes lib/src/render/draw/font_data.cpp: outlines of the characters in pictures, from DejaVu Sans Condensed (Debian: fonts-dejavu-core,
+fonts-dejavu-extra; python3-fonttools). Run it when further characters are needed:
 
     /usr/bin/python3 tools/font/write_font.py [FONT.ttf]
 """
@@ -44,7 +44,7 @@ def outline(font, letter):
         words.append(kind + " ".join(numbers))
 
     for kind, points in pen.value:
-        if kind == "qCurveTo" and points[-1] is None:  # no point on the curve
+        if kind == "qCurveTo" and points[-1] is None:  # a contour without on-curve points
             first = tuple((a + b) / 2 for a, b in zip(points[0], points[-2]))
             step("m", first)
             kind, points = "qCurveTo", [*points[:-1], first]

@@ -1,9 +1,9 @@
-// covol in ImageJ and Fiji: the surface through marks on the open stack, back as a mask, as outlines on all slices and as a table.
+// covol in ImageJ and Fiji: computes the surface through marks on the open stack; results are a mask, outlines on all slices and a table.
 //
-// Put this file into the folder plugins: it is then Plugins > Covol. Marks are the ROI Manager's where it has any, else the selection:
-// points (multi-point tool) lie on the border; outlines (polygon, freehand, ellipse, rectangle) are the border on their slices.
-// Needs the program covol (docs/install.md) and Linux. A script gives its settings as lines, no dialog is shown, and what went wrong
-// is returned, or "":
+// Put this file into the folder plugins: it is then Plugins > Covol. Marks are the ROIs of the ROI Manager, or the selection if it is
+// empty: points (multi-point tool) are on the border; outlines (polygon, freehand, ellipse, rectangle) are the border on their slices.
+// Needs the program covol (docs/install.md) and Linux. A script passes its settings as lines; then no dialog is shown, and an error
+// message or "" is returned:
 //     said = runMacro("Covol_.ijm", "program=/usr/bin/covol\nvoxel size=2vx\noptions=--model paper\nreport=/tmp/cell.html");
 
 function settingOf(lines, name, missing) {
@@ -12,13 +12,13 @@ function settingOf(lines, name, missing) {
     return missing;
 }
 
-// 1 of a selection that is an area (0 to 4 and 9), 0 of points (10) and of lines (5 to 8), whose corners are marks as points are.
+// 1 for a selection that is an area (types 0 to 4 and 9), 0 for points (10) and lines (5 to 8), whose corners are marks like points.
 function isArea(type) {
     if (type <= 4 || type == 9) return 1;
     return 0;
 }
 
-// Saves those of the ROI Manager that are areas, or those that are not; gives how many there are.
+// Saves the ROIs of the ROI Manager that are areas, or those that are not; returns their number.
 function saveManaged(areas, path) {
     chosen = newArray(0);
     for (i = 0; i < roiManager("count"); i++) {
@@ -33,7 +33,7 @@ function saveManaged(areas, path) {
     return chosen.length;
 }
 
-// Runs words, which a shell takes from a file as they are, and gives what the program says.
+// Runs a command, whose arguments a shell reads unchanged from a file, and returns its output.
 function runProgram(words, path) {
     text = "";
     for (i = 0; i < words.length; i++) text = text + words[i] + "\n";
@@ -41,7 +41,7 @@ function runProgram(words, path) {
     return exec("sh", "-c", "while IFS= read -r word; do set -- \"$@\" \"$word\"; done <\"$0\"; unset LD_LIBRARY_PATH; exec \"$@\" 2>&1", path);
 }
 
-// Deletes a run's own folder, which holds files alone.
+// Deletes the temporary folder of a run, which contains only files.
 function deleteFolder(folder) {
     left = getFileList(folder);
     for (i = 0; i < left.length; i++) ok = File.delete(folder + "/" + left[i]);
@@ -88,7 +88,7 @@ if (!scripted) {
     call("ij.Prefs.set", "covol.program", program);
 }
 
-// A folder that no other run has.
+// A folder with a unique name.
 folder = getDirectory("temp") + "covol-" + d2s(getTime(), 0) + "-" + floor(1e6 * random());
 File.makeDirectory(folder);
 words = newArray(program, "segment", folder + "/stack.tif");
@@ -111,7 +111,7 @@ if (options != "") {
 if (report != "") words = Array.concat(words, newArray("--report", report));
 words = Array.concat(words, newArray("-o", folder + "/surface.vdb", "--mask", folder + "/mask.tif", "--table", folder + "/table.csv"));
 
-// The stack as it is on the screen, without its selection; its name and its marks stay.
+// The displayed stack, without its selection; its name and its marks are kept.
 showStatus("covol: saving the stack");
 wasBatch = is("Batch Mode");
 if (!wasBatch) setBatchMode(true);
@@ -134,7 +134,7 @@ if (!File.exists(folder + "/mask.tif")) {
     exit("covol: " + said);
 }
 
-// Outlines: on every slice where the structure is.
+// Outlines on every slice that contains the structure.
 open(folder + "/mask.tif");
 rename("Mask of " + title);
 mask = getImageID();

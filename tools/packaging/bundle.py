@@ -1,14 +1,14 @@
 #!/usr/bin/python3
 """Makes covol-VERSION-linux-MACHINE.tar.xz: the program with every library that it needs, for any Linux whose C library is at
-least as new as the one that it was built with.
+least as new as the one of the build.
 
     cmake --preset package && cmake --build build-package --target covol_packed
     /usr/bin/python3 tools/packaging/bundle.py build-package [--output FOLDER] [--level 0..9]
 
-The libraries come from the Debian packages that covol was built with. Each keeps its name and finds the others beside it (an
-RPATH relative to itself, which LD_LIBRARY_PATH does not override). The C library is the user's own: it fits the kernel, and a
-copy would not find the machine's users, hosts and locales. `share/doc/covol/FILES.txt` in the bundle names the package, version
-and licences of every file, and `share/doc/covol/licences` has their texts. The same build gives the same bytes (SOURCE_DATE_EPOCH,
+The libraries come from the Debian packages that covol was built with. Each keeps its name and finds the others in the same folder (by
+a relative RPATH, which LD_LIBRARY_PATH does not override). The C library is not included: the user's own fits the kernel,
+and a copy would not find the machine's users, hosts and locales. `share/doc/covol/FILES.txt` in the bundle names the package, version
+and licences of every file, and `share/doc/covol/licences` has their texts. The bundle is reproducible (SOURCE_DATE_EPOCH,
 or the time of the last commit, is the time of every file). Needs patchelf, binutils and dpkg.
 """
 import argparse
@@ -40,7 +40,7 @@ def run(*words, **more):
 
 
 def needed_by(path):
-    """Names of the shared libraries that a file asks for."""
+    """Names of the shared libraries that a file needs directly."""
     return re.findall(r"\(NEEDED\)\s+Shared library: \[([^]]+)\]", run("readelf", "-dW", path))
 
 
@@ -50,7 +50,7 @@ def is_elf(path):
 
 
 def resolved_by(path):
-    """{name: where the dynamic loader of this machine finds it} of all that a file needs, directly or not."""
+    """{name: path} of all shared libraries that a file needs, directly or not, as found by the dynamic loader."""
     found = dict(re.findall(r"^\s*(\S+) => (/\S+)", run("ldd", path), re.M))
     missing = re.findall(r"^\s*(\S+) => not found", run("ldd", path), re.M)
     if missing:
@@ -59,7 +59,7 @@ def resolved_by(path):
 
 
 def add_libraries(root):
-    """Copies what the program needs, and what that needs, into lib; gives {copy: where it is from}."""
+    """Copies the libraries that the program needs, directly or not, into lib; returns {copy: original path}."""
     lib, origins = root / "lib", {}
     for user in [path for path in root.rglob("*") if path.is_file() and not path.is_symlink() and is_elf(path)]:
         for name, place in resolved_by(user).items():
@@ -70,7 +70,7 @@ def add_libraries(root):
 
 
 def set_paths(root):
-    """Each file finds the libraries from where it lies; modes as a package has them."""
+    """Sets relative RPATHs for the libraries, and file modes as in a package."""
     for path in root.rglob("*"):
         if path.is_symlink() or not path.is_file():
             continue
@@ -84,7 +84,7 @@ def set_paths(root):
 
 
 def check_closed(root):
-    """Nothing is asked for that is neither in the bundle nor of the C library."""
+    """Checks that every needed library is in the bundle or belongs to the C library."""
     there = {path.name for path in (root / "lib").iterdir()}
     for path in root.rglob("*"):
         if path.is_file() and not path.is_symlink() and is_elf(path):
@@ -94,7 +94,7 @@ def check_closed(root):
 
 
 def newest_c_library(root):
-    """The version of glibc that the bundle asks for at least."""
+    """The minimum version of glibc that the bundle needs."""
     versions = set()
     for path in root.rglob("*"):
         if path.is_file() and not path.is_symlink() and is_elf(path):
@@ -119,7 +119,7 @@ def packages_of(origins):
 
 
 def licence_names(text):
-    """The short names of a copyright file's licences; what follows none of Debian's forms is named so."""
+    """The short names of the licences in a copyright file; if it does not follow Debian's format, a reference to it."""
     names = dict.fromkeys(name.strip() for name in re.findall(r"^License:[ \t]*(\S[^\n]*)$", text, re.M))
     return ", ".join(names) or "as its copyright file says"
 
@@ -129,7 +129,7 @@ def write_licences(root, origins):
     texts = doc / "licences"
     texts.mkdir(parents=True, exist_ok=True)
     common = pathlib.Path("/usr/share/common-licenses")
-    for path in sorted(common.iterdir()):  # which the packages' copyright files refer to
+    for path in sorted(common.iterdir()):  # referenced by the packages' copyright files
         shutil.copyfile(os.path.realpath(path), texts / f"common-{path.name}")
     rows = []
     for copy, (package, version) in sorted(packages_of(origins).items()):
@@ -212,7 +212,7 @@ def main():
 
 
 def flatten(root):
-    """Debian's lib/MACHINE-linux-gnu becomes lib, so that paths in the bundle are short and one."""
+    """Moves Debian's lib/MACHINE-linux-gnu to lib, so that all libraries of the bundle are in one folder."""
     for folder in (root / "lib").glob("*-linux-gnu"):
         for path in folder.iterdir():
             path.rename(root / "lib" / path.name)

@@ -1,4 +1,4 @@
-"""What `covol --describe-options` says, for the scripts beside this one. Standard library only."""
+"""Reads the output of `covol --describe-options` for the scripts in this folder. Standard library only."""
 import json
 import re
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 
 class Option:
-    """An option of a command; without flags it is a positional."""
+    """An option of a command; a positional has no flags."""
 
     def __init__(self, described):
         self.flags = [flag.strip() for flag in described["names"].split(",") if flag]
@@ -19,17 +19,17 @@ class Option:
 
     @property
     def is_list(self):
-        """Whether several values may follow the flag, or stand on the command line."""
+        """Whether the flag or positional may have several values."""
         return self.value.endswith("...")
 
     @property
     def words(self):
-        """The words to choose from; none where the value is something else."""
+        """The possible values of a choice; empty for other types."""
         return self.value.split("|") if re.fullmatch(r"[a-z0-9-]+(\|[a-z0-9-]+)+", self.value) else []
 
     @property
     def is_file(self):
-        """Whether a file's name is expected, perhaps among others."""
+        """Whether the value is, or may be, a file name."""
         return not self.words and bool(re.search(r"FILE|IMAGE|OUT|IN\b|^[AB]$|START|FOLDER|\.vdb", self.value))
 
 
@@ -52,7 +52,7 @@ class Command:
 
 
 class Program:
-    """@param source  the program, or - for its description on standard input"""
+    """@param source  path of the program, or - to read its description from standard input"""
 
     def __init__(self, source):
         run = lambda *words: subprocess.run([source, *words], capture_output=True, text=True, check=True).stdout

@@ -1,4 +1,4 @@
-# What is installed below /usr needs no path to its libraries, and Debian allows none.
+# Files installed below /usr need no paths to their libraries, and Debian does not allow any.
 file(GLOB_RECURSE files ${CPACK_TEMPORARY_DIRECTORY}/*)
 foreach(file ${files})
   if(IS_SYMLINK ${file} OR NOT file MATCHES "/(covol|covol-reader|[^/]*\\.so[^/]*)$")

@@ -4,8 +4,8 @@
     /usr/bin/python3 tools/packaging/wheel.py covol-0.1.0-linux-x86_64.tar.xz [--output FOLDER]
     pip install covol-0.1.0-py3-none-manylinux_2_36_x86_64.whl
 
-The package has the names of the module that is compiled for Debian's Python, and the same files beside them; in place of the compiled
-part it has tools/python/program, which runs the program in covol/program. The same bundle gives the same bytes. Standard library only.
+The package has the same interface as the module that is compiled for Debian's Python, and shares its Python files; the compiled part
+is replaced by tools/python/program, which runs the program in covol/program. The wheel is reproducible. Standard library only.
 """
 import argparse
 import base64
@@ -19,7 +19,7 @@ import time
 import zipfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
-LEFT_OUT = ("share/man/", "share/bash-completion/", "share/zsh/", "share/fish/", "README.txt")  # a shell does not look for them there
+LEFT_OUT = ("share/man/", "share/bash-completion/", "share/zsh/", "share/fish/", "README.txt")  # shells do not search for them there
 METADATA = """Metadata-Version: 2.1
 Name: covol
 Version: {version}
@@ -59,7 +59,7 @@ def digest(data):
 
 
 def files_of_program(root):
-    """(name, bytes, executable) of what the program needs. A zip has no links: the name that is asked for gets the file."""
+    """(name, bytes, executable) of the files that the program needs. Zip files have no links: the name that is needed gets the content."""
     targets = {}
     for path in sorted(root.rglob("*")):
         if path.is_symlink():
@@ -101,7 +101,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="covol-wheel-") as work:
         with tarfile.open(options.bundle) as tar:
             times = {entry.mtime for entry in tar.getmembers()}
-            tar.extractall(work)  # one that this machine has made
+            tar.extractall(work)  # a trusted archive that this machine has made
         [root] = pathlib.Path(work).iterdir()
         c_library = re.search(r"glibc (\d+)\.(\d+)", (root / "README.txt").read_text())
         if not c_library:
@@ -117,7 +117,7 @@ def main():
             ("licenses/LICENSE", (SOURCE / "LICENSE").read_text()), ("licenses/licences.md", (SOURCE / "docs/licences.md").read_text())]]
         record = "".join(f"{name},{digest(data)},{len(data)}\n" for name, data, _ in entries) + f"{about}/RECORD,,\n"
         entries.append((f"{about}/RECORD", record.encode(), False))
-    stamp = time.gmtime(max(max(times), 315532800))[:6]  # a zip begins in 1980
+    stamp = time.gmtime(max(max(times), 315532800))[:6]  # zip files have no earlier times
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"covol-{version}-{tag}.whl"
     partial = path.with_name(path.name + ".part")

@@ -1,8 +1,8 @@
-"""Completion for bash, zsh and fish from the program's own description of its options.
+"""Writes completions for bash, zsh and fish from the program's own description of its options.
 
     python3 write_completions.py BUILD/bin/covol FOLDER      FOLDER/covol (bash), FOLDER/_covol (zsh), FOLDER/covol.fish
 
-Commands, flags, words to choose from, and files where a file is expected. Standard library only.
+They complete commands, flags, choices, and file names if a file is expected. Standard library only.
 """
 import pathlib
 import sys

@@ -1,8 +1,8 @@
-"""Manual pages from the program's own description of its options: covol(1), and covol-COMMAND(1) for each command.
+"""Writes manual pages from the program's own description of its options: covol(1), and covol-COMMAND(1) for each command.
 
     python3 write_man.py BUILD/bin/covol FOLDER      FOLDER/covol.1.gz, FOLDER/covol-segment.1.gz, ...
 
-Standard library only. The pages say the same bytes for the same program.
+Standard library only. The pages are reproducible.
 """
 import gzip
 import pathlib
@@ -23,7 +23,7 @@ EXAMPLES = {
 
 
 def roff(text):
-    """Plain text, with what troff would take for markup escaped."""
+    """Plain text, with escaped troff markup."""
     text = text.replace("\\", "\\e").replace("-", "\\-").replace("'", "\\(aq").replace("^", "\\(ha").replace("~", "\\(ti")
     return "\\&" + text if text.startswith((".", "\\(aq")) else text
 

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Makes the plugins that people install into other programs, each as one file.
+"""Makes the plugins for other programs, each as one file.
 
     /usr/bin/python3 tools/plugins/pack.py [blender|imagej|slicer]... [--output FOLDER]
 
-blender gives covol_blender-VERSION.zip, for Blender 3.4 (Preferences, Install) and as an extension for 4.2 and later (Install from
-Disk); slicer gives covol_slicer-VERSION.zip, a folder for 3D Slicer's module paths; imagej the macros as they are. What the plugins
-share with the Python package, how the program is run and files are read, is copied into each. Standard library only.
+blender makes covol_blender-VERSION.zip, for Blender 3.4 (Preferences, Install) and as an extension for 4.2 and later (Install from
+Disk); slicer makes covol_slicer-VERSION.zip, a folder for 3D Slicer's module paths; imagej copies the macros unchanged. The code that
+the plugins share with the Python package, to run the program and to read files, is copied into each. Standard library only.
 """
 import argparse
 import pathlib
@@ -17,7 +17,7 @@ import zipfile
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 PYTHON = SOURCE / "tools/python"
 SHARED = [PYTHON / "covol/_errors.py", PYTHON / "covol/_files.py", PYTHON / "program/_process.py"]
-TIME = (1980, 1, 1, 0, 0, 0)  # the same sources give the same bytes
+TIME = (1980, 1, 1, 0, 0, 0)  # a constant time, so that archives are reproducible
 
 
 def version():
@@ -35,7 +35,7 @@ def files_of(name):
 
 
 def pack(name, folder):
-    """Makes the file of a plugin and gives its path."""
+    """Makes the file of a plugin and returns its path."""
     folder.mkdir(parents=True, exist_ok=True)
     if name == "imagej":
         target = folder / "Covol_.ijm"

@@ -1,13 +1,13 @@
-"""Fills the options of segment() and reconstruct() into covol/__init__.pyi, from the module's own table.
+"""Writes the options of segment() and reconstruct() into covol/__init__.pyi, from the module's own table.
 
-    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py           says whether that is up to date
-    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py --write   fills them in
+    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py           checks whether the file is up to date
+    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py --write   updates it
 """
 import pathlib
 import re
 import sys
 
-sys.path.pop(0)  # the sources of the package lie beside this file, without the extension module
+sys.path.pop(0)  # this folder contains the sources of the package without the extension module
 from covol import _covol
 
 STUB = pathlib.Path(__file__).parent / "covol/__init__.pyi"

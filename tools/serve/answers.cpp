@@ -22,8 +22,8 @@ std::string in_small_letters(std::string text) {
     return text;
 }
 
-// What handlers may not set: it says how long an answer is, or protects the page.
-bool is_of_the_server(const std::string& name) {
+// Headers that handlers must not set: they state the length of an answer, or protect the page.
+bool is_server_header(const std::string& name) {
     static const Headers own = protecting_headers({});
     constexpr std::array<std::string_view, 9> kFraming{"connection",     "content-disposition", "content-encoding",
                                                        "content-length", "content-type",        "keep-alive",
@@ -55,7 +55,7 @@ std::string why_unsendable(const Response& response) {
     for (const auto& [name, value] : response.headers) {
         if (!is_header_name(name)) return "a header's name holds what cannot be sent";
         if (!is_header_value(value)) return name + ": expected one line without control characters";
-        if (is_of_the_server(name)) return name + ": is set by the server alone";
+        if (is_server_header(name)) return name + ": is set by the server alone";
     }
     return {};
 }
@@ -82,7 +82,8 @@ Response refusal(int status, const std::string& why) {
 Response cookie_answer(const std::string& cookie_name, const std::string& cookie, bool is_link) {
     Response response;
     if (is_link) {
-        // A browser would follow a redirection as the other page's, without the cookie.
+        // A browser would treat a redirection as a request of the linking page, and send no cookie. Hence a page is
+        // sent.
         response.type = "text/html; charset=utf-8";
         response.body =
             "<!doctype html>\n<title>covol</title><meta http-equiv=\"refresh\" content=\"0;url=/\"><a "
@@ -98,7 +99,7 @@ Response cookie_answer(const std::string& cookie_name, const std::string& cookie
 
 std::string attachment(std::string_view file_name) {
     std::string name(file_name);
-    // Browsers do much of this, too; programs that fetch files may not.
+    // Browsers do much of this, too, but programs that download files may not.
     for (char& c : name) {
         if ((c >= 0 && c < ' ') || c == '\x7f' || c == '/' || c == '\\') c = '_';
     }

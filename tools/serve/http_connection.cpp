@@ -42,7 +42,7 @@ void HttpConnection::read() {
     serializer_.reset();
     parser_.emplace();
     parser_->header_limit(kMaxHeaderBytes);
-    // judge() looks at the length. Boost 1.74 takes "none" for 0 here.
+    // judge() checks the length. Boost 1.74 interprets "none" as 0 here.
     if (hub_.rules.max_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     waits_since_ = std::chrono::steady_clock::now();
     stream_.expires_after(hub_.options.idle);
@@ -60,17 +60,17 @@ void HttpConnection::on_read(beast::error_code status) {
     const bool is_malformed = status.category() == make_error_code(http::error::bad_method).category() &&
                               status != http::error::end_of_stream && status != http::error::partial_message;
     if (status && is_malformed) return refuse(400, "This is no request that is understood.");
-    if (status) return finish();  // the end, or nothing came for too long
+    if (status) return finish();  // the connection was closed, or timed out
 
-    Judgement judgement = judge(head_of(parser_->get()), hub_.rules);
+    Decision judgement = judge(head_of(parser_->get()), hub_.rules);
     is_head_ = parser_->get().method() == http::verb::head;
     switch (judgement.kind) {
-        case Judgement::Kind::Refuse: return refuse(judgement.status, judgement.why);
-        case Judgement::Kind::SetCookie:
+        case Decision::Kind::Refuse: return refuse(judgement.status, judgement.why);
+        case Decision::Kind::SetCookie:
             return answer(cookie_answer(hub_.rules.cookie_name, hub_.rules.cookie, judgement.is_link), wants_to_stay());
-        case Judgement::Kind::Get: return call_handler(std::move(judgement.request));
-        case Judgement::Kind::Post: return take_body(std::move(judgement.request));
-        case Judgement::Kind::Live: return open_live();
+        case Decision::Kind::Get: return call_handler(std::move(judgement.request));
+        case Decision::Kind::Post: return take_body(std::move(judgement.request));
+        case Decision::Kind::Live: return open_live();
     }
 }
 
@@ -89,22 +89,23 @@ void HttpConnection::answer_with(const std::string& path, std::function<Response
             hub.report(path + ": " + what_was_thrown());
             response = refusal(500, "This could not be answered.");
         }
-        handler = nullptr;  // with the body that it may hold
-        // Moved: the socket is to be destroyed on its own thread.
+        handler = nullptr;  // releases the body that it may hold
+        // Moved, because the socket must be destroyed on its own thread.
         asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
             self->end_post();
             beast::error_code ignored;
-            self->stream_.socket().cancel(ignored);  // the watch: the next request is read at once when it comes
+            self->stream_.socket().cancel(ignored);  // ends watch(): the next request is read as soon as it arrives
             self->answer(std::move(response), self->wants_to_stay());
         });
     });
 }
 
-// A page that is turned to another slice closes the connection on which it waits for this one: its place is free then.
+// A page that switches to another slice closes the connection with the pending request: the connection then becomes
+// free.
 void HttpConnection::watch(std::shared_ptr<std::atomic<bool>> gone) {
     stream_.socket().async_wait(asio::ip::tcp::socket::wait_read, [self = self(), gone](beast::error_code status) {
         char next = 0;
-        // Bytes that are there belong to the next request.
+        // Available bytes belong to the next request.
         if (status || ::recv(self->stream_.socket().native_handle(), &next, 1, MSG_PEEK | MSG_DONTWAIT) != 0) return;
         *gone = true;
         self->finish();
@@ -131,7 +132,7 @@ void HttpConnection::take_body(Request request) {
     read_body(std::move(parser), std::move(request));
 }
 
-// Piece by piece, as write().
+// In pieces, like write().
 void HttpConnection::read_body(std::shared_ptr<BodyParser> parser, Request request) {
     stream_.expires_after(hub_.options.idle);
     BodyParser& into = *parser;
@@ -183,7 +184,7 @@ void HttpConnection::answer(Response response, bool keep) {
     write();
 }
 
-// Piece by piece: the limit of time is for each, so that a large file may take long on a slow line.
+// In pieces: the time limit applies to each piece, so that a large file may take long over a slow connection.
 void HttpConnection::write() {
     stream_.expires_after(hub_.options.idle);
     http::async_write_some(stream_, *serializer_, [self = self()](beast::error_code status, std::size_t) {
@@ -198,7 +199,7 @@ void HttpConnection::write() {
     });
 }
 
-// Where a socket is closed before all is read that came, the client may lose the answer.
+// If a socket is closed before all received data has been read, the client may lose the answer.
 void HttpConnection::drain() {
     constexpr std::size_t kMax = 1 << 20, kPiece = 4096;
     buffer_.consume(buffer_.size());

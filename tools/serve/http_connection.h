@@ -15,14 +15,14 @@
 
 namespace covol::serve {
 
-/// A socket that speaks HTTP, one request after another, until it becomes a WebSocket or is closed.
+/// A socket that handles HTTP requests, one after another, until it becomes a WebSocket or is closed.
 class HttpConnection final : public Connection {
 public:
     HttpConnection(Hub& hub, boost::asio::ip::tcp::socket socket);
 
-    /// Waits for a request. @pre it is in a shared pointer
+    /// Waits for a request. @pre this object is owned by a shared pointer
     void read();
-    /// Answers with a text for people, and closes.
+    /// Answers with a message and closes.
     void refuse(int status, const std::string& why);
 
     void stop() override { finish(); }
@@ -59,7 +59,7 @@ private:
     std::optional<StringResponse> response_;
     std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
     bool is_head_ = false, keeps_ = false, is_posting_ = false;
-    std::optional<bool> wants_to_stay_;  // of a POST, whose head is gone when it is answered
+    std::optional<bool> wants_to_stay_;  // for a POST, whose header has been released when it is answered
     std::size_t drained_ = 0;
     std::optional<MessageRate::Time> waits_since_;
 };

@@ -4,21 +4,21 @@
 
 namespace covol::serve {
 
-// Two threads for messages: one handler that is slow does not stop the other clients.
+// Two threads for messages, so that one slow handler does not block the other clients.
 Hub::Hub(Options its_options, Handlers its_handlers)
     : options(std::move(its_options)),
       handlers(std::move(its_handlers)),
       get_pool(std::size_t(options.get_threads)),
       live_pool(2) {}
 
-// More than these are closed without a word.
+// Further connections are closed without an answer.
 constexpr std::size_t kMaxRefused = 8;
 
-void Hub::welcome(boost::asio::ip::tcp::socket socket) {
+void Hub::serve_socket(boost::asio::ip::tcp::socket socket) {
     bool has_room = connections_.size() < options.max_connections;
     if (!has_room) {
-        // Browsers keep connections open for later, and other programs may hold some without a word: neither may keep
-        // out one that has a request.
+        // Browsers keep connections open for later requests, and other programs may hold idle ones. Neither may block a
+        // connection that has a request.
         std::shared_ptr<Connection> longest;
         for (const auto& connection : connections_) {
             const auto since = connection->waits_since();
@@ -46,7 +46,7 @@ void Hub::leave(const std::shared_ptr<Connection>& connection, bool is_live) {
 }
 
 void Hub::stop_all() {
-    const auto all = connections_;  // they leave while they stop
+    const auto all = connections_;  // a copy, because stop() removes connections
     for (const auto& connection : all) connection->stop();
 }
 
@@ -71,7 +71,7 @@ bool Hub::send(Client client, std::string text) {
 void Hub::broadcast(std::string text) {
     if (is_stopping) return;
     const auto shared = std::make_shared<const std::string>(std::move(text));
-    // Under the lock: two texts that are broadcast at the same time come in one order to all.
+    // Locked, so that texts that are broadcast at the same time arrive in the same order at all clients.
     const std::lock_guard lock(recipients_mutex_);
     for (const auto& [client, recipient] : recipients_) recipient->send(shared, true);
 }
@@ -80,7 +80,7 @@ void Hub::report(const std::string& what) const {
     if (!handlers.on_error) return;
     try {
         handlers.on_error(what);
-    } catch (...) {  // there is nobody left to tell
+    } catch (...) {  // an error of the error handler cannot be reported
     }
 }
 

@@ -27,7 +27,7 @@ LiveConnection::LiveConnection(Hub& hub, beast::tcp_stream stream, Client client
 
 void LiveConnection::accept(http::request<http::empty_body> request) {
     handshake_ = std::move(request);
-    beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has its own limits of time
+    beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has its own timeouts
     websocket::stream_base::timeout limits{};
     limits.handshake_timeout = std::chrono::seconds(10);
     limits.idle_timeout = hub_.options.live_idle;
@@ -36,12 +36,12 @@ void LiveConnection::accept(http::request<http::empty_body> request) {
     socket_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
         for (const auto& [name, value] : protecting_headers("default-src 'none'")) response.set(name, value);
     }));
-    // Sizes are checked in on_read(): Beast would close without reading what is still coming, and the client would not
-    // get the reason.
+    // Sizes are checked in on_read(): Beast would close without reading the remaining data, and the client would not
+    // receive the reason.
     socket_.read_message_max(0);
     socket_.auto_fragment(false);
     socket_.text(true);
-    // Pings are counted as messages: they cost as much.
+    // Pings are counted as messages, because they cost as much.
     socket_.control_callback([this](websocket::frame_type kind, beast::string_view) {
         if (kind == websocket::frame_type::close || !is_too_fast()) return;
         asio::post(hub_.io, [self = self()] {
@@ -63,7 +63,7 @@ void LiveConnection::call(const char* name, const Call& handler) {
     }
 }
 
-// The socket is to be destroyed on its own thread, not on one for handlers.
+// The socket must be destroyed on its own thread, not on a handler thread.
 void LiveConnection::release(std::shared_ptr<LiveConnection> self) {
     asio::io_context& io = self->hub_.io;
     asio::post(io, [self = std::move(self)] {});
@@ -98,7 +98,7 @@ bool LiveConnection::has_much_to_handle() const {
 void LiveConnection::on_read(beast::error_code status) {
     is_reading_ = false;
     if (status) return finish();
-    if (is_closing_) return;  // close() reads on, up to the client's answer
+    if (is_closing_) return;  // close() continues to read until the client's answer
     if (buffer_.size() > hub_.options.max_message_bytes) {
         return close(websocket::close_code::too_big, "a message is too large", kPartingTime);
     }
@@ -116,7 +116,7 @@ void LiveConnection::on_read(beast::error_code status) {
         }
         asio::post(hub.io, [self = std::move(self), bytes = text.size()] { self->on_handled(bytes); });
     });
-    // What is not read here waits with the client, so that little is kept for handlers that are slow.
+    // Unread messages stay with the client, which limits the queue of slow handlers.
     pauses_ = has_much_to_handle();
     if (!pauses_) read();
 }
@@ -148,23 +148,23 @@ void LiveConnection::write() {
 
 void LiveConnection::on_write(beast::error_code status) {
     if (is_closing_ || is_finished_) return;
-    if (status) return is_reading_ ? part(kPartingTime) : finish();
+    if (status) return is_reading_ ? close_after(kPartingTime) : finish();
     if (outbox_.written()) write();
 }
 
 void LiveConnection::close(websocket::close_code code, const char* why, std::chrono::milliseconds maximum) {
     if (is_finished_) return;
     const bool was_closing = is_closing_;
-    part(maximum);
+    close_after(maximum);
     if (was_closing) return;
     socket_.async_close({code, why}, [self = self()](beast::error_code status) {
         if (!status || !self->is_reading_) self->finish();
     });
 }
 
-// Where the client closes, or sends no UTF-8, reading answers that by itself, and writing fails from then on. The
-// reading has to come to its end: of a socket that is closed before, the client may not get the answer.
-void LiveConnection::part(std::chrono::milliseconds maximum) {
+// If the client closes or sends invalid UTF-8, the read operation answers that itself, and writing fails from then on.
+// The read operation has to be completed: if the socket is closed before, the client may not receive the answer.
+void LiveConnection::close_after(std::chrono::milliseconds maximum) {
     is_closing_ = true;
     outbox_.close();
     deadline_.expires_after(maximum);
@@ -175,7 +175,7 @@ void LiveConnection::part(std::chrono::milliseconds maximum) {
 
 void LiveConnection::stop() {
     if (!is_open_) return finish();
-    close(websocket::close_code::going_away, "the program ends", Hub::kGoodbye);
+    close(websocket::close_code::going_away, "the program ends", Hub::kCloseTimeout);
 }
 
 void LiveConnection::finish() {

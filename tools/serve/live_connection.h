@@ -13,12 +13,12 @@
 
 namespace covol::serve {
 
-/// A socket that has become a WebSocket. Where nothing else is said, for the thread of Hub::io.
+/// A socket that has become a WebSocket. Unless stated otherwise, functions are called on the thread of Hub::io.
 class LiveConnection final : public Connection, public Recipient {
 public:
     LiveConnection(Hub& hub, boost::beast::tcp_stream stream, Client client);
 
-    /// Answers the handshake and serves the client. @pre it is in a shared pointer
+    /// Answers the handshake and serves the client. @pre this object is owned by a shared pointer
     void accept(boost::beast::http::request<boost::beast::http::empty_body> request);
     void stop() override;
     void finish() override;
@@ -36,7 +36,7 @@ private:
     void read();
     void on_read(boost::beast::error_code status);
     [[nodiscard]] bool is_too_fast();
-    /// On a thread for handlers: calls one, and closes the client where it throws.
+    /// On a handler thread: calls a handler, and closes the connection if it throws.
     template <typename Call>
     void call(const char* name, const Call& handler);
     static void release(std::shared_ptr<LiveConnection> self);
@@ -44,9 +44,9 @@ private:
     [[nodiscard]] bool has_much_to_handle() const;
     void write();
     void on_write(boost::beast::error_code status);
-    /// Neither reads on nor writes, and closes after so long at most.
-    void part(std::chrono::milliseconds maximum);
-    /// Says why, waits so long for the client's answer and closes.
+    /// Stops reading and writing, and closes after `maximum` at the latest.
+    void close_after(std::chrono::milliseconds maximum);
+    /// Sends the reason, waits at most `maximum` for the client's answer and closes.
     void close(boost::beast::websocket::close_code code, const char* why, std::chrono::milliseconds maximum);
 
     Hub& hub_;
@@ -58,7 +58,7 @@ private:
     boost::beast::flat_buffer buffer_;
     MessageRate rate_;
     Outbox outbox_;
-    SharedText written_;  // what is being written has to live so long
+    SharedText written_;  // keeps the text alive while it is written
     std::size_t unhandled_ = 0, unhandled_bytes_ = 0;
     bool is_open_ = false, is_closing_ = false, is_finished_ = false;
     bool is_reading_ = false, pauses_ = false;

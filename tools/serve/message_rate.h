@@ -4,7 +4,7 @@
 
 namespace covol::serve {
 
-/// How many messages one may send: so many at once, and so many a second in the long run.
+/// Limits the rate of a client's messages: a burst, and a mean number per second.
 class MessageRate {
 public:
     using Time = std::chrono::steady_clock::time_point;
@@ -12,7 +12,7 @@ public:
     /// @param per_second  > 0 @param burst  >= 1
     MessageRate(double per_second, double burst) : per_second_(per_second), burst_(burst), left_(burst) {}
 
-    /// Counts a message. @return false where it is one too many
+    /// Counts a message. @return false if it exceeds the limit
     [[nodiscard]] bool allows_one(Time now) {
         left_ = std::min(burst_, left_ + per_second_ * std::chrono::duration<double>(now - counted_).count());
         counted_ = now;

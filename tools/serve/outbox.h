@@ -7,23 +7,23 @@
 
 namespace covol::serve {
 
-/// A text that several clients may be sent, kept once.
+/// A text that may be sent to several clients, stored once.
 using SharedText = std::shared_ptr<const std::string>;
 
-/// The texts that wait to be written to one client, of limited size. From any thread; one of them writes.
+/// The texts that are queued for one client, of limited size. May be used from any thread; one thread writes.
 class Outbox {
 public:
     enum class Added {
-        Waiting,  ///< the writer will come to it
+        Waiting,  ///< the running writer will send it
         First,    ///< the writer has to be started
-        TooMuch,  ///< no more is taken from now on: the client has to be closed
-        Refused   ///< it was closed, or is not ready for broadcasts
+        TooMuch,  ///< no more texts are accepted: the client must be disconnected
+        Refused   ///< closed, or not ready for broadcasts
     };
 
-    /// @param max_bytes  of the texts that are not written yet; a single one may be larger where nothing else waits
+    /// @param max_bytes  of the unsent texts; a single one may be larger if the queue is empty
     explicit Outbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-    /// The first text for this client alone makes it ready for broadcasts.
+    /// The first text for this client makes it ready for broadcasts.
     [[nodiscard]] Added add(SharedText text, bool is_broadcast) {
         const std::lock_guard lock(mutex_);
         if (is_closed_ || (is_broadcast && !takes_broadcasts_)) return Added::Refused;
@@ -49,7 +49,7 @@ public:
         return texts_.front();
     }
 
-    /// The text of next() is written. @return whether there is another one
+    /// Removes the text of next(), which has been sent. @return whether there is another one
     [[nodiscard]] bool written() {
         const std::lock_guard lock(mutex_);
         bytes_ -= texts_.front()->size();
@@ -57,7 +57,7 @@ public:
         return !texts_.empty();
     }
 
-    /// Takes no more; what waits stays for the writer that may be at it.
+    /// Accepts no more texts; queued ones stay for the writer that may be active.
     void close() {
         const std::lock_guard lock(mutex_);
         is_closed_ = true;

@@ -8,7 +8,7 @@
 namespace covol::serve {
 namespace {
 
-// Not those of <cctype>, which depend on the locale.
+// Not the functions of <cctype>, which depend on the locale.
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 char small(char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; }
@@ -31,7 +31,7 @@ int hex_value(char c) {
     return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-// Nothing where an escape is wrong, or the text is no UTF-8 or holds a NUL.
+// nullopt if an escape is invalid, or if the text is not UTF-8 or contains a NUL.
 std::optional<std::string> decode(std::string_view text, bool is_query) {
     std::string decoded;
     for (std::size_t n = 0; n < text.size(); ++n) {
@@ -65,10 +65,10 @@ bool parse_query(std::string_view text, std::map<std::string, std::string>& quer
     }
 }
 
-Judgement refuse(int status, std::string why) { return {Judgement::Kind::Refuse, status, std::move(why)}; }
+Decision refuse(int status, std::string why) { return {Decision::Kind::Refuse, status, std::move(why)}; }
 
-// The length of a POST's body, in its own `body_bytes`.
-Judgement judge_body(const std::vector<std::string_view>& lengths, const Rules& rules) {
+// Determines the length of a POST's body and stores it in `body_bytes`.
+Decision judge_body(const std::vector<std::string_view>& lengths, const Rules& rules) {
     if (lengths.size() != 1) return refuse(411, "Content-Length: expected it once.");
     std::size_t bytes = 0;
     const char* const end = lengths[0].data() + lengths[0].size();
@@ -78,14 +78,14 @@ Judgement judge_body(const std::vector<std::string_view>& lengths, const Rules& 
     if (status != std::errc() || bytes > rules.max_body_bytes)
         return refuse(413, "A file has at most " + std::to_string(rules.max_body_bytes) + " bytes here.");
     if (bytes == 0) return refuse(400, "Content-Length: expected a file that is not empty.");
-    Judgement good;
-    good.kind = Judgement::Kind::Post;
+    Decision good;
+    good.kind = Decision::Kind::Post;
     good.body_bytes = bytes;
     return good;
 }
 
-// What is wrong with the request before anybody asks who sent it; Get or Post where nothing is.
-Judgement judge_form(const RequestHead& head, const Rules& rules) {
+// Checks the form of a request before its origin; Get or Post if it is valid.
+Decision judge_form(const RequestHead& head, const Rules& rules) {
     const bool is_post = head.method == "POST" && rules.max_body_bytes > 0;
     if (head.method != "GET" && head.method != "HEAD" && !is_post)
         return refuse(405, "Only GET and HEAD are answered here.");
@@ -102,8 +102,8 @@ Judgement judge_form(const RequestHead& head, const Rules& rules) {
             return refuse(413, "Requests have no body here.");
         }
     }
-    Judgement good;
-    good.kind = Judgement::Kind::Get;
+    Decision good;
+    good.kind = Decision::Kind::Get;
     return good;
 }
 
@@ -112,8 +112,9 @@ bool has_value(const RequestHead& head, std::string_view name, std::string_view 
     return values.size() == 1 && values[0] == value;
 }
 
-// Whether a person followed a link of another page: the whole window goes here, and that page sees nothing of it. Or a
-// frame of a page that may have one, which the page's policy decides; other hosts' frames would not be sent the cookie.
+// Whether the user followed a link on another page, which replaces the whole window, so that the linking page cannot
+// read the answer; or whether a frame of a permitted page is loaded, which the page's policy controls. Frames of pages
+// on other hosts would not send the cookie.
 bool is_link(const RequestHead& head, const Rules& rules) {
     if (rules.may_be_framed && has_value(head, "Sec-Fetch-Site", "same-site") &&
         has_value(head, "Sec-Fetch-Mode", "navigate") && has_value(head, "Sec-Fetch-Dest", "iframe"))
@@ -122,15 +123,15 @@ bool is_link(const RequestHead& head, const Rules& rules) {
            has_value(head, "Sec-Fetch-Mode", "navigate") && has_value(head, "Sec-Fetch-Dest", "document");
 }
 
-// Whether the request is for this server, and comes from one of its own pages or from none.
-Judgement judge_source(const RequestHead& head, const Rules& rules, bool may_be_link, bool is_post) {
+// Whether the request is for this server, and comes from one of its own pages or from no page.
+Decision judge_source(const RequestHead& head, const Rules& rules, bool may_be_link, bool is_post) {
     const auto hosts = values_of(head, "Host");
     if (hosts.size() != 1) return refuse(400, "Host: expected it once.");
     if (std::find(rules.authorities.begin(), rules.authorities.end(), hosts[0]) == rules.authorities.end()) {
         return refuse(403, "This server is not reached by that name.");
     }
     const auto origins = values_of(head, "Origin");
-    // Browsers send it with each WebSocket and each POST, and the page's own origin is the one of its Host.
+    // Browsers send Origin with each WebSocket and each POST, and for the page itself it matches Host.
     const bool is_own = origins.size() == 1 && origins[0] == "http://" + std::string(hosts[0]);
     if (!is_own && (head.is_upgrade || is_post || !origins.empty())) {
         return refuse(403, "Pages of other servers are not answered here.");
@@ -140,8 +141,8 @@ Judgement judge_source(const RequestHead& head, const Rules& rules, bool may_be_
     if (!sites.empty() && !is_own_site && !may_be_link) {
         return refuse(403, "Other pages do not lead here: open the link that was printed at the start.");
     }
-    Judgement good;
-    good.kind = Judgement::Kind::Get;
+    Decision good;
+    good.kind = Decision::Kind::Get;
     return good;
 }
 
@@ -153,23 +154,23 @@ bool is_known(const RequestHead& head, const Rules& rules) {
 
 }  // namespace
 
-Judgement judge(const RequestHead& head, const Rules& rules) {
-    const Judgement form = judge_form(head, rules);
-    if (form.kind == Judgement::Kind::Refuse) return form;
-    const bool is_post = form.kind == Judgement::Kind::Post;
+Decision judge(const RequestHead& head, const Rules& rules) {
+    const Decision form = judge_form(head, rules);
+    if (form.kind == Decision::Kind::Refuse) return form;
+    const bool is_post = form.kind == Decision::Kind::Post;
     std::optional<Request> request = parse_target(head.target);
     const bool has_token =
                    request && request->path == "/" && request->query.contains("token") && !head.is_upgrade && !is_post,
                follows_link = has_token && is_link(head, rules);
-    if (Judgement source = judge_source(head, rules, follows_link, is_post); source.kind == Judgement::Kind::Refuse)
+    if (Decision source = judge_source(head, rules, follows_link, is_post); source.kind == Decision::Kind::Refuse)
         return source;
     if (has_token) {
         if (!is_same_secret(rules.token, request->query["token"])) {
             return refuse(403, "This link is of another run. Open the one that was printed last.");
         }
         if (request->query.size() != 1) return refuse(400, "Beside the token nothing is expected in this address.");
-        Judgement first;
-        first.kind = Judgement::Kind::SetCookie;
+        Decision first;
+        first.kind = Decision::Kind::SetCookie;
         first.is_head = head.method == "HEAD";
         first.is_link = follows_link;
         return first;
@@ -181,8 +182,8 @@ Judgement judge(const RequestHead& head, const Rules& rules) {
     const bool is_live = request->path == rules.live_path;
     if (head.is_upgrade && (!is_live || head.method != "GET")) return refuse(404, "No WebSocket is opened here.");
     if (!head.is_upgrade && is_live) return refuse(426, "This address is for WebSockets.");
-    Judgement good;
-    good.kind = is_live ? Judgement::Kind::Live : form.kind;
+    Decision good;
+    good.kind = is_live ? Decision::Kind::Live : form.kind;
     good.body_bytes = form.body_bytes;
     good.is_head = head.method == "HEAD";
     good.request = std::move(*request);
@@ -269,7 +270,7 @@ bool is_utf8(std::string_view text) {
         if (first < 0x80) continue;
         const std::size_t more = first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : 1;
         if (first < 0xC2 || first > 0xF4 || text.size() - n < more) return false;
-        // The second byte excludes overlong forms, surrogates and what is above U+10FFFF.
+        // The range of the second byte excludes overlong forms, surrogates and values above U+10FFFF.
         unsigned low = 0x80, high = 0xBF;
         if (first == 0xE0) low = 0xA0;
         if (first == 0xED) high = 0x9F;

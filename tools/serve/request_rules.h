@@ -9,64 +9,64 @@
 
 #include "serve/web_server.h"
 
-// Which requests are answered: pure functions of what a client sent, without sockets.
+// Decides which requests are answered: pure functions of what a client sent, without sockets.
 namespace covol::serve {
 
-/// The first lines of a request as they came, with the blanks around values removed.
+/// The header of a request as received, without the blanks around values.
 struct RequestHead {
     std::string_view method, target;
-    std::vector<std::pair<std::string_view, std::string_view>> fields;  ///< names in any case, some perhaps twice
-    bool is_upgrade = false;                                            ///< it asks for a WebSocket
+    std::vector<std::pair<std::string_view, std::string_view>> fields;  ///< names in any case; some may occur twice
+    bool is_upgrade = false;                                            ///< it requests a WebSocket
 };
 
-/// What a request is compared with.
+/// The values that a request is compared with.
 struct Rules {
     std::vector<std::string> authorities;  ///< values of `Host`, see allowed_authorities()
-    std::string token;                     ///< of the link that a person opens
+    std::string token;                     ///< part of the link that the user opens
     std::string cookie_name, cookie;
     std::string live_path;
     std::size_t max_target_bytes = 4096;
-    bool may_be_framed = false;      ///< pages of the same host, on other ports, may show the link in a frame
-    std::size_t max_body_bytes = 0;  ///< of a POST; 0: none is answered
+    bool may_be_framed = false;      ///< pages of the same host on other ports may show the link in a frame
+    std::size_t max_body_bytes = 0;  ///< of a POST; 0: all POSTs are refused
 };
 
-/// What to do with a request.
-struct Judgement {
+/// The decision about a request.
+struct Decision {
     enum class Kind {
         Refuse,     ///< answer with `status` and `why`, and close the connection
-        SetCookie,  ///< the right token: set the cookie, and lead to "/"
+        SetCookie,  ///< the token is correct: set the cookie, and redirect to "/"
         Get,        ///< let a handler answer
         Post,       ///< read `body_bytes`, and let a handler answer
         Live        ///< open a WebSocket
     };
     Kind kind = Kind::Refuse;
     int status = 400;
-    std::string why{};           ///< for people
+    std::string why{};           ///< message for the user
     Request request{};           ///< of Get and Post
     std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::max_body_bytes
     bool is_head = false;
-    bool is_link = false;  ///< of SetCookie: a person followed a link of another page, or of a file, to get here
+    bool is_link = false;  ///< for SetCookie: the user followed a link on another page, or in a file
 };
 
-/// Applies all rules to a request. No handler hears of one before Host, Origin, Sec-Fetch-Site and either the token or
-/// the cookie are right. Links of other pages lead to the token's address alone. A POST also has to say that it comes
-/// from the server's own page, and how long its body is.
-[[nodiscard]] Judgement judge(const RequestHead& head, const Rules& rules);
+/// Applies all rules to a request. Handlers are called only if Host, Origin, Sec-Fetch-Site and either the token or the
+/// cookie are correct. Links on other pages are accepted for the token's address only. A POST also has to state that it
+/// comes from the server's own page, and the length of its body.
+[[nodiscard]] Decision judge(const RequestHead& head, const Rules& rules);
 
-/// 127.0.0.1 and localhost with this port, and the further ones as browsers write them: in small letters, and without
-/// the port where it is 80. @pre each further one is_authority()
+/// 127.0.0.1 and localhost with this port, and the further ones, in the form that browsers send: in lower case, and
+/// without the port if it is 80. @pre is_authority() holds for each further one
 [[nodiscard]] std::vector<std::string> allowed_authorities(std::uint16_t port, const std::vector<std::string>& further);
 
 /// Whether it is `name`, `name:port`, `[IPv6]` or `[IPv6]:port` with a port from 1 to 65535.
 [[nodiscard]] bool is_authority(std::string_view text);
 
-/// The parts of "/path?name=value&name=value", decoded. Nothing where it is no such text: a wrong or half escape, a NUL
-/// or text that is no UTF-8, a control character in the path, a parameter without a name or without '=', one name
-/// twice, a fragment, a character that has to be escaped. '+' is a blank in the query, as forms write it.
+/// The parts of "/path?name=value&name=value", decoded. nullopt if the text is invalid: a wrong or incomplete escape, a
+/// NUL or invalid UTF-8, a control character in the path, a parameter without a name or without '=', a repeated name, a
+/// fragment, or a character that has to be escaped. '+' is a blank in the query, as in forms.
 [[nodiscard]] std::optional<Request> parse_target(std::string_view target);
 
-/// Whether one of the cookies of this name in the value of a `Cookie` field is the secret. Pages on other ports of this
-/// machine may have set further ones of the same name, for other paths.
+/// Whether one of the cookies with this name in the value of a `Cookie` field is the secret. Pages on other ports of
+/// this machine may have set further cookies of the same name, for other paths.
 [[nodiscard]] bool has_cookie(std::string_view field, std::string_view name, std::string_view secret);
 
 /// Whether the bytes are UTF-8: no overlong forms, no surrogates, nothing above U+10FFFF.

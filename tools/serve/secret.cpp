@@ -31,7 +31,7 @@ std::string random_secret() {
 
 bool is_same_secret(std::string_view secret, std::string_view guess) {
     if (secret.size() != guess.size()) return false;
-    // Volatile: else a compiler may leave the loop at the first difference.
+    // Volatile, because a compiler could otherwise end the loop at the first difference.
     volatile unsigned char difference = 0;
     for (std::size_t n = 0; n < secret.size(); ++n) {
         difference = static_cast<unsigned char>(difference | (secret[n] ^ guess[n]));

@@ -36,8 +36,8 @@ namespace {
     throw Error(Errc::Io, what + std::strerror(number));
 }
 
-// Made without Asio: its sockets would be inherited by programs that are started, a browser say, and stay open with
-// them.
+// Created without Asio, whose sockets would be inherited by child processes, such as a browser, and stay open as long
+// as they run.
 int listen_on(std::uint16_t port) {
     const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (socket < 0) fail_to_listen(port, errno);
@@ -45,7 +45,7 @@ int listen_on(std::uint16_t port) {
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const int yes = 1;  // connections of an earlier run that are still ending do not hold the port
+    const int yes = 1;  // allows the port to be reused while connections of an earlier run are ending
     constexpr int kBacklog = 64;
     if (::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
         ::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
@@ -61,7 +61,7 @@ Options checked(Options options) {
     if (const std::string why = options.why_invalid(); !why.empty()) {
         throw Error(Errc::InvalidOptions, why);
     }
-    // It is stronger than X-Frame-Options, which knows no origins.
+    // It has priority over X-Frame-Options, which does not support origins.
     options.page_policy += "; frame-ancestors";
     for (const std::string& one : options.frame_origins) options.page_policy += " " + one;
     if (options.frame_origins.empty()) options.page_policy += " 'none'";
@@ -101,7 +101,7 @@ public:
         port_ = acceptor_.local_endpoint().port();
         hub_.rules.authorities = allowed_authorities(port_, hub_.options.authorities);
         hub_.rules.token = random_secret();
-        hub_.rules.cookie = random_secret();  // another one: links are kept in histories and lists of processes
+        hub_.rules.cookie = random_secret();  // not the token: links are stored in histories and process lists
         hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
         hub_.rules.live_path = hub_.options.live_path;
         hub_.rules.may_be_framed = !hub_.options.frame_origins.empty();
@@ -138,7 +138,7 @@ private:
             try {
                 hub_.io.run();
                 return;
-            } catch (...) {  // no memory, say: it concerns one connection
+            } catch (...) {  // such as lack of memory: only one connection is affected
                 hub_.report(what_was_thrown());
             }
         }
@@ -148,7 +148,7 @@ private:
         acceptor_.async_wait(tcp::acceptor::wait_read, [this](boost::system::error_code status) {
             if (hub_.is_stopping || !acceptor_.is_open()) return;
             if (status || accept_all()) return wait();
-            // No more files may be open: try again when some are closed.
+            // The limit of open files has been reached: try again when some have been closed.
             pause_.expires_after(std::chrono::milliseconds(100));
             pause_.async_wait([this](boost::system::error_code) {
                 if (!hub_.is_stopping) wait();
@@ -156,9 +156,9 @@ private:
         });
     }
 
-    // Takes the connections that wait. @return false where none can be had for now
+    // Accepts the pending connections. @return false if none can be accepted at present
     bool accept_all() {
-        constexpr int kMax = 64;  // then it is the turn of others
+        constexpr int kMax = 64;  // then other events are handled
         for (int n = 0; n < kMax; ++n) {
             const int accepted = ::accept4(acceptor_.native_handle(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
             if (accepted < 0) {
@@ -176,7 +176,7 @@ private:
                 continue;
             }
             socket.set_option(tcp::no_delay(true), status);
-            hub_.welcome(std::move(socket));
+            hub_.serve_socket(std::move(socket));
         }
         return true;
     }
@@ -195,7 +195,7 @@ WebServer::WebServer(Options options, Handlers handlers) {
         impl_ = std::make_unique<Impl>(std::move(options), std::move(handlers));
     } catch (const Error&) {
         throw;
-    } catch (const std::exception& error) {  // of sockets and threads
+    } catch (const std::exception& error) {  // from sockets and threads
         throw Error(Errc::Io, error.what());
     }
 }

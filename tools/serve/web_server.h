@@ -12,84 +12,84 @@
 #include <utility>
 #include <vector>
 
-// A web server for one person's browser, on the loopback address of this machine: HTTP for what is fetched, WebSockets
-// for messages in both directions. It knows who may ask; what is answered is up to its handlers.
+// A web server for one user's browser, on the loopback address of this machine: HTTP for requests, WebSockets for
+// messages in both directions. It controls the access; handlers compute the answers.
 namespace covol::serve {
 
 /// A GET, HEAD or POST that passed all checks.
 struct Request {
     std::string path;                          ///< decoded, begins with '/'
     std::map<std::string, std::string> query;  ///< decoded, UTF-8 without NUL
-    /// Becomes true if the client closes the connection before it has the answer: nobody waits for it any more.
+    /// Becomes true if the client closes the connection before it has received the answer, which is then not needed any
+    /// more.
     std::shared_ptr<const std::atomic<bool>> gone{};
 };
 
-/// What a handler answers. The server adds the length and all headers that protect the page.
+/// The answer of a handler. The server adds the length and all headers that protect the page.
 struct Response {
     int status = 200;                                            ///< 200 to 599
     std::string type = "text/plain; charset=utf-8";              ///< Content-Type
-    std::string body{};                                          ///< for HEAD its length alone is sent
+    std::string body{};                                          ///< for HEAD only its length is sent
     bool is_deflated = false;                                    ///< the body is a zlib stream of what `type` says
-    std::vector<std::pair<std::string, std::string>> headers{};  ///< further ones, `X-Width` say
-    std::string file_name{};  ///< UTF-8; where there is one, the browser saves the body as a file of that name
+    std::vector<std::pair<std::string, std::string>> headers{};  ///< further ones, such as `X-Width`
+    std::string file_name{};  ///< UTF-8; if it is not empty, the browser saves the body as a file of that name
 };
 
-/// One WebSocket, by a number that is not used again.
+/// One WebSocket, identified by a number that is not used again.
 struct Client {
     std::uint64_t number = 0;
     friend auto operator<=>(const Client&, const Client&) = default;
 };
 
-/// What the server calls, on its own threads. Those of one client are called one after another: `opened`, then each
-/// `message` in its order, then `closed`; those of different clients, and `get`, at the same time. Each may be empty.
-/// One that is slow delays the next ones of its client, and others when more than two clients are slow: long work
-/// belongs on a thread of the caller's. They may call send() and broadcast(), but not stop().
+/// Functions that the server calls, on its own threads. Those of one client are called one after another: `opened`,
+/// then each `message` in order, then `closed`; those of different clients, and `get`, concurrently. Each may be empty.
+/// A slow handler delays the next ones of its client, and other clients if more than two are slow: long computations
+/// should run on another thread. Handlers may call send() and broadcast(), but not stop().
 struct Handlers {
-    std::function<Response(const Request&)>
-        get{};  ///< may be slow; what it throws becomes an answer 500 without details
-    /// A POST with its body, one at a time, where Options::max_body_bytes allows any; as `get`.
+    std::function<Response(const Request&)> get{};  ///< may be slow; if it throws, the answer is 500 without details
+    /// A POST with its body, one at a time, if Options::max_body_bytes > 0; otherwise as `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
-    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; where it throws, the client is closed (1011)
+    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, the client is closed (1011)
     std::function<void(Client)> closed{};                     ///< exactly once for each client that was `opened`
-    std::function<void(const std::string&)> on_error{};  ///< what went wrong in a handler or in accepting, for a log
+    std::function<void(const std::string&)> on_error{};  ///< errors in a handler or in accepting connections, for a log
 };
 
-/// Where to listen, and what one person's browser may ask for.
+/// The address of the server, and limits for the requests of one user's browser.
 struct Options {
-    std::uint16_t port = 0;  ///< 0: one that is free
-    /// Further values of `Host`, `name:port`, that a page may be loaded from, such as the other end of a forwarded
+    std::uint16_t port = 0;  ///< 0: any free port
+    /// Further values of `Host`, `name:port`, that a page may be loaded from, such as the local end of a forwarded
     /// port.
     std::vector<std::string> authorities{};
-    /// Origins, "http://localhost:8888", whose pages may show the page in a frame: notebooks on this machine.
+    /// Origins, "http://localhost:8888", of pages that may show the page in a frame: notebooks on this machine.
     std::vector<std::string> frame_origins{};
     std::string page_policy = "default-src 'none'";  ///< Content-Security-Policy of text/html, without frame-ancestors
-    std::string live_path = "/live";                 ///< where WebSockets are opened
+    std::string live_path = "/live";                 ///< path of WebSockets
     std::size_t max_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
-    std::size_t max_body_bytes = 0;                         ///< of a POST; 0: none is answered
-    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< that a client has not read yet: with more it is closed
-    /// Open at once, >= 1, WebSockets among them. One more closes the one that waits longest for a request; where none
-    /// waits it is refused (503).
+    std::size_t max_body_bytes = 0;                         ///< of a POST; 0: all POSTs are refused
+    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< of unsent data of a client: above it, it is closed
+    /// Open connections, >= 1, including WebSockets. A further one closes the one that has been waiting longest for a
+    /// request; if none is waiting, it is refused (503).
     std::size_t max_connections = 16;
     std::size_t max_clients = 8;                  ///< WebSockets open at once
-    double messages_per_second = 200;             ///< > 0, of each client: with more it is closed (1008)
-    double message_burst = 400;                   ///< >= 1: so many at once
+    double messages_per_second = 200;             ///< > 0, of each client: above it the client is closed (1008)
+    double message_burst = 400;                   ///< >= 1: maximum number at once
     std::chrono::milliseconds idle{30'000};       ///< >= 1: without a request, or without progress of an answer
-    std::chrono::milliseconds live_idle{60'000};  ///< >= 2: in which a client answers a ping, and its handlers catch up
-    int get_threads = 4;                          ///< >= 1: so many calls of `get` at once
+    std::chrono::milliseconds live_idle{60'000};  ///< >= 2: to answer a ping, and for handlers to catch up
+    int get_threads = 4;                          ///< >= 1: concurrent calls of `get`
 
-    /// Empty when usable, else what is wrong: "port: expected ...".
+    /// Empty if valid, otherwise the reason: "port: expected ...".
     [[nodiscard]] std::string why_invalid() const;
 };
 
-/// Listens on 127.0.0.1 as long as it lives.
+/// Listens on 127.0.0.1 during its lifetime.
 ///
-/// Who has the link of url() gets a cookie, and nobody is answered without it. A request also has to name this server
-/// as its `Host`, and to come from a page of the server's own where it says where it comes from. So other people on
-/// this machine, and pages of other sites in the same browser, get nothing.
+/// Only clients that have opened the link of url() get a cookie, and requests without the cookie are refused. A request
+/// also has to name this server as its `Host`, and, if it states its origin, to come from a page of this server. So
+/// other users of this machine, and pages of other sites in the same browser, get no data.
 class WebServer {
 public:
-    /// Answers from now on.
+    /// Answers requests from now on.
     /// @throws Error  InvalidOptions; Io (the port is taken; no random numbers; no sockets or threads).
     WebServer(Options options, Handlers handlers);
     ~WebServer();  ///< as stop()
@@ -101,16 +101,16 @@ public:
     [[nodiscard]] std::string url() const;
 
     /// Sends a text, UTF-8, to a client. From any thread; texts to one client arrive in the order of the calls.
-    /// @return false where the client is gone, or is closed now since too much waits for it
+    /// @return false if the client has left, or is closed now because too much data is queued for it
     bool send(Client client, std::string text);
-    /// Sends a text to all clients, in an order that is the same for all of them where threads call this at the same
-    /// time. A client gets broadcasts from the first send() to it on, and at the latest from when `opened` has
-    /// returned: what `opened` sends is the first that it gets.
+    /// Sends a text to all clients. The order is the same for all of them, even if threads call this concurrently. A
+    /// client gets broadcasts from the first send() to it on, and at the latest when `opened` has returned: the texts
+    /// that `opened` sends arrive first.
     void broadcast(std::string text);
 
-    /// Closes all connections and waits for its threads, which takes less than a second beside the handlers that are
-    /// running: those are waited for. Requests and messages that wait for a handler are dropped; `closed` is called for
-    /// each client. From any thread but the handlers', and more than once.
+    /// Closes all connections and waits for its threads, which takes less than a second in addition to the running
+    /// handlers, which are waited for. Pending requests and messages are discarded; `closed` is called for each client.
+    /// May be called from any thread except the handlers', and more than once.
     void stop();
 
 private:

@@ -1,7 +1,7 @@
-"""The module Covol of 3D Slicer: the surface through markups on a volume, as a segmentation and a model.
+"""The module Covol of 3D Slicer: computes the surface through markups on a volume, as a segmentation and a model.
 
-Edit > Application Settings > Modules > Additional module paths takes the folder of this file. Needs the program covol and Linux. What it
-does stands in CovolLib/job.py; this file has the panel alone.
+To install it, add the folder of this file to Edit > Application Settings > Modules > Additional module paths. Needs the program covol
+and Linux. The functions are in CovolLib/job.py; this file contains only the panel.
 """
 import ctk
 import qt
@@ -10,7 +10,7 @@ from slicer.ScriptedLoadableModule import ScriptedLoadableModule, ScriptedLoadab
 
 from CovolLib import _process, job
 
-TICK = 100  # milliseconds between two looks at a run
+TICK = 100  # milliseconds between two checks of a run
 
 
 class Covol(ScriptedLoadableModule):
@@ -45,9 +45,9 @@ class CovolWidget(ScriptedLoadableModuleWidget):
         self.start = qt.QPushButton("Find the surface")
         self.start.connect("clicked(bool)", self.onStart)
         form.addRow(self.start)
-        self.said = qt.QLabel()
-        self.said.wordWrap = True
-        form.addRow(self.said)
+        self.message = qt.QLabel()
+        self.message.wordWrap = True
+        form.addRow(self.message)
         self.layout.addStretch(1)
         self.timer = qt.QTimer()
         self.timer.setInterval(TICK)
@@ -78,21 +78,21 @@ class CovolWidget(ScriptedLoadableModuleWidget):
     def onTick(self):
         events = self.job.process.poll()
         for kind, value in events or []:
-            self.said.text = f"{value[0]} {100 * value[1]:.0f} %" if kind == "stage" else value
+            self.message.text = f"{value[0]} {100 * value[1]:.0f} %" if kind == "stage" else value
         if events is not None:
             return
         self.timer.stop()
         self.start.text = "Find the surface"
         done, self.job = self.job, None
-        # A person may have removed the nodes of the last result.
+        # The user may have removed the nodes of the last result.
         last = [node if node is not None and slicer.mrmlScene.IsNodePresent(node) else None for node in (self.segmentation, self.model)]
         try:
             self.segmentation, self.model, report = done.finish(*last)
-            self.said.text = "\n".join(job.summary(report))
+            self.message.text = "\n".join(job.summary(report))
         except _process.Interrupted:
-            self.said.text = "cancelled"
+            self.message.text = "cancelled"
         except _process.Failed as error:
-            self.said.text = str(error)
+            self.message.text = str(error)
             slicer.util.errorDisplay(str(error))
 
     def cleanup(self):

@@ -1,5 +1,5 @@
-// Makes two pages, each one file: viewer.html (what covol report writes) of page.html, and mark.html (what covol mark
-// serves) of mark_page.html. --out FOLDER puts them elsewhere; --check only says whether they are what would be made.
+// Builds two pages, each as one file: viewer.html (written by covol report) from page.html, and mark.html (served by covol
+// mark) from mark_page.html. --out FOLDER writes them to another folder; --check only checks whether they are up to date.
 import * as esbuild from 'esbuild';
 import {createHash} from 'node:crypto';
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';

@@ -6,27 +6,28 @@
 
 namespace covol {
 
-/// The state of a run's flows on disk, at intervals: a run that was killed goes on from it and ends with the same bits.
-/// Each flow has a number, in the order of evolve()'s calls, which has to be the same each time; what a run computes
-/// before a flow and between two of them (tags, distances, edges) it computes again.
+/// Saves the states of a run's flows to disk at intervals: a run that was killed resumes from them and ends with
+/// bit-identical results. Each flow has a number, in the order of the calls of evolve(), which has to be the same in
+/// each run. What a run computes before a flow and between two flows (tags, distances, edges) is not saved but computed
+/// again.
 ///
-/// Of flow N there are flow-N.vdb (u, and the edges where the band has reached new ones: files to look at) and
-/// flow-N.state, which are put in place together.
+/// Flow N is stored in flow-N.vdb (u, and the edges if the band has reached new ones; meant for viewing) and
+/// flow-N.state; both are put in place together.
 class COVOL_API Checkpoints {
 public:
-    /// @param folder  made where it is not there
+    /// @param folder  created if it does not exist
     /// @param every   seconds between two states of a flow; 0: one after each step
-    /// @param job     what tells this run from others: version, options, digests of the inputs
-    /// @param resume  whether the run goes on from states that the folder holds
-    /// @throws Error Io; InvalidInput (states of another job, or without `resume` of any).
+    /// @param job     identifies this run: version, options, digests of the inputs
+    /// @param resume  whether the run resumes from states in the folder
+    /// @throws Error Io; InvalidInput (states of another job; any states, if not `resume`).
     Checkpoints(const std::string& folder, double every, const std::string& job, bool resume);
     ~Checkpoints();
     Checkpoints(const Checkpoints&) = delete;
     Checkpoints& operator=(const Checkpoints&) = delete;
 
-    /// Whether the folder had states.
+    /// Whether the folder contained states.
     [[nodiscard]] bool had_states() const noexcept;
-    /// Once the results are in place: removes what was written here, and the folder where nothing else is in it.
+    /// Called once the results are in place: removes the files written here, and the folder if nothing else is in it.
     void remove() noexcept;
 
     // For evolve():
@@ -35,7 +36,7 @@ public:
     /// "FOLDER/flow-03.vdb"
     [[nodiscard]] std::string file(int flow, const char* ending) const;
     [[nodiscard]] bool is_due() const;
-    /// A state was written.
+    /// Called after a state was written.
     void restart_clock();
 
 private:

@@ -9,7 +9,7 @@
 
 namespace covol {
 
-/// How alike two solids are. Distances between their surfaces are symmetric (both directions pooled), world units.
+/// Similarity of two solids. Distances between their surfaces are symmetric (both directions pooled), in world units.
 struct CompareReport {
     double dice = 0, jaccard = 0;
     double volume_a = 0, volume_b = 0;
@@ -18,17 +18,17 @@ struct CompareReport {
     double assd = 0;       ///< the mean: average symmetric surface distance
 };
 
-/// A solid in one of the forms that covol writes. Masks: label 0 is outside; `label` picks one, 0 any.
+/// A solid in one of the forms that covol writes. Masks: label 0 is outside; `label` selects one, 0 selects any.
 struct Solid {
     std::optional<Image> mask;
     int label = 0;
     std::optional<TriangleMesh> mesh;
     FloatGridPtr level_set;
 };
-/// By the name's end: images, meshes, .vdb (as read_vdb_level_set chooses).
+/// The form is chosen by the file extension: images, meshes, .vdb (the grid is chosen as in read_vdb_level_set()).
 [[nodiscard]] COVOL_API Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
-/// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.
+/// Overlap on the finer of both lattices (a mask's own voxels if one is a mask), and distances between the surfaces.
 [[nodiscard]] COVOL_API CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
 
 }  // namespace covol

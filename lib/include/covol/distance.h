@@ -28,9 +28,9 @@ struct DistanceResult {
 
 /// Unsigned distance from voxel centres to the nearest point, in the tube d <= max_distance within the domain.
 ///
-/// Each voxel keeps the index of its nearest known point; the index is swept through the tube in the 8 orderings of
-/// fast sweeping (Zhao 2005), leaf by leaf, so every value is an exact distance to some point and nearly always to the
-/// nearest one. Values do not depend on the number of threads.
+/// Each voxel stores the index of its nearest known point; the index is swept through the tube in the 8 orderings of
+/// fast sweeping (Zhao 2005), leaf by leaf, so that every value is an exact distance to some point and almost always to
+/// the nearest one. Values do not depend on the number of threads.
 /// @param points  world positions, finite, at least one; points outside the domain count too.
 /// @throws Error InvalidOptions, InvalidInput.
 [[nodiscard]] COVOL_API DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain,

@@ -37,24 +37,22 @@ struct Domain {
     friend bool operator==(const Domain&, const Domain&) = default;
 };
 
-/// The fewest voxels of edge h whose union covers `box`, centred on it.
-/// A box that is a whole number of voxels is matched exactly, so that an isotropic image's
-/// voxels are the domain's voxels.
+/// The smallest set of voxels of edge h whose union covers `box`, centred on it. A box that is a whole number of voxels
+/// is matched exactly, so that an isotropic image's voxels are the domain's voxels.
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
 /// axis).
 [[nodiscard]] COVOL_API Domain make_domain(const WorldBox& box, double voxel_size);
 
-/// The voxels of `lattice` whose union covers `box`, up to rounding; where the lattice's own voxels end does not
-/// matter. Boxes on one lattice have one transform, so that their grids may be joined voxel by voxel.
+/// The voxels on the lattice of `lattice` whose union covers `box`, up to rounding; the extent of `lattice` itself is
+/// ignored. Boxes on one lattice share one transform, so that their grids can be joined voxel by voxel.
 /// @throws Error InvalidInput (an empty box, or one that reaches more than 2^23 voxels from voxel (0,0,0)).
 [[nodiscard]] COVOL_API Domain covering(const Domain& lattice, const WorldBox& box);
 
 /// The voxels of edge h that cover `box`, on a lattice that does not depend on `box`: two parts of an image or of a
-/// cloud share it, so that their grids may be joined.
-/// @param image   the world box of the image, whose voxels are the lattice's where h is their spacing; none: the
-/// lattice
-///                begins at the world's origin, or, more than 2^22 voxels from it, at a multiple of 2^22 voxels
-/// @param origin  the centre of voxel (0,0,0) instead, where it is stated
+/// cloud share it, so that their grids can be joined.
+/// @param image   the world box of the image, whose voxels are the lattice's if h is their spacing; none: the lattice
+///     begins at the world's origin, or, for a box more than 2^22 voxels from it, at a multiple of 2^22 voxels
+/// @param origin  the centre of voxel (0,0,0) instead, if given
 /// @throws Error InvalidOptions, InvalidInput as make_domain and covering.
 [[nodiscard]] COVOL_API Domain choose_domain(const WorldBox& box, double voxel_size,
                                              const std::optional<WorldBox>& image, const std::optional<Vec3>& origin);
@@ -62,7 +60,7 @@ struct Domain {
 /// The same lattice with `layers` more voxels on every side.
 [[nodiscard]] COVOL_API Domain widened(Domain domain, int layers);
 
-/// Box around the points, `margin` (world units) wider on every side.
+/// Box around the points, enlarged by `margin` (world units) on every side.
 [[nodiscard]] COVOL_API WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
 
 /// Sets the grid's transform and stores the box as metadata ("covol_domain_min", "covol_domain_max").
@@ -70,7 +68,7 @@ COVOL_API void set_domain(FloatGrid& grid, const Domain& domain);
 
 /// The domain that set_domain stored. Without the metadata the box is the bounding box of the
 /// active voxels grown by one leaf (8 voxels), so that nothing touches its boundary.
-/// @throws Error InvalidInput when the transform is not a uniform scale and a translation.
+/// @throws Error InvalidInput if the transform is not a uniform scale and a translation.
 [[nodiscard]] COVOL_API Domain domain_of(const FloatGrid& grid);
 
 /// An empty grid on `domain`: `background` everywhere, no active voxel, the given name.

@@ -13,13 +13,14 @@
 
 namespace covol {
 
-/// What an edge is: s in g(s), Eq. (2), of the image normalised to [0,1].
+/// The quantity s in g(s), Eq. (2), that defines an edge, of the image normalised to [0,1].
 enum class EdgeFeature {
-    Automatic,   ///< detect_edges() takes Slope; segment() asks the marks of contours, see detect_feature()
-    Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, the paper's
-    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have
-                 ///< two
-    DarkLine  ///< s = 1 - G_σ * I
+    Automatic,   ///< detect_edges() uses Slope; segment() chooses by the image at the marks of contours, see
+                 ///< detect_feature()
+    Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, as in the paper
+    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, with no slope in the middle and one on
+                 ///< either side
+    DarkLine     ///< s = 1 - G_σ * I
 };
 template <>
 inline constexpr auto kWords<EdgeFeature> = std::array{"auto", "slope", "bright-line", "dark-line"};
@@ -33,10 +34,10 @@ struct EdgeOptions {
     std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: see edge_contrast
     std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
                                           ///< the band
-    /// that percentile, in (0,1); automatic: 0.9 for slopes, and for lines a third of the median: g then goes by
-    /// relative brightness, as contrast that varies needs
+    /// that percentile, in (0,1); automatic: 0.9 for slopes; for lines a third of the median, so that g depends on
+    /// relative brightness, as varying contrast requires
     std::optional<double> contrast_percentile;
-    /// mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
+    /// intensities mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
     std::optional<std::array<double, 2>> intensities;
 };
 
@@ -45,14 +46,14 @@ inline constexpr auto kOptions<EdgeOptions> = std::tuple{
     Option{"sigma", &EdgeOptions::sigma, kLength, with_image(Group::Edges), "presmoothing of the image",
            "2vx after tagging, else 1vx", "1vx"},
     Option{"edge_feature", &EdgeOptions::feature, with_image(Group::Edges),
-           "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes",
-           "what the marks of contours lie on, else slope", "slope"},
+           "kind of edges: borders between darker and brighter regions, or bright or dark sheets such as membranes",
+           "with contours what their marks lie on, else slope", "slope"},
     Option{"edge_k", &EdgeOptions::edge_k, kPositive, with_image(Group::Edges), "K in g = 1/(1 + K s^2)",
            "see `edge_contrast`"},
     Option{"edge_contrast", &EdgeOptions::edge_contrast, kPositive, with_image(Group::Edges),
-           "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to "
-           "[0,1]; not with `edge_k`",
-           "90 % percentile in the band, for lines a third of the median"},
+           "gradient (per world unit) or brightness of lines at which g = 1/2, in the image scaled to [0,1]; not with "
+           "`edge_k`",
+           "90th percentile in the band, for lines a third of the median"},
     Option{"contrast_percentile", &EdgeOptions::contrast_percentile, kBetween0And1},
     Option{"intensities", &EdgeOptions::intensities},
     Rule<EdgeOptions>{"intensities", "the darker one first",
@@ -64,7 +65,7 @@ struct EdgeReport {
     double sigma = 0;          ///< world units
     double edge_k = 0;         ///< K as used
     double edge_contrast = 0;  ///< 1/sqrt(K)
-    double low = 0, high = 0;  ///< as used
+    double low = 0, high = 0;  ///< intensities as used
 };
 
 struct EdgeResult {
@@ -79,18 +80,18 @@ struct EdgeResult {
 [[nodiscard]] COVOL_API EdgeResult detect_edges(const Image& image, const FloatGrid& topology,
                                                 const EdgeOptions& options = {}, const RunContext& run = {});
 
-/// What the image has where people mark a border, on the average over many places.
+/// What the image shows at positions where people mark a border, averaged over many of them.
 struct MarkedFeature {
     EdgeFeature feature = EdgeFeature::Slope;
-    double line = 0;  ///< brightness there, less that of both sides; intensities
+    double line = 0;  ///< brightness there, minus that of both sides; intensities
     double step = 0;  ///< half the difference between outside and inside
 };
 
-/// A line where the marked places differ from both of their sides by more than the sides differ, and by more than
-/// three standard errors; else a slope.
-/// @param places   world units
-/// @param normals  outward unit vectors; as many
-/// @param reach    how far beside a place its sides are looked at, world units
+/// A line if the marked positions differ from both of their sides by more than the sides differ from each other, and by
+/// more than three standard errors; else a slope.
+/// @param places   positions, world units
+/// @param normals  outward unit vectors, one for each position
+/// @param reach    distance from a position at which its two sides are sampled, world units
 [[nodiscard]] COVOL_API MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places,
                                                      const std::vector<Vec3>& normals, double reach);
 

@@ -11,12 +11,12 @@
 
 namespace covol {
 
-/// What a surface rests on, and where new marks would help most.
+/// What supports a surface, and where new marks would help most.
 struct EvidenceOptions {
-    double reach = 0.0;  ///< world units, > 0: the surface within this of a mark rests on the marks
-    /// in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
+    double reach = 0.0;  ///< world units, > 0: the surface within this distance of a mark is supported by the marks
+    /// in (0,1): where the edge strength 1 − g is below this, the image does not support the surface
     double weak_edge = 0.25;
-    int suggestions = 0;  ///< how many slices to name, >= 0
+    int suggestions = 0;  ///< number of slices to suggest, >= 0
 };
 
 template <>
@@ -33,13 +33,13 @@ struct SliceEvidence {
     double to_marks_mean = 0, to_marks_max = 0;  ///< from the surface to the nearest mark anywhere; 0 without marks
     double edge_strength = 0;                    ///< mean of 1 − g on the surface; 0 without an image
     int marks = 0;                               ///< that lie in the slice
-    double marks_mean = 0, marks_max = 0;        ///< from those to the surface
+    double marks_mean = 0, marks_max = 0;        ///< distance from those to the surface
 };
 
-/// A slice where marks would help, and the place in it where they would help most.
+/// A slice in which marks would help, and the position in it where they would help most.
 struct Suggestion {
     int slice = 0;
-    /// unsupported surface that marks along the outline there would reach, beyond earlier suggestions
+    /// unsupported surface that marks along the outline there would support, beyond earlier suggestions
     double area = 0;
     Vec3 index{0, 0, 0};  ///< voxels of the image
     Vec3 world{0, 0, 0};
@@ -48,17 +48,17 @@ struct Suggestion {
 struct Evidence {
     double reach = 0, weak_edge = 0;        ///< as used
     double area = 0, unsupported_area = 0;  ///< of the whole surface
-    std::vector<SliceEvidence> slices;      ///< those that the surface or a mark meets, ascending
-    std::vector<Suggestion> suggestions;    ///< best first; fewer than asked for when nothing is left to support
+    std::vector<SliceEvidence> slices;      ///< those that contain surface or a mark, ascending
+    std::vector<Suggestion> suggestions;    ///< best first; fewer than requested if no unsupported surface remains
     std::vector<float> distance_to_marks;   ///< at the mesh's vertices; empty without marks
     std::vector<float> edge_strength;       ///< 1 − g there; empty without an edge grid
 };
 
-/// Judges a surface by its marks and the image's edges.
+/// Assesses a surface by its marks and the image's edges.
 ///
-/// Triangles are split between the slices; one is unsupported when the means over its vertices say so. Slices are
+/// Triangles are split between the slices; a triangle is unsupported if the means over its vertices are. Slices are
 /// suggested greedily: the one whose outline would, with marks along it, support the most surface (within `reach` of
-/// the outline), then the next without what that one supports.
+/// the outline), then the next one without the surface that the first would support, and so on.
 /// @param mesh   world units
 /// @param marks  world positions, may be empty
 /// @param edge   g from detect_edges(); background 1
@@ -66,16 +66,16 @@ struct Evidence {
 [[nodiscard]] COVOL_API Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks,
                                                  const FloatGrid& edge, const ImageGeometry& geometry,
                                                  const EvidenceOptions& options, const RunContext& run = {});
-/// By the marks alone.
+/// By the marks alone, without edges.
 [[nodiscard]] COVOL_API Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks,
                                                  const ImageGeometry& geometry, const EvidenceOptions& options,
                                                  const RunContext& run = {});
 
-/// Share of a surface's area that lies farther than `reach` from every point: where the points do not determine it.
-/// @param distance  to the points; its background, for what lies beyond its tube, is at least `reach`
+/// Fraction of a surface's area that is farther than `reach` from every point and thus not determined by the points.
+/// @param distance  to the points; its background, the value beyond its tube, is at least `reach`
 [[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
                                                                double reach, const RunContext& run = {});
-/// The same, on a distance grid of its own with a third of `reach` as voxel size.
+/// The same, on a temporary distance grid with a third of `reach` as voxel size.
 [[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh,
                                                                const std::vector<Vec3>& points, double reach,
                                                                const RunContext& run = {});

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <memory>
 
-// OpenVDB's FloatGrid by forward declaration, so that covol's headers cost nothing to include.
-// Include <openvdb/openvdb.h> where you look inside a grid.
+// Forward declaration of OpenVDB's FloatGrid, so that covol's headers are cheap to include.
+// Include <openvdb/openvdb.h> to access the contents of a grid.
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {

@@ -12,19 +12,20 @@
 
 namespace covol {
 
-/// Standard deviation of what is uniform over a unit: of a mark's place in its voxel, where nothing else is known.
+/// Standard deviation of a uniform distribution over a unit: of a mark's position in its voxel, if nothing else is
+/// known.
 inline constexpr double kUniformDeviation = 0.3;
 
 struct GuessOptions {
-    /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its
+    /// Standard deviation of a mark along three directions, as world vectors (an image's axes times a fraction of its
     /// spacing).
     std::array<Vec3, 3> deviation{};
-    /// The largest that it may be, where marks fit each other badly; up to `deviation`: as it is said.
+    /// Maximum to which the deviation may be raised if the marks are inconsistent; up to `deviation`: it is not raised.
     double max_deviation = 0;
-    std::vector<Vec3> inside, outside;  ///< places whose side is known
-    /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
+    std::vector<Vec3> inside, outside;  ///< positions whose side is known
+    /// The box at which the body is cut off. Marks in the cut are distinguished from marks on the surface.
     std::optional<WorldBox> end;
-    /// About where the normals point, outwards: one for each mark. Empty: nothing is known.
+    /// Approximate outward normals, one for each mark. Empty: unknown.
     std::vector<Vec3> normals;
 };
 
@@ -38,25 +39,25 @@ inline constexpr auto kOptions<GuessOptions> =
                Option{"normals", &GuessOptions::normals}};
 
 struct GuessReport {
-    std::size_t marks = 0;        ///< that hold the surface
-    std::size_t cut_marks = 0;    ///< that lie in the cut, inside the body: left out
-    std::size_t patches = 0;      ///< surfaces of a part of the marks; 0: one of all of them
-    bool held_around = false;     ///< by itself the surface would go on beyond the marks, and not close
-    std::size_t wrong_seeds = 0;  ///< places of GuessOptions that lie on the wrong side in spite of all
-    std::string summary;          ///< one line for people
+    std::size_t marks = 0;        ///< that determine the surface
+    std::size_t cut_marks = 0;    ///< that lie in the cut, inside the body: not used
+    std::size_t patches = 0;      ///< surfaces through subsets of the marks; 0: one surface through all of them
+    bool held_around = false;     ///< the unconstrained surface would extend beyond the marks and not close
+    std::size_t wrong_seeds = 0;  ///< positions of GuessOptions that still lie on the wrong side
+    std::string summary;          ///< one line for the user
 };
 
-/// Whether marks can have a body between them: at least four, not all in one plane.
+/// Whether marks can enclose a body: at least four, not all in one plane.
 [[nodiscard]] COVOL_API bool can_enclose(const std::vector<Vec3>& marks);
 
 struct Guess {
-    FloatGridPtr u;           ///< a start as those of band.h: u0 clamped to +-3h, active beside the surface
-    std::vector<Vec3> marks;  ///< on the surface; the others lie in the cut
+    FloatGridPtr u;           ///< a start like those of band.h: u0 clamped to +-3h, active near the surface
+    std::vector<Vec3> marks;  ///< those on the surface; the others lie in the cut
     GuessReport report;
 };
 
-/// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
-/// lib/src/guess/variational.h). No density of marks is asked for.
+/// A guess of the surface from few marks: the surface of minimum bending energy through them (variational implicit
+/// surface, see lib/src/guess/variational.h). The marks need not be dense.
 /// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the
 /// domain).
 [[nodiscard]] COVOL_API Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks,

@@ -10,35 +10,36 @@
 
 namespace covol {
 
-/// What becomes of a surface where no points hold it.
+/// What happens to a surface where there are no points.
 enum class Holes {
-    Auto,   ///< Open if the points lie on sheets and hold less than half of the closed surface, else Close
-    Close,  ///< it goes on smoothly
+    Auto,   ///< Open if the points lie on sheets and cover less than half of the closed surface, else Close
+    Close,  ///< it continues smoothly
     Open,   ///< the mesh ends there; the level set stays closed
     Flat    ///< it is spanned by the flattest patch, in mesh and level set
 };
 template <>
 inline constexpr auto kWords<Holes> = std::array{"auto", "close", "open", "flat"};
 
-/// Whether a mesh is needed for it, and not a level set alone.
+/// Whether the policy needs a mesh, and not only a level set.
 [[nodiscard]] constexpr bool needs_mesh(Holes policy) { return policy == Holes::Open || policy == Holes::Flat; }
 
 struct HolesOptions {
     Holes policy = Holes::Auto;
-    /// world units, > 0: a hole is what lies farther from all points; automatic: choose_hole_distance()
+    /// world units, > 0: a hole is the surface that is farther from all points; automatic: choose_hole_distance()
     std::optional<double> distance;
 };
 
 template <>
-inline constexpr auto kOptions<HolesOptions> = std::tuple{
-    Option{"holes", &HolesOptions::policy, points_alone(Group::Clouds),
-           "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the "
-           "flattest patch spans it, in both; auto: it ends if that is more than half of it, else it goes on"},
-    Option{"hole_distance", &HolesOptions::distance, kPositiveLength, points_alone(Group::Clouds),
-           "a hole is where the surface lies farther from all points",
-           "3 spacings where they are sparse, at least 3vx"}};
+inline constexpr auto kOptions<HolesOptions> =
+    std::tuple{Option{"holes", &HolesOptions::policy, points_alone(Group::Clouds),
+                      "what happens where there are no points: the surface continues smoothly (close), the mesh ends "
+                      "and only the level set stays closed (open), or both are closed by the flattest patch (flat); "
+                      "auto: open if this concerns more than half of the surface, else close"},
+               Option{"hole_distance", &HolesOptions::distance, kPositiveLength, points_alone(Group::Clouds),
+                      "a hole is a part of the surface that is farther than this from all points",
+                      "3 times the spacing where the points are sparse, at least 3vx"}};
 
-/// A closed line on which a mesh ends.
+/// A closed line at which a mesh ends.
 struct BoundaryLoop {
     std::size_t edges = 0;
     double length = 0;  ///< world units
@@ -49,22 +50,22 @@ struct BoundaryLoop {
 struct HolesReport {
     Holes policy = Holes::Close;  ///< what was done, never Auto
     double distance = 0;          ///< as used
-    double fraction = 0;          ///< of the closed surface's area: what was trimmed, or made flat
-    double closed_volume = 0;     ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
-    std::size_t dropped_pieces = 0;   ///< between holes, too small to stay
+    double fraction = 0;          ///< of the closed surface's area that was trimmed or flattened
+    double closed_volume = 0;     ///< only from segment(): of the level set, if the mesh is open and has none; else 0
+    std::size_t dropped_pieces = 0;   ///< between holes, too small to be kept
     std::vector<BoundaryLoop> loops;  ///< of the holes
 };
 
-/// A distance from which on points are missing: three spacings where they lie sparsely (the 95 % nearest neighbour),
-/// and three voxels. Of points spread evenly at random hardly a gap is as wide (one of 10^12 discs of that radius is
-/// empty).
+/// The distance beyond which points are missing: three spacings where points are sparse (95th percentile of the
+/// nearest-neighbour distance), at least three voxels. Points that are spread uniformly at random hardly ever have such
+/// a wide gap (one in 10^12 discs of that radius is empty).
 [[nodiscard]] COVOL_API double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size);
 
-/// At each vertex, to the nearest point. @pre there is a point
+/// The distance of each vertex to the nearest point. @pre there is a point
 [[nodiscard]] COVOL_API std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points,
                                                              const RunContext& run = {});
 
-/// Share of the area that lies farther than `distance` from every point, of the distances at the vertices.
+/// Fraction of the area that is farther than `distance` from every point, from the distances at the vertices.
 [[nodiscard]] COVOL_API double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
                                                        double distance);
 
@@ -73,20 +74,21 @@ struct TreatedHoles {
     HolesReport report;
 };
 
-/// Takes away what lies farther than `distance` from all points, back to the last of them: all that is closer than that
-/// to such a place. So a ball of that radius rolls along the rim, which is as smooth as it. Triangles are cut along the
-/// line, vertices close to it moved onto it, and pieces smaller than the ball's disc left out.
+/// Removes the surface that is farther than `distance` from all points, and everything closer than that to a removed
+/// position, so that the hole extends back to the points. The rim is therefore traced by a rolling ball of that radius,
+/// and as smooth as one. Triangles are cut along the rim, vertices close to it are moved onto it, and pieces smaller
+/// than the ball's disc are dropped.
 /// @param mesh       closed, manifold, outward
 /// @param to_points  measure_distances()
-/// @param slack      of the rim beyond the last points, world units, < distance
-/// @return 2-manifold with boundary, outward; the mesh itself where there is no hole
-/// @throws Error InvalidInput where nothing is left.
+/// @param slack      width of the surface that is kept beyond the last points, world units, < distance
+/// @return 2-manifold with boundary, outward; the mesh itself if there is no hole
+/// @throws Error InvalidInput if nothing remains.
 [[nodiscard]] COVOL_API TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                 double distance, double slack, const RunContext& run = {});
 
-/// The same cut, with the surface of least area in each hole instead of what was there (Pinkall and Polthier, Computing
-/// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may pass through itself: a
-/// level set made from it does not.
+/// The same cut, with the surface of minimum area in each hole in place of what was there (Pinkall and Polthier,
+/// Computing discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may intersect
+/// itself; a level set made from it does not.
 [[nodiscard]] COVOL_API TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                    double distance, double slack, const RunContext& run = {});
 

@@ -20,19 +20,19 @@ namespace detail {
 class ChunkedVoxels;
 }
 
-/// Where an image's voxels lie in the world, as ITK has it (LPS):
+/// The position of an image's voxels in the world, as in ITK (LPS):
 /// world = origin + direction * diag(spacing) * (i,j,k), voxel centres at integers.
 struct ImageGeometry {
     Index3 size{0, 0, 0};                                  ///< voxels along i, j, k
     Vec3 spacing{1, 1, 1};                                 ///< world units, > 0
     Vec3 origin{0, 0, 0};                                  ///< world position of the centre of voxel (0,0,0)
     Matrix3 direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< columns are the axes i, j, k; orthonormal
-    std::string unit;                                      ///< "um", "mm", ... or empty when the file does not say
-    bool spacing_known = true;  ///< false: the file states no spacing, and 1 stands in for what is missing
+    std::string unit;                                      ///< "um", "mm", ... or empty if the file does not state it
+    bool spacing_known = true;  ///< false: the file states no spacing, and 1 replaces the missing values
 
     [[nodiscard]] COVOL_API Vec3 index_to_world(const Vec3& index) const;
     [[nodiscard]] COVOL_API Vec3 world_to_index(const Vec3& world) const;
-    /// The smallest box that holds every voxel (cubes, not centres).
+    /// The smallest box that contains every voxel (whole voxels, not only their centres).
     [[nodiscard]] COVOL_API WorldBox world_box() const;
     /// Direction is the identity up to 1e-6.
     [[nodiscard]] COVOL_API bool is_axis_aligned() const;
@@ -43,7 +43,7 @@ enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double 
 
 /// "uint8", ..., "float", "double"
 [[nodiscard]] COVOL_API const char* to_string(PixelType type);
-/// Of one pixel.
+/// Bytes of one pixel.
 [[nodiscard]] COVOL_API std::size_t bytes_of(PixelType type);
 
 /// The voxels min..max of an image, inclusive.
@@ -57,13 +57,13 @@ struct VoxelBox {
 };
 
 struct ReadImageOptions {
-    std::optional<Vec3> spacing;  ///< world units, > 0; automatic: the file's
+    std::optional<Vec3> spacing;  ///< world units, > 0; automatic: that of the file
     std::optional<int> channel;   ///< of a hyperstack, from 0; automatic: there must be only one
     std::optional<int> frame;     ///< time point of a series, from 0; automatic: there must be only one
-    /// Read only what samples within this box need: the voxels in it and one more on every side.
+    /// Reads only what samples within this box need: the voxels in it and one more on every side.
     std::optional<WorldBox> roi = {};
-    /// A coarse level of a pyramid that states no translation is moved by half the difference between its spacing and
-    /// the finest level's: where voxels are means of finer ones, that is where they lie.
+    /// Moves a coarse level of a pyramid that states no translation by half the difference between its spacing and that
+    /// of the finest level: its voxels lie there if they are means of finer ones.
     bool correct_level_shift = false;
 };
 
@@ -72,85 +72,87 @@ inline constexpr auto kOptions<ReadImageOptions> =
     std::tuple{Option{"spacing", &ReadImageOptions::spacing, kPositiveLength, Group::Input,
                       "voxel spacing, instead of the file's"},
                Option{"channel", &ReadImageOptions::channel, kNotNegative, Group::Input,
-                      "channel of an image that has several, from 0"},
+                      "channel of an image with several channels, counted from 0"},
                Option{"frame", &ReadImageOptions::frame, kNotNegative, Group::Input,
-                      "time point of an image that has several, from 0"},
-               Option{"roi", &ReadImageOptions::roi, Group::Input, "take this box of the world only"},
+                      "time point of an image with several time points, counted from 0"},
+               Option{"roi", &ReadImageOptions::roi, Group::Input, "read only this box, in world coordinates"},
                Option{"correct_level_shift", &ReadImageOptions::correct_level_shift, Group::Input,
-                      "move a coarse level of an OME-Zarr image that states no translation onto the finest one"}};
+                      "align a coarse level of an OME-Zarr image with the finest level if it states no translation"}};
 
-/// The chunks of an image whose file keeps it in boxes that are packed each on its own.
+/// The chunks of an image whose file stores it in separately compressed boxes.
 struct ChunkCount {
     Index3 size{0, 0, 0};     ///< voxels of a chunk along i, j, k
     std::uint64_t read = 0;   ///< how many were read and decoded
     std::uint64_t total = 0;  ///< of the whole image
 };
 
-/// Voxels as they lie in memory.
+/// Voxels in their memory layout.
 struct VoxelView {
     PixelType type = PixelType::Float;
-    std::shared_ptr<const void> first;            ///< voxel (0,0,0); keeps the memory
-    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< pixels from a voxel to the next along i, j, k; of any sign
+    std::shared_ptr<const void> first;            ///< voxel (0,0,0); keeps the memory alive
+    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< pixels from one voxel to the next along i, j, k; of any sign
 };
 
-/// A scalar 3D image in the file's own pixel type (a byte stays a byte).
+/// A scalar 3D image in the file's own pixel type (a byte remains a byte).
 ///
-/// Its geometry is always the whole image's; with ReadImageOptions::roi only a box of voxels is held. Large files that
-/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Of large images in
-/// chunks each chunk is read when its first voxel is asked for, and kept; a damaged one is found then, and thrown by
-/// whatever asked. Such files must not be changed while the image lives.
+/// Its geometry is always that of the whole image; with ReadImageOptions::roi only a box of voxels is held. Large files
+/// that store their pixels in the layout of memory are mapped, not read: only accessed parts take memory. Of large
+/// images in chunks each chunk is read when its first voxel is requested, and kept; a damaged chunk is only found then,
+/// and the function that requested it throws. Such files must not be changed during the lifetime of the image.
 class Image {
 public:
     [[nodiscard]] const ImageGeometry& geometry() const noexcept { return geometry_; }
     [[nodiscard]] PixelType pixel_type() const noexcept { return type_; }
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
-    /// The voxels that can be asked for.
+    /// The voxels that can be requested.
     [[nodiscard]] const VoxelBox& held() const noexcept { return held_; }
     /// The value of voxel (i,j,k); @pre held.
     [[nodiscard]] COVOL_API double at(int i, int j, int k) const;
     /// The values of a box of held voxels, i fastest. @pre held.
     COVOL_API void copy(const VoxelBox& box, float* out) const;
-    /// How much of the file was read; none where it has no chunks.
+    /// How much of the file was read; none if it has no chunks.
     [[nodiscard]] COVOL_API std::optional<ChunkCount> chunks() const;
 
-    /// Trilinear samples at the centres of the voxels min..max (inclusive) of `frame`'s lattice;
-    /// positions outside the image take the nearest voxel's value.
+    /// Trilinear samples at the centres of the voxels min..max (inclusive) of `frame`'s lattice; positions outside the
+    /// image take the nearest voxel's value.
     /// @param out  (max-min+1) values, k fastest (OpenVDB's leaf order).
-    /// @throws Error InvalidInput when they need voxels of the image that are not held.
+    /// @throws Error InvalidInput if they need voxels of the image that are not held.
     COVOL_API void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
 
-    /// Says which parts of `frame`'s lattice sample() will be asked for: of a large image in chunks they are decoded
-    /// now, in the file's order and in parallel, and not one by one as they come. Of other images nothing happens.
+    /// Announces which parts of `frame`'s lattice will be requested from sample(): of a large image in chunks they are
+    /// decoded now, in the file's order and in parallel, instead of one by one on request. For other images this does
+    /// nothing.
     /// @throws Error InvalidInput (damaged), Io, Cancelled, InvalidOptions (more than run.memory_budget).
     COVOL_API void load(const Domain& frame, const std::vector<VoxelBox>& boxes, const RunContext& run = {}) const;
-    /// The same for samples at single places of the world.
+    /// The same for samples at single positions in the world.
     COVOL_API void load(const std::vector<Vec3>& places, const RunContext& run = {}) const;
-    /// The same for a box of held voxels that copy() or at() will be asked for.
+    /// The same for a box of held voxels that will be requested from copy() or at().
     COVOL_API void load(const VoxelBox& box, const RunContext& run = {}) const;
 
-    /// Gives the pages of a mapped file that were touched back to the system; they are read again when asked for.
-    /// Of images that are not mapped nothing is given back.
+    /// Returns the accessed pages of a mapped file to the system; they are read again on request. Does nothing for
+    /// images that are not mapped.
     COVOL_API void release() const;
 
-    /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
-    /// large images are subsampled on a regular lattice; of large images in chunks the chunks that were read so far
-    /// count, or some on a regular lattice where none was).
+    /// Intensities below which the fractions `low` and `high` of the held voxels lie. Deterministic; large images are
+    /// subsampled on a regular lattice; of large images in chunks the chunks read so far are used, or some on a regular
+    /// lattice if none was read.
     [[nodiscard]] COVOL_API std::array<double, 2> percentiles(double low, double high) const;
-    /// Smallest and largest value of the held voxels; of a mapped file of some slices, of chunks as above.
+    /// Minimum and maximum of the held voxels; of a mapped file, of some slices; of chunks, as above.
     [[nodiscard]] COVOL_API std::array<double, 2> range() const;
     /// The held voxels as an image of their own; shares their memory.
     [[nodiscard]] COVOL_API Image cropped() const;
-    /// The same voxels elsewhere in the world; shares their memory. @throws Error InvalidInput when the sizes differ.
+    /// The same voxels at another position in the world; shares their memory. @throws Error InvalidInput if the sizes
+    /// differ.
     [[nodiscard]] COVOL_API Image placed(const ImageGeometry& geometry) const;
 
-    /// Takes a copy of `values` (i fastest, size[0]*size[1]*size[2]).
+    /// Copies `values` (i fastest, size[0]*size[1]*size[2]).
     COVOL_API static Image from_values(const ImageGeometry& geometry, const float* values);
     COVOL_API static Image from_values(const ImageGeometry& geometry, const std::uint8_t* values);
-    /// Takes no copy: the voxels stay where they are, and must not change while the image lives.
-    /// @throws Error InvalidInput (no voxel, a spacing or an origin that is none, values that are not finite),
-    ///               Unsupported (axes that are not perpendicular).
+    /// Does not copy: the voxels stay where they are, and must not change during the lifetime of the image.
+    /// @throws Error InvalidInput (no voxel, an invalid spacing or origin, values that are not finite), Unsupported
+    ///     (axes that are not perpendicular).
     [[nodiscard]] COVOL_API static Image from_view(const ImageGeometry& geometry, const VoxelView& voxels);
-    /// The held voxels, without a copy; none of an image whose chunks are read when they are asked for.
+    /// The held voxels, without a copy; none for an image whose chunks are read on request.
     [[nodiscard]] COVOL_API std::optional<VoxelView> view() const;
 
 private:
@@ -172,69 +174,70 @@ private:
     std::string path_;
     VoxelBox held_;
     std::shared_ptr<const void> data_;             // voxel held_.min
-    std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from a voxel to the next along i, j, k
+    std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from one voxel to the next along i, j, k
     bool mapped_ = false;
     std::shared_ptr<const detail::ChunkedVoxels> chunks_;  // in place of data_
     Index3 first_{0, 0, 0};                                // the file's voxel that is held_.min
     std::optional<ChunkCount> chunk_count_;
 };
 
-/// What a file's header says, and where it says so.
+/// The content of a file's header, and the fields that it comes from.
 struct ImageInfo {
     ImageGeometry geometry;
     PixelType type = PixelType::Float;
     std::string format;                      ///< "ImageJ TIFF", "NIfTI-1", ...
-    std::string axis_order;                  ///< the file's, fastest first: "XYCZT"
-    int channels = 1;                        ///< chosen from by ReadImageOptions::channel
-    int frames = 1;                          ///< chosen from by ReadImageOptions::frame
+    std::string axis_order;                  ///< of the file, fastest first: "XYCZT"
+    int channels = 1;                        ///< ReadImageOptions::channel chooses one of them
+    int frames = 1;                          ///< ReadImageOptions::frame chooses one of them
     std::vector<std::string> channel_names;  ///< empty, or one for each channel
     std::array<bool, 3> spacing_known{true, true, true};
-    /// Header fields that were used, and their values as they stand there.
+    /// Header fields that were used, with their values as in the file.
     std::vector<std::pair<std::string, std::string>> fields;
-    /// Memory that read_image() takes; 0 where it maps the file, or reads chunks when they are asked for.
+    /// Memory that read_image() takes; 0 if it maps the file or reads chunks on request.
     std::uint64_t bytes_to_hold = 0;
-    Index3 chunk_size{0, 0, 0};       ///< voxels of a chunk; 0: it is not read in chunks
-    std::vector<std::string> levels;  ///< of a pyramid, each with its size, the finest first; empty: there is none
+    Index3 chunk_size{0, 0, 0};       ///< voxels of a chunk; 0: the image is not read in chunks
+    std::vector<std::string> levels;  ///< of a pyramid, each with its size, the finest first; empty: no pyramid
 };
 
-/// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,
+/// Reads a 3D image: TIFF (including descriptions by ImageJ, OME and tifffile; BigTIFF, tiles, several files), NRRD,
 /// NIfTI, MetaImage, MRC, a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and 3 (the folder of
 /// the image, or of one level), HDF5 (Imaris, BigDataViewer, ITK's, or a dataset: "FILE.h5:/path/to/dataset"), a float
-/// grid of a .vdb file ("FILE.vdb:name", or its first one; the box of its active voxels). A file that states no spacing
-/// is a warning.
-/// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; an roi outside),
-///               Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
+/// grid of a .vdb file ("FILE.vdb:name", or its first one; the box of its active voxels). Warns if a file states no
+/// spacing.
+/// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; a roi outside),
+///     Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
 [[nodiscard]] COVOL_API Image read_image(const std::string& path, const ReadImageOptions& options = {},
                                          const RunContext& run = {});
 
-/// Only what the header says; of options.roi nothing. @throws as read_image.
+/// The geometry in the header only; options.roi is ignored. @throws as read_image.
 [[nodiscard]] COVOL_API ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {},
                                                           const RunContext& run = {});
 
-/// All that the header says. @throws as read_image, but channel and frame need not be chosen.
+/// Everything in the header. @throws as read_image, but channel and frame need not be chosen.
 [[nodiscard]] COVOL_API ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options = {},
                                                   const RunContext& run = {});
 
-/// The voxels that read_image() holds for `roi`. @throws Error InvalidInput when it misses the image.
+/// The voxels that read_image() holds for `roi`. @throws Error InvalidInput if it does not meet the image.
 [[nodiscard]] COVOL_API VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi);
 
-/// The lattice of `box` alone.
+/// The part of the geometry that `box` covers.
 [[nodiscard]] COVOL_API ImageGeometry cropped(const ImageGeometry& geometry, const VoxelBox& box);
 
-/// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif by the name's end; packed,
-/// except .nii. A TIFF has spacing, unit and origin (Fiji's way) but no place for a direction; NIfTI has no unit but
-/// the millimetre, the numbers are written as they are.
-/// Whole or not at all: to a temporary name beside the target, then renamed.
+/// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif, by the file extension;
+/// compressed, except .nii. A TIFF has spacing, unit and origin (as Fiji writes them) but cannot store a direction;
+/// NIfTI has no unit other than the millimetre, and the numbers are written unchanged. The file is written completely
+/// or not at all: to a temporary name beside the target, then renamed.
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
-/// The same with key/value pairs, which NRRD keeps and the other formats drop.
+/// The same with key/value pairs, which NRRD stores and the other formats drop.
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
                            const std::vector<std::pair<std::string, std::string>>& metadata);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
                            const std::vector<std::pair<std::string, std::string>>& metadata);
 
-/// What `write_image` can write, judged by the name alone. @throws Error InvalidOptions with the list.
+/// Checks by the name alone that `write_image` can write the file. @throws Error InvalidOptions with the list of
+/// extensions.
 COVOL_API void check_image_extension(const std::string& path);
 
 }  // namespace covol

@@ -8,8 +8,8 @@
 namespace covol {
 
 /// The files that read_image() reads for `path` beside that file, or in that folder: detached pixels, the other files
-/// of a series or of a set, descriptions in files of their own. Of a Zarr store, which is read as a whole, none. Names
-/// in a header need not be there.
+/// of a series or of a set, separate description files. None for a Zarr store, which is read as a whole. Files named in
+/// a header need not exist.
 /// @throws Error as read_image().
 [[nodiscard]] COVOL_API std::vector<std::string> list_image_files(const std::string& path, const RunContext& run = {});
 

@@ -13,14 +13,14 @@
 
 namespace covol {
 
-/// What a value of a label image stands for.
+/// The meaning of a value of a label image.
 struct NamedLabel {
     std::int32_t value = 0;
     std::string name;
     std::array<std::uint8_t, 3> color{187, 187, 187};  ///< red, green, blue
 };
 
-/// The voxels of an image that is written, a box at a time: only what is being packed is held.
+/// The voxels of an image that is written, one box at a time: only the boxes being compressed are in memory.
 class COVOL_API PixelSource {
 public:
     /// @param labels  the values are labels: coarse levels take the most frequent one, not the mean
@@ -36,16 +36,17 @@ public:
 
     /// Writes the values of `box`, of type(), to `out`, i fastest. Called by several threads at once.
     virtual void fill(const VoxelBox& box, void* out) const = 0;
-    /// The value of all voxels of `box`, where that is known without a look at each of them.
+    /// The value of all voxels of `box`, if it is known without evaluating each of them.
     [[nodiscard]] virtual std::optional<double> uniform(const VoxelBox& box) const;
-    /// No value lies outside; none where that takes a look at the voxels. ImageJ shows this range.
+    /// A range that contains all values; none if that requires evaluating the voxels. ImageJ displays this range.
     [[nodiscard]] virtual std::optional<std::array<double, 2>> range() const;
-    /// Hears of each voxel of the file once, by several threads at once.
-    /// @param values  of the box; null: all are `uniform`
+    /// Called once for each voxel of the file, from several threads at once.
+    /// @param values  of the box; null: all of them are `uniform`
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
-    /// Key/value pairs, for NRRD. Asked before the voxels, too: the later texts may be shorter, not longer.
+    /// Key/value pairs, for NRRD. Also called before the voxels are written: the later texts may be shorter, but not
+    /// longer.
     [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> metadata() const;
-    /// What the values stand for, for OME-Zarr and DICOM.
+    /// The meaning of the values, for OME-Zarr and DICOM.
     [[nodiscard]] virtual std::vector<NamedLabel> label_names() const;
 
 private:
@@ -54,13 +55,13 @@ private:
     bool is_labels_;
 };
 
-/// Whether a folder is an array or a group of Zarr 2 or 3: what a .zarr may replace.
+/// Whether a folder is an array or a group of Zarr 2 or 3, which writing a .zarr may replace.
 [[nodiscard]] COVOL_API bool is_zarr_store(const std::string& folder);
 
 struct WriteImageOptions {
-    bool pack = true;  ///< false: .nrrd and .mha with the voxels as they are in memory
-    /// The image whose lattice this is, or empty: a NIfTI file keeps its qform and sform and their codes, as long as
-    /// they mean that lattice; a DICOM segmentation belongs to its patient and study, and refers to its slices.
+    bool pack = true;  ///< false: .nrrd and .mha are not compressed
+    /// The file of the image with this lattice, or empty. A NIfTI file keeps its qform and sform and their codes if
+    /// they describe that lattice; a DICOM segmentation belongs to its patient and study, and refers to its slices.
     std::string like = {};
     std::optional<int> like_frame = {};  ///< of that image, as ReadImageOptions::frame
 };
@@ -68,14 +69,14 @@ struct WriteImageOptions {
 template <>
 inline constexpr auto kOptions<WriteImageOptions> = std::tuple{Option{"pack", &WriteImageOptions::pack}};
 
-/// Writes an image as the other write_image() do, but in boxes of a few MB that are filled and packed in parallel: the
-/// memory does not grow with the image. The file does not depend on the number of threads.
+/// Writes an image as the other overloads of write_image() do, but in boxes of a few MB that are filled and compressed
+/// in parallel: memory does not grow with the image. The file does not depend on the number of threads.
 ///
-/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .dcm is a DICOM segmentation (of labels alone); .zarr is OME-Zarr
-/// 0.4 in chunks of 128^3, with levels of half the size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF
-/// in tiles of 256 x 256. A folder that is no Zarr store is never replaced.
-/// @throws Error Io, InvalidOptions (ending), Unsupported (larger than the format allows), Cancelled; what the source
-///               throws. Nothing half-written stays.
+/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .dcm is a DICOM segmentation (labels only); .zarr is OME-Zarr 0.4
+/// in chunks of 128^3, with levels of half the size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in
+/// tiles of 256 x 256. A folder that is not a Zarr store is never replaced.
+/// @throws Error Io, InvalidOptions (extension), Unsupported (larger than the format allows), Cancelled; whatever the
+///     source throws. No partial file remains.
 COVOL_API void write_image(const std::string& path, const PixelSource& source, const WriteImageOptions& options = {},
                            const RunContext& run = {});
 

@@ -10,38 +10,39 @@
 
 namespace covol {
 
-/// A closed surface, kept as its signed distance: the grid is a level set of OpenVDB's, in world units, negative
-/// inside, with cubic voxels, and outside of a band of kHalfWidthVoxels voxels on both sides of the surface it is
-/// +-kHalfWidth voxels. A value: copies share the grid, and nothing writes to it.
+/// A closed surface, stored as its signed distance: the grid is an OpenVDB level set in world units, negative inside,
+/// with cubic voxels; outside of a band of kHalfWidthVoxels voxels on both sides of the surface its value is
+/// +-kHalfWidthVoxels voxels. A value type: copies share the grid, which is never modified.
 class LevelSet {
 public:
-    /// The zero level set of any grid that is negative inside; its distance is made exact.
-    /// @throws Error InvalidInput (no zero crossing; voxels that are no cubes), Cancelled.
+    /// The zero level set of any grid that is negative inside; it is redistanced exactly.
+    /// @throws Error InvalidInput (no zero crossing; voxels that are not cubes), Cancelled.
     [[nodiscard]] COVOL_API static LevelSet from(const FloatGrid& u, const RunContext& run = {});
-    /// Takes a grid that is such a distance already: extract_surface() and start_from_...() give one.
-    /// @throws Error InvalidInput (null, another class of grid, another background, voxels that are no cubes).
+    /// Takes a grid that already is such a distance, as from extract_surface() and start_from_...().
+    /// @throws Error InvalidInput (null, another class of grid, another background, voxels that are not cubes).
     COVOL_API explicit LevelSet(FloatGridPtr distance);
 
     [[nodiscard]] const FloatGrid& grid() const { return *grid_; }
-    /// For functions that take a pointer, and for files; not to be written to.
+    /// For functions that take a pointer, and for files; must not be modified.
     [[nodiscard]] const FloatGridPtr& pointer() const { return grid_; }
     [[nodiscard]] COVOL_API Domain domain() const;
 
-    /// Distances from places to the surface, trilinear between voxels, negative inside; no more than the band's half
-    /// width. @param places  world units
+    /// Distances from positions to the surface, trilinear between voxels, negative inside, limited to the half width of
+    /// the band. @param places  positions, world units
     [[nodiscard]] COVOL_API std::vector<double> sample(std::span<const Vec3> places) const;
     [[nodiscard]] COVOL_API double sample(const Vec3& place) const;
 
-    /// The surface moved outward by `distance` world units, < 0 inward, along its normals, as far as the domain goes.
-    /// @throws Error InvalidInput (nothing is left), InvalidOptions (not finite), Cancelled.
+    /// The surface moved outward by `distance` world units along its normals, inward if it is < 0, up to the domain's
+    /// end.
+    /// @throws Error InvalidInput (nothing remains), InvalidOptions (not finite), Cancelled.
     [[nodiscard]] COVOL_API LevelSet offset(double distance, const RunContext& run = {}) const;
-    /// What lies in one or the other, in both, or in this and not in the other, on this lattice and domain.
-    /// @throws Error InvalidInput (nothing is left), Cancelled.
+    /// The union, the intersection, or the difference of this and the other solid, on this lattice and domain.
+    /// @throws Error InvalidInput (nothing remains), Cancelled.
     [[nodiscard]] COVOL_API LevelSet united(const LevelSet& other, const RunContext& run = {}) const;
     [[nodiscard]] COVOL_API LevelSet intersected(const LevelSet& other, const RunContext& run = {}) const;
     [[nodiscard]] COVOL_API LevelSet without(const LevelSet& other, const RunContext& run = {}) const;
 
-    /// Volume, area, pieces and handles of its triangles, which are not kept.
+    /// Volume, area, components and genus of its triangle mesh, which is not kept.
     [[nodiscard]] COVOL_API MeshMeasures measure(const RunContext& run = {}) const;
 
 private:

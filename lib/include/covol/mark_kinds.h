@@ -9,17 +9,17 @@
 
 namespace covol {
 
-/// What a mark says of its place: it lies on the structure's surface, in the structure, or outside of it.
+/// The position of a mark: on the structure's surface, inside the structure, or outside of it.
 enum class MarkKind { Surface, Inside, Outside };
 template <>
 inline constexpr auto kWords<MarkKind> = std::array{"surface", "inside", "outside"};
 
-/// A file of marks, and the kind of each where a column `kind` of its table tells it.
+/// A file of marks, with the kind of each mark if its table has a column `kind`.
 struct KindedPoints {
     PointCloud cloud;
-    std::vector<MarkKind> kinds;  ///< one for each point; empty: the file tells none, all lie on the surface
+    std::vector<MarkKind> kinds;  ///< one for each point; empty: the file states none, all lie on the surface
 
-    /// The points of that kind alone. Those of a file without kinds are all surface, and keep their lines.
+    /// Only the points of that kind. Those of a file without kinds are all on the surface, and keep their lines.
     [[nodiscard]] COVOL_API PointCloud of(MarkKind kind) const;
 };
 

@@ -13,49 +13,49 @@ namespace covol {
 struct TriangleMesh {
     std::vector<std::array<float, 3>> vertices;  ///< relative to `origin`
     std::vector<std::array<std::uint32_t, 3>> triangles;
-    /// World. 0, but where the surface lies so far from there that single precision would not hold it, as clouds in
-    /// national grids do.
+    /// World. 0, unless the surface is too far from there for single precision, as clouds in national grid coordinates
+    /// are.
     Vec3 origin{0, 0, 0};
 
     [[nodiscard]] bool empty() const noexcept { return triangles.empty(); }
-    /// Where a vertex lies, world.
+    /// World position of a vertex.
     [[nodiscard]] Vec3 place(std::size_t vertex) const {
         const std::array<float, 3>& v = vertices[vertex];
         return {origin[0] + v[0], origin[1] + v[1], origin[2] + v[2]};
     }
 };
 
-/// A round place for the `origin` of a mesh within a box; 0 where no coordinate is more than 2^17 of the finest lengths
-/// of interest, which single precision divides into 128 steps there.
+/// Round coordinates for the `origin` of a mesh within a box; 0 if no coordinate exceeds 2^17 times the finest length
+/// of interest, which single precision still divides into 128 steps there.
 [[nodiscard]] COVOL_API Vec3 choose_mesh_origin(const WorldBox& box, double finest);
 
 /// The same mesh, its vertices relative to another origin.
 COVOL_API void move_mesh_origin(TriangleMesh& mesh, const Vec3& origin);
 
-/// Facts about a mesh; volume and genus are meant for closed meshes.
+/// Properties of a mesh; volume and genus are meant for closed meshes.
 struct MeshMeasures {
     double volume = 0;  ///< signed; positive when oriented outward
     double area = 0;
     int components = 0;     ///< edge-connected
-    int genus = 0;          ///< total over all components, from Euler's characteristic; -1 when not closed
+    int genus = 0;          ///< sum over all components, from Euler's characteristic; -1 if not closed
     bool closed = false;    ///< every edge belongs to exactly two triangles of opposite direction
     bool manifold = false;  ///< closed or not, each vertex's triangles form one fan and no edge has more than two
 };
 [[nodiscard]] COVOL_API MeshMeasures measure(const TriangleMesh& mesh);
 
-/// How far a mesh is from the surface that it stands for, in voxels.
+/// Distance of a mesh from the surface that it represents, in voxels.
 struct MeshDeviation {
     double max = 0;
     double mean = 0;  ///< over the area
 };
 
-/// The 1st percentile of the triangles' smallest angles, degrees; 0 of an empty mesh.
+/// The 1st percentile of the triangles' smallest angles, degrees; 0 for an empty mesh.
 [[nodiscard]] COVOL_API double smallest_angle(const TriangleMesh& mesh);
 
 /// Unit normals at the vertices, weighted by angle.
 [[nodiscard]] COVOL_API std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh);
 
-/// Drops unreferenced vertices and triangles of a component whose |volume| is below `min_volume`.
+/// Removes unreferenced vertices, and components whose |volume| is below `min_volume`.
 COVOL_API void remove_small_components(TriangleMesh& mesh, double min_volume);
 
 }  // namespace covol

@@ -11,8 +11,8 @@ namespace covol {
 
 struct RelaxOptions {
     double isovalue = 0.0;   ///< world units; that of extract_mesh()
-    int rounds = 3;          ///< >= 0: turns of edge flips and moves; 0 leaves the mesh as it is
-    double tolerance = 0.0;  ///< voxels; > 0: no change moves a triangle farther from the level set than that
+    int rounds = 3;          ///< >= 0: rounds of edge flips and moves; 0 leaves the mesh unchanged
+    double tolerance = 0.0;  ///< voxels; > 0: no change moves a triangle farther from the level set than this
 };
 
 template <>
@@ -24,24 +24,24 @@ struct RelaxReport {
     std::int64_t triangles = 0;  ///< afterwards
     double smallest_angle_before = 0,
            smallest_angle = 0;   ///< degrees: 1st percentile of the triangles' smallest angles
-    std::int64_t flips = 0;      ///< edges turned
-    std::int64_t collapses = 0;  ///< short sides of slivers drawn together
+    std::int64_t flips = 0;      ///< edges flipped
+    std::int64_t collapses = 0;  ///< short edges of slivers collapsed
     MeshDeviation deviation;     ///< from the level set, of the vertices too
 };
 
-/// Makes the triangles of a level set's mesh well shaped: edges are turned where that widens the smallest angle,
-/// vertices move towards the middle of their neighbours along the surface and back onto the level set (tangential
-/// relaxation, as Botsch and Kobbelt, A remeshing approach to multiresolution modeling, 2004). Nothing is done that
-/// would turn a triangle over or let two touch: a closed manifold mesh without self-intersection stays one, of the same
-/// topology. Vertices on a boundary stay where they are, those on the flat faces of a clip stay in their plane.
-/// Deterministic; vertices and triangles keep their number.
-/// @param level_set  what the mesh was extracted from.
+/// Improves the shape of the triangles of a level set's mesh: edges are flipped if that increases the smallest angle,
+/// vertices move towards the centre of their neighbours along the surface and back onto the level set (tangential
+/// relaxation, as Botsch and Kobbelt, A remeshing approach to multiresolution modeling, 2004). No change is made that
+/// would invert a triangle or make two touch: a closed manifold mesh without self-intersection stays one, of the same
+/// topology. Vertices on a boundary do not move, those on the flat faces of a clip stay in their plane. Deterministic;
+/// numbers of vertices and triangles do not change.
+/// @param level_set  from which the mesh was extracted.
 /// @throws Error InvalidOptions, InvalidInput (an edge with more than two triangles).
 COVOL_API RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options = {},
                                  const RunContext& run = {});
 
-/// The distances of a mesh's points, less than a voxel apart, from a level set, to the first order; caps of a clip left
-/// out.
+/// The distances of a mesh's points, less than a voxel apart, from a level set, to first order, without the caps of a
+/// clip.
 [[nodiscard]] COVOL_API MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh,
                                                         double isovalue = 0.0, const RunContext& run = {});
 

@@ -17,19 +17,19 @@ struct StreamedMesh {
     MeshMeasures measures;
 };
 
-/// Whether stream_mesh() writes files of this name: .ply, .stl and .obj.
+/// Whether stream_mesh() writes files with this name: .ply, .stl and .obj.
 [[nodiscard]] COVOL_API bool can_stream_mesh(const std::string& path);
 
-/// Writes the mesh that extract_mesh() makes, with the same vertices and triangles in the same order, and neither of
-/// them is held: a layer of leaves at a time goes to the file. Beside the level set it takes some 400 bytes for each of
-/// its leaves (a fifth of what the leaf takes) and 4 for each vertex.
+/// Writes the mesh that extract_mesh() makes, with the same vertices and triangles in the same order, without holding
+/// either in memory: one layer of leaves at a time is written to the file. In addition to the level set it takes about
+/// 400 bytes for each of its leaves (a fifth of the leaf itself) and 4 for each vertex.
 ///
-/// measures: volume, area and components as measure() has them; `closed` by a sum over the directed edges that is 0
-/// when each goes both ways; the genus from Euler's characteristic. `manifold` is what extract_mesh() guarantees.
+/// measures: volume, area and components as from measure(); `closed` from a sum over the directed edges that is 0 if
+/// each occurs in both directions; the genus from Euler's characteristic. `manifold` is guaranteed by extract_mesh().
 /// @param isovalue  world units
 /// @param options   those of write_mesh(); binary, without attributes
-/// @throws Error as extract_mesh() and write_mesh(); Unsupported (more vertices or triangles than the format holds);
-///               InvalidInput (no surface at this level). Nothing half-written stays.
+/// @throws Error as extract_mesh() and write_mesh(); Unsupported (more vertices or triangles than the format allows);
+///     InvalidInput (no surface at this level). No partial file remains.
 COVOL_API StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, double isovalue = 0.0,
                                    const WriteMeshOptions& options = {}, const RunContext& run = {});
 

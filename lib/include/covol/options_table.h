@@ -13,19 +13,19 @@
 #include "covol/error.h"
 #include "covol/fwd.h"
 
-// Beside each struct of options stands a table of its fields, kOptions<Struct>: a tuple of Option, of Part for a struct
-// within it, and of Rule for what one field's range cannot say. Validation, the command line and its help, Python's
-// keywords, reports and messages are made from it.
+// Each struct of options is followed by a table of its fields, kOptions<Struct>: a tuple of Option, of Part for a
+// nested struct, and of Rule for constraints that the range of one field cannot express. Validation, the command line
+// and its help, Python's keywords, reports and messages are generated from it.
 namespace covol {
 
 enum class Unit {
     One,
-    Length,  ///< world units; people may give voxels, "3vx"
-    Volume,  ///< world units^3; people give the edge of a cube
+    Length,  ///< world units; users may give voxels, "3vx"
+    Volume,  ///< world units^3; users give the edge of a cube
     Voxels
 };
 
-/// Where help lists an option, in this order; None: it is for callers of the library alone.
+/// The section of the help that lists an option, in this order; None: only for callers of the library.
 enum class Group {
     Input,
     Marks,
@@ -43,7 +43,7 @@ enum class Group {
     None
 };
 
-/// Which jobs have an option.
+/// The jobs that have an option.
 enum class Offered {
     Always,
     WithImage,    ///< not points alone
@@ -51,10 +51,10 @@ enum class Offered {
     SingleStep    ///< only the struct's own step, which runs alone
 };
 
-/// Finite numbers between two ends.
+/// Finite numbers between two limits.
 struct Range {
     double min = -std::numeric_limits<double>::infinity(), max = std::numeric_limits<double>::infinity();
-    bool above_min = false, below_max = false;  ///< the end itself is not one of them
+    bool above_min = false, below_max = false;  ///< the limit itself is excluded
     Unit unit = Unit::One;
 
     [[nodiscard]] COVOL_API bool holds(double value) const;
@@ -74,7 +74,7 @@ inline constexpr Range kPositive{0, std::numeric_limits<double>::infinity(), tru
     kLength = counted_in(Unit::Length, kNotNegative), kPositiveLength = counted_in(Unit::Length, kPositive),
     kAnyLength = counted_in(Unit::Length, {}), kVolume = counted_in(Unit::Volume, kNotNegative);
 
-/// What the words are that people give for an enumeration, in the order of its values; null: none for that one.
+/// The names of an enumeration's values as the user gives them, in the order of the values; null: it has none.
 template <typename Enum>
 inline constexpr auto kWords = nullptr;
 template <typename Enum>
@@ -94,14 +94,14 @@ struct Place {
 [[nodiscard]] constexpr Place points_alone(Group group) { return {group, Offered::PointsAlone}; }
 [[nodiscard]] constexpr Place single_step(Group group) { return {group, Offered::SingleStep}; }
 
-/// What an option is, but for its type.
+/// The description of an option, except for its type.
 struct OptionInfo {
-    const char* name;  ///< the one that people and messages say: a keyword, and with dashes a flag
-    Range range{};     ///< of a number, and of each number of a list
+    const char* name;  ///< the name in messages and for users: a keyword, and with dashes a flag
+    Range range{};     ///< of a number, and of each number in a list
     Place place{};
     const char* text = "";             ///< one line of help; names of options in backquotes
-    const char* automatic = "";        ///< what holds where it is not given, if that is no plain value
-    const char* automatic_alone = "";  ///< the same of the single step, if that is something else
+    const char* automatic = "";        ///< what applies if it is not given, unless that is a plain value
+    const char* automatic_alone = "";  ///< the same for the single step, if it differs
 };
 
 template <typename Struct, typename Value>
@@ -116,12 +116,12 @@ struct Option : OptionInfo {
     constexpr Option(const char* name_, Value Struct::*field_, Place place_, const char* text_,
                      const char* automatic_ = "", const char* alone = "")
         : OptionInfo{name_, {}, place_, text_, automatic_, alone}, field(field_) {}
-    /// For callers of the library alone.
+    /// Only for callers of the library.
     constexpr Option(const char* name_, Value Struct::*field_, Range range_ = {})
         : OptionInfo{name_, range_}, field(field_) {}
 };
 
-/// The options of a field that is a struct of options itself.
+/// The options of a field that is itself a struct of options.
 template <typename Struct, typename Inner>
 struct Part {
     Inner Struct::*field;
@@ -131,7 +131,7 @@ Part(Inner Struct::*) -> Part<Struct, Inner>;
 
 template <typename Struct>
 struct Rule {
-    const char* name;  ///< of the option that is wrong where it does not hold
+    const char* name;  ///< of the option that is wrong if the rule is violated
     const char* expected;
     bool (*holds)(const Struct&);
 };
@@ -139,7 +139,7 @@ struct Rule {
 template <typename Struct>
 inline constexpr auto kOptions = nullptr;
 
-/// Calls visit(const OptionInfo&, field) for each option, those of parts included, in the order of the tables.
+/// Calls visit(const OptionInfo&, field) for each option, including those of parts, in the order of the tables.
 template <typename Options, typename Visit>
 constexpr void for_each_option(Options& options, const Visit& visit) {
     const auto take = [&]<typename Row>(const Row& row) {
@@ -154,9 +154,9 @@ constexpr void for_each_option(Options& options, const Visit& visit) {
 template <typename T>
 inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
 
-/// For why_invalid(): a line of its own, "name: complaint", where there is one.
+/// For why_invalid(): adds a line "name: complaint" unless the complaint is empty.
 COVOL_API void add_complaint(std::string& lines, const char* name, const std::string& complaint);
-/// The same of a number outside of the option's range.
+/// The same for a number outside of the option's range.
 COVOL_API void complain(std::string& lines, const OptionInfo& option, double value);
 
 namespace detail {
@@ -194,7 +194,7 @@ void complain_of(std::string& lines, const Options& options) {
 
 }  // namespace detail
 
-/// Empty where the options are usable, else one line for each bad field: "tau: expected > 0, got -1".
+/// Empty if the options are valid, else one line for each invalid field: "tau: expected > 0, got -1".
 template <typename Options>
 [[nodiscard]] std::string why_invalid(const Options& options) {
     std::string lines;
@@ -202,7 +202,7 @@ template <typename Options>
     return lines;
 }
 
-/// @throws Error InvalidOptions, "function: tau: expected ...", of the first bad field.
+/// @throws Error InvalidOptions, "function: tau: expected ...", of the first invalid field.
 template <typename Options>
 void require_valid(const Options& options, const char* function) {
     const std::string why = why_invalid(options);

@@ -9,7 +9,7 @@
 
 namespace covol {
 
-/// A test shape with known truth.
+/// A test shape whose true surface is known.
 struct PhantomOptions {
     std::string kind = "sphere";  ///< sphere, torus, box, two-spheres, sphere-round, sphere-square, sphere-slit
     int size = 128;               ///< voxels along each axis, >= 16
@@ -30,7 +30,7 @@ inline constexpr auto kOptions<PhantomOptions> = std::tuple{
     Option{"size", &PhantomOptions::size, between(16, 2048), Group::Input, "voxels along each axis"},
     Option{"count", &PhantomOptions::point_count, kNotNegative, Group::Input, "number of points"},
     Option{"noise", &PhantomOptions::noise, kNotNegative, Group::Input, "standard deviation, in units of the contrast"},
-    Option{"seed", &PhantomOptions::seed, Range{}, Group::Input, "of the random numbers"},
+    Option{"seed", &PhantomOptions::seed, Range{}, Group::Input, "seed of the random numbers"},
     Rule<PhantomOptions>{"kind", "one that list_phantom_kinds() has",
                          [](const PhantomOptions& o) { return std::ranges::count(list_phantom_kinds(), o.kind) > 0; }}};
 

@@ -5,8 +5,8 @@
 
 namespace covol {
 
-/// read_points() of a text in columns, as .xyz and .csv files have it, that is no file.
-/// @param source  what messages call it
+/// read_points() for a text in columns, as in .xyz and .csv files, that is not in a file.
+/// @param source  its name in messages
 /// @throws Error InvalidInput, InvalidOptions as read_points().
 [[nodiscard]] COVOL_API PointCloud parse_points(const std::string& text, const std::string& source,
                                                 const ReadPointsOptions& options = {});

@@ -6,16 +6,16 @@
 
 namespace covol {
 
-/// A part of covol that is loaded, or started, when a file first needs it.
+/// A part of covol that is loaded, or started, when a file first requires it.
 struct ReaderPart {
     std::string name;     ///< "itk"
-    std::string formats;  ///< that need it: "NRRD and MetaImage"
-    std::string path;     ///< of its file; empty where it is linked into the program
-    std::string problem;  ///< why it cannot be used; empty where it can
+    std::string formats;  ///< that require it: "NRRD and MetaImage"
+    std::string path;     ///< of its file; empty if it is linked into the program
+    std::string problem;  ///< why it cannot be used; empty if it can
 };
 
-/// Loads each of them, and looks for the program that reads files apart from this one. For `covol doctor`: readers load
-/// what they need by themselves.
+/// Loads each of them, and looks for the separate program that reads files. For `covol doctor`: readers load their
+/// parts by themselves.
 [[nodiscard]] COVOL_API std::vector<ReaderPart> check_reader_parts();
 
 }  // namespace covol

@@ -13,44 +13,44 @@
 
 namespace covol {
 
-/// One of the surfaces of a picture.
+/// One of the surfaces in a picture.
 struct RenderStructure {
     std::string name;                                  ///< for the legend; UTF-8
     const FloatGrid* surface = nullptr;                ///< level set, world units; not null
     std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
     std::vector<Vec3> marks;                           ///< world units
-    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 where another structure lies in its box; 0.16 in a
+    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 if another structure lies in its box; 0.16 in a
     /// volume view
     std::optional<double> opacity;
 };
 
-/// What pictures show. What it points to has to outlive the call alone.
+/// The content of pictures. The objects pointed to only have to outlive the call.
 struct RenderScene {
     std::vector<RenderStructure> structures;
-    std::vector<Vec3> marks;       ///< world units, of no structure in particular
+    std::vector<Vec3> marks;       ///< world units, that belong to no structure
     const Image* image = nullptr;  ///< null: no slices
     std::string unit;              ///< of lengths, "um" or "mm"; empty: unknown
-    /// World axes are anatomical (LPS): letters stand at the edges of slices, which lie as radiologists have them.
+    /// World axes are anatomical (LPS): slices are labelled with letters at their edges, and oriented as in radiology.
     bool is_anatomical = false;
 };
 
-/// What a picture consists of.
+/// The parts of a picture.
 enum class FigureKind {
-    Composed,  ///< a large view of the surfaces, and slices of the image; other views where there is no image
-    Surface,   ///< the view alone
-    Slices     ///< the slices alone
+    Composed,  ///< a large view of the surfaces, and slices of the image; other views if there is no image
+    Surface,   ///< only the view of the surfaces
+    Slices     ///< only the slices
 };
 template <>
 inline constexpr auto kWords<FigureKind> = std::array{"composed", "surface", "slices"};
 
-/// Where a parallel view looks from, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 along -z, down
+/// The direction of a parallel view, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 along -z, down
 /// the world's third axis.
 struct ViewDirection {
     double azimuth = 0, elevation = 0;
 };
 
-/// "front", "back", "left", "right", "top", "bottom" and "iso", or "AZIMUTH,ELEVATION". Where axes are anatomical, left
-/// is the patient's. @throws Error InvalidOptions.
+/// "front", "back", "left", "right", "top", "bottom" and "iso", or "AZIMUTH,ELEVATION". If axes are anatomical, left is
+/// the patient's. @throws Error InvalidOptions.
 [[nodiscard]] COVOL_API ViewDirection parse_view(const std::string& text, bool is_anatomical);
 
 struct RenderOptions {
@@ -58,27 +58,29 @@ struct RenderOptions {
     FigureKind figure = FigureKind::Composed;
     ViewDirection view{-32, 28};
     double zoom = 1;  ///< of the view of the surfaces, 0.05 to 100
-    bool whole_turn =
-        false;  ///< the view has room for the surfaces turned about the vertical axis: frames fit each other
-    /// 0 to 64 slices along `slice_axis` in place of three planes that meet; those that have marks come first.
+    /// the view has space for the surfaces turned about the vertical axis, so that frames match
+    bool whole_turn = false;
+    /// 0 to 64 slices along `slice_axis` in place of three intersecting planes; those with marks come first.
     std::optional<int> slices;
-    std::optional<int> slice_axis;  ///< of the image, 0 to 2; automatic: the one across marked slices, else 2
-    std::optional<Vec3> at;         ///< world; where the three planes meet; automatic: the structures' middle
-    bool volume = false;            ///< the image, volume rendered, behind the surfaces
-    bool white_background = true;   ///< else black
+    /// of the image, 0 to 2; automatic: the axis perpendicular to marked slices, else 2
+    std::optional<int> slice_axis;
+    std::optional<Vec3> at;        ///< world; intersection of the three planes; automatic: the structures' centre
+    bool volume = false;           ///< the image, volume rendered, behind the surfaces
+    bool white_background = true;  ///< else black
 };
 
 template <>
 inline constexpr auto kOptions<RenderOptions> = std::tuple{
     Option{"width", &RenderOptions::width, between(64, 16384)},
     Option{"height", &RenderOptions::height, between(64, 16384)},
-    Option{"zoom", &RenderOptions::zoom, between(0.05, 100), Group::Picture, "enlarges the view of the surfaces"},
+    Option{"zoom", &RenderOptions::zoom, between(0.05, 100), Group::Picture,
+           "magnification of the view of the surfaces"},
     Option{"volume", &RenderOptions::volume, Group::Picture, "show the image, volume rendered, behind the surfaces"},
     Option{"slices", &RenderOptions::slices, between(0, 64), Group::Picture,
-           "so many slices along one axis, marked ones first; 0 for none", "three planes through the middle"},
+           "number of slices along one axis, marked slices first; 0 for none", "three planes through the middle"},
     Option{"slice_axis", &RenderOptions::slice_axis, between(0, 2)},
-    Option{"at", &RenderOptions::at, Group::Picture, "place in the world where the three planes meet",
-           "the structures' middle"},
+    Option{"at", &RenderOptions::at, Group::Picture, "world position at which the three planes intersect",
+           "the centre of the structures"},
     Rule<RenderOptions>{"size", "width * height <= 50 million",
                         [](const RenderOptions& o) { return double(o.width) * o.height <= 5e7; }},
     Rule<RenderOptions>{"view", "a finite azimuth, and an elevation of -90 to 90", [](const RenderOptions& o) {
@@ -87,9 +89,9 @@ inline constexpr auto kOptions<RenderOptions> = std::tuple{
 
 /// A figure: surfaces shaded by the gradient of smoothed level sets, with marks, axes and a scale bar; slices of the
 /// image in true proportions, with each structure's outline, the marks within half a slice, and a scale bar; a legend.
-/// The same input gives the same picture on any number of threads.
+/// The same input gives the same picture for any number of threads.
 /// @throws Error InvalidOptions; InvalidInput (no structure, a grid without voxels at a surface or with voxels that are
-///               no cubes, slices without an image); Cancelled; what reading the image throws.
+///     not cubes, slices without an image); Cancelled; whatever reading the image throws.
 [[nodiscard]] COVOL_API Picture render(const RenderScene& scene, const RenderOptions& options = {},
                                        const RunContext& run = {});
 

@@ -13,26 +13,26 @@ class Checkpoints;
 
 enum class LogLevel { Info, Warning };
 
-/// How a computation runs, as opposed to what it computes: nothing in here changes a result.
+/// How a computation runs, as opposed to what it computes: nothing here changes a result.
 struct RunContext {
-    int threads =
-        0;  ///< At most so many work, as far as there are cores; 0: those of the caller's TBB arena, all cores.
+    /// Maximum number of threads, limited by the cores; 0: those of the caller's TBB arena, all cores.
+    int threads = 0;
 
-    /// Called from the calling thread with a stage's name and its fraction done in [0,1].
+    /// Called from the calling thread with the name of a stage and its completed fraction in [0,1].
     std::function<void(const std::string& stage, double fraction)> progress;
 
-    /// Called with one line of text; automatic choices come as Info. Lines name options as messages of errors do.
+    /// Called with one line of text; automatic choices have level Info. Options are named as in messages of errors.
     std::function<void(LogLevel, const std::string& line)> log;
 
-    /// Set from anywhere (a signal handler, say) to make the computation throw Errc::Cancelled
-    /// or, where partial results are useful, return early and say so.
+    /// Set from anywhere (a signal handler, for example) to make the computation throw Errc::Cancelled or, if partial
+    /// results are useful, return early and report it.
     const std::atomic<bool>* cancel = nullptr;
 
-    /// Where the states of long flows are kept; null: nowhere.
+    /// Where the states of long flows are saved; null: nowhere.
     std::shared_ptr<Checkpoints> checkpoints;
 
-    /// Bytes that may be taken; 0: no bound. What is sure to need more is refused before it takes any
-    /// (Errc::InvalidOptions).
+    /// Maximum number of bytes that may be allocated; 0: unlimited. A computation that certainly needs more fails
+    /// before it allocates any (Errc::InvalidOptions).
     std::uint64_t memory_budget = 0;
 
     [[nodiscard]] bool cancelled() const noexcept {
@@ -45,8 +45,8 @@ struct RunContext {
     COVOL_API void check() const;
 };
 
-/// Runs `work` on at most run.threads threads (every TBB loop inside it, OpenVDB's own included): in a TBB arena of its
-/// own, or in the one that the caller is in where that is as wide. What `work` throws passes through.
+/// Runs `work` on at most run.threads threads (including every TBB loop inside it, OpenVDB's own too): in a separate
+/// TBB arena, or in the caller's if it has that many threads. Exceptions of `work` are passed on.
 COVOL_API void with_threads(const RunContext& run, const std::function<void()>& work);
 
 }  // namespace covol

@@ -12,7 +12,7 @@
 namespace covol {
 
 // Starts other than tagging: u0 = clamp(signed distance, -3h, 3h), active where |u0| < 3h, named "band".
-// All throw Error InvalidOptions / InvalidInput when no surface lies in the domain.
+// All throw Error InvalidOptions / InvalidInput if no surface lies in the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);
 [[nodiscard]] COVOL_API FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box);
 [[nodiscard]] COVOL_API FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh,
@@ -25,16 +25,16 @@ namespace covol {
                                                          const RunContext& run = {});
 /// Fills values at from + n * step, n < count (world units): negative inside.
 using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
-/// The parts of a function's zero level set that pass near the seeds; its scale does not matter.
+/// The parts of a function's zero level set that pass near the seeds; the function's scale does not matter.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds,
                                                       const LevelRow& level, const RunContext& run = {});
-/// What seeds alone tell: the surface halfway between the nearest seeds inside and outside, but no farther from the
-/// seeds inside than half of what separates the two kinds usually (the median over the seeds outside of the distance to
-/// the nearest one inside), and far enough to join them. Without seeds outside that is kHalfWidthVoxels.
-/// @throws Error also where there is no seed inside, or none in the domain.
+/// A surface from seeds alone: halfway between the nearest seeds inside and outside, but no farther from the seeds
+/// inside than half the usual distance between the two kinds (the median over the seeds outside of the distance to the
+/// nearest one inside), and far enough to join them. Without seeds outside the distance is kHalfWidthVoxels.
+/// @throws Error also if there is no seed inside, or none in the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
                                                       const std::vector<Vec3>& outside, const RunContext& run = {});
-/// Any level-set-like grid (negative inside), resampled onto the domain.
+/// Any grid like a level set (negative inside), resampled onto the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set,
                                                      const RunContext& run = {});
 

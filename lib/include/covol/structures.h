@@ -18,14 +18,14 @@ namespace covol {
 
 /// One of several solids.
 struct Structure {
-    std::string name;      ///< what people call it; not empty, unique
+    std::string name;      ///< name given by the user; not empty, unique
     FloatGridPtr surface;  ///< as extract_surface() makes it: a signed distance, negative inside
 };
 
 struct SeparateOptions {
-    std::optional<double> gap;  ///< gaps narrower than this close, world units; 0: none; automatic: 1 voxel
-    double nested_fraction =
-        0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
+    std::optional<double> gap;  ///< gaps narrower than this are closed, world units; 0: none; automatic: 1 voxel
+    /// in (0.5,1]: a solid is carved out of a larger one that contains at least this fraction of it
+    double nested_fraction = 0.9;
 };
 
 template <>
@@ -36,8 +36,8 @@ inline constexpr auto kOptions<SeparateOptions> =
 /// Two structures that overlapped.
 struct StructureOverlap {
     std::size_t a = 0, b = 0;          ///< a < b
-    double volume = 0;                 ///< that both claimed, world units^3
-    std::optional<std::size_t> inner;  ///< the one that was carved out of the other
+    double volume = 0;                 ///< claimed by both, world units^3
+    std::optional<std::size_t> inner;  ///< the structure that was carved out of the other
 };
 
 struct SeparateReport {
@@ -46,37 +46,36 @@ struct SeparateReport {
 };
 
 struct SeparateResult {
-    std::vector<FloatGridPtr> surfaces;  ///< in the structures' order; those that did not change are the same grids
+    std::vector<FloatGridPtr> surfaces;  ///< in the structures' order; unchanged ones are the same grids
     SeparateReport report;
 };
 
-/// Makes solids disjoint, and closes the gaps between them that are narrower than a voxel.
+/// Makes solids disjoint, and closes gaps between them that are narrower than a voxel.
 ///
 /// With φ_i the signed distances and m = min over j≠i of φ_j, a voxel where φ_i + m is below 0 (an overlap), or below
 /// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
-/// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. Where overlaps are deep the distances are computed as deep. A solid
-/// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
+/// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. If overlaps are deep, the distances are computed to that depth. A
+/// solid inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
 /// extract_surface(). The result does not depend on the structures' order or on the number of threads.
 ///
 /// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are
-/// the
-///               same solid; one of which nothing is left).
+///     the same solid; one of which nothing remains).
 [[nodiscard]] COVOL_API SeparateResult separate(const std::vector<Structure>& structures,
                                                 const SeparateOptions& options = {}, const RunContext& run = {});
 
 /// Label image in the given geometry (i fastest): n + 1 where the voxel's centre lies in structures[n], else 0.
-/// A centre that rounding puts into two solids, or into none where two touch, belongs to the nearer one (of equals, to
-/// the one whose name comes first).
+/// A centre that lies in two solids due to rounding, or in none where two touch, belongs to the nearer one (if they are
+/// equally near, to the one whose name comes first).
 /// @throws Error InvalidInput (more than 254 structures).
 [[nodiscard]] COVOL_API std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures,
                                                                    const ImageGeometry& geometry,
                                                                    const RunContext& run = {});
 
-/// The same image, to be written box by box (covol/image_stream.h): nothing of its size is held.
+/// The same image, to be written box by box (covol/image_stream.h), so that it is never held in memory as a whole.
 class COVOL_API LabelImage : public PixelSource {
 public:
-    /// @param values  of the structures, instead of 1, 2, ...; int32 where one is below 0 or above 255, else bytes
-    /// @param named  keep names and colours where the format has a place for them
+    /// @param values  of the structures, instead of 1, 2, ...; int32 if one is below 0 or above 255, else bytes
+    /// @param named  store names and colours if the format supports them
     /// @throws Error InvalidInput (more than 254 structures).
     LabelImage(std::vector<Structure> structures, const ImageGeometry& geometry, std::vector<int> values = {},
                bool named = true);
@@ -89,7 +88,7 @@ public:
     [[nodiscard]] std::vector<std::pair<std::string, std::string>> metadata() const override;
     [[nodiscard]] std::vector<NamedLabel> label_names() const override;
 
-    /// Of each structure, so far.
+    /// Number of voxels of each structure written so far.
     [[nodiscard]] std::vector<std::uint64_t> voxels_written() const;
 
 private:
@@ -97,16 +96,17 @@ private:
     std::unique_ptr<State> state_;
 };
 
-/// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. One structure is called "surface", as everywhere in covol.
+/// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. A single structure is called "surface", as everywhere in
+/// covol.
 [[nodiscard]] COVOL_API std::vector<std::string> make_grid_names(const std::vector<std::string>& names);
 
-/// A colour for structure n, red, green and blue in [0,255]; the first twelve differ clearly.
+/// A colour for structure n, red, green and blue in [0,255]; the first twelve are clearly distinct.
 [[nodiscard]] COVOL_API std::array<std::uint8_t, 3> structure_color(std::size_t n);
 
 /// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
 /// 1, 2, ... and extents.
-/// @param extents  the box of each structure's voxels; 0 to -1 where it has none
-/// @param values  the label values that the file has instead; empty: 1, 2, ...
+/// @param extents  the box of each structure's voxels; 0 to -1 if it has none
+/// @param values  label values of the file, instead of 1, 2, ...; empty: 1, 2, ...
 [[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(
     const std::vector<std::string>& names, const std::vector<VoxelBox>& extents, const std::vector<int>& values = {});
 

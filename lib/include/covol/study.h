@@ -19,10 +19,10 @@
 #include "covol/options_table.h"
 #include "covol/pipeline.h"
 
-// What a person marks on one image: structures with their marks, and everything that was done to them, in a journal.
+// Marks set by a person on one image: structures with their marks, and a journal of all actions on them.
 namespace covol {
 
-/// Numbers of structures, marks and outlines begin at 1 and are not used again, not even after an undo.
+/// Numbers of structures, marks and outlines begin at 1 and are never reused, not even after an undo.
 using StudyId = std::int64_t;
 
 struct StudyMark {
@@ -35,18 +35,18 @@ struct StudyMark {
 /// A line on a slice of the image.
 struct StudyOutline {
     StudyId id = 0;
-    int axis = 2;        ///< of the image that the slice is perpendicular to: 0, 1, 2 for i, j, k
+    int axis = 2;        ///< image axis perpendicular to the slice: 0, 1, 2 for i, j, k
     double at = 0;       ///< the slice: voxels along that axis
     bool closed = true;  ///< it encloses the structure; an open one lies on its surface
     std::vector<Vec3> world;
     bool operator==(const StudyOutline&) const = default;
 };
 
-/// Another program's result that a structure's marks correct.
+/// Another program's result, which a structure's marks correct.
 struct StudyGuess {
-    std::string path;    ///< a mask, label image, mesh or level set; from the study's folder where it is relative
-    std::string digest;  ///< digest_of() it
-    int label = 0;       ///< of a mask; 0: its only one
+    std::string path;    ///< a mask, label image, mesh or level set; if relative, from the study's folder
+    std::string digest;  ///< digest_of() the file
+    int label = 0;       ///< of a mask; 0: its only label
     bool operator==(const StudyGuess&) const = default;
 };
 
@@ -55,9 +55,9 @@ struct StudyStroke {
     StudyId id = 0;
     bool erases = false;
     double radius = 1;        ///< world units, > 0
-    std::optional<int> axis;  ///< of a disc, which stays on the slice `at` perpendicular to it; none: a ball
+    std::optional<int> axis;  ///< perpendicular to the slice `at`, for a disc on it; none: a ball
     int at = 0;               ///< voxels along that axis
-    std::vector<Vec3> world;  ///< corners of the line; one is a dab
+    std::vector<Vec3> world;  ///< vertices of the line; a single one is a dab
     bool operator==(const StudyStroke&) const = default;
 };
 
@@ -65,7 +65,7 @@ struct StudyStructure {
     StudyId id = 0;
     std::string name;                     ///< unique within the study
     std::array<std::uint8_t, 3> color{};  ///< red, green, blue
-    bool locked = false;                  ///< its marks do not change
+    bool locked = false;                  ///< its marks cannot be changed
     bool visible = true;
     std::vector<StudyMark> marks;  ///< in the order in which they were set
     std::vector<StudyOutline> outlines;
@@ -73,17 +73,18 @@ struct StudyStructure {
     std::optional<StudyGuess> guess;
     bool operator==(const StudyStructure&) const = default;
 
-    /// Whether there is anything that a surface can be made from.
+    /// Whether a surface can be made from it.
     [[nodiscard]] bool has_evidence() const {
         return !marks.empty() || !outlines.empty() || !strokes.empty() || guess.has_value();
     }
-    /// Whether both say the same of a surface.
+    /// Whether the surfaces of both are made from the same input.
     [[nodiscard]] bool has_same_evidence(const StudyStructure& other) const {
         return marks == other.marks && outlines == other.outlines && strokes == other.strokes && guess == other.guess;
     }
 };
 
-/// How all structures of a study are segmented, instead of what SegmentOptions chooses; the program's flags come first.
+/// Options for the segmentation of all structures of a study, instead of the automatic choices of SegmentOptions; flags
+/// of the program override them.
 struct StudyOptions {
     std::optional<double> voxel_size;      ///< world units, > 0
     std::optional<double> rho;             ///< EvolveOptions::rho, in [0,1]
@@ -94,10 +95,11 @@ struct StudyOptions {
     [[nodiscard]] COVOL_API SegmentOptions applied_to(SegmentOptions options) const;
 };
 
-/// Structures in their order. They are shared between states, and never change.
+/// Structures in their order. They are shared between states, and immutable.
 using StudyState = std::vector<std::shared_ptr<const StudyStructure>>;
 
-/// What a person does. `structure` names the one that it is about; colours are chosen where none is given.
+/// The actions of a person. `structure` identifies the structure concerned; colours are chosen automatically if none is
+/// given.
 struct StudyActions {
     struct AddStructure {
         std::string name;
@@ -130,13 +132,13 @@ struct StudyActions {
         MarkKind kind = MarkKind::Surface;
         Vec3 world{0, 0, 0};
     };
-    /// One action for the marks of a file.
+    /// One action for all marks of a file.
     struct AddMarks {
         StudyId structure = 0;
         MarkKind kind = MarkKind::Surface;
         std::vector<Vec3> world;  ///< of that kind
         std::vector<Vec3> inside = {}, outside = {};
-        std::vector<StudyOutline> outlines = {};  ///< their own numbers are not used
+        std::vector<StudyOutline> outlines = {};  ///< their ids are not used
     };
     struct MoveMark {
         StudyId structure = 0, mark = 0;
@@ -150,14 +152,14 @@ struct StudyActions {
     };
     struct AddOutline {
         StudyId structure = 0;
-        StudyOutline outline;  ///< its own number is not used
+        StudyOutline outline;  ///< its id is not used
     };
     struct RemoveOutline {
         StudyId structure = 0, mark = 0;
     };
     struct AddStroke {
         StudyId structure = 0;
-        StudyStroke stroke;  ///< its own number is not used
+        StudyStroke stroke;  ///< its id is not used
     };
     struct ClearPaint {
         StudyId structure = 0;
@@ -169,7 +171,7 @@ struct StudyActions {
     struct RemoveGuess {
         StudyId structure = 0;
     };
-    /// A structure for each label of another program's label image, which is its guess.
+    /// A structure for each label of another program's label image, with that label as its guess.
     struct AddLabels {
         std::string path, digest;  ///< as of StudyGuess
         struct Label {
@@ -193,60 +195,61 @@ using StudyAction =
                  StudyActions::ClearPaint, StudyActions::SetGuess, StudyActions::RemoveGuess, StudyActions::AddLabels,
                  StudyActions::SetOptions, StudyActions::Undo, StudyActions::Redo>;
 
-/// Whether the action names a file: what comes from a page may not.
+/// Whether the action contains the name of a file, which actions from a page must not.
 [[nodiscard]] COVOL_API bool names_file(const StudyAction& action);
 
-/// An action with the key that its sender made for it: one that comes twice is applied once.
+/// An action with a key made by its sender: an action that arrives twice is applied once.
 struct KeyedAction {
-    std::string key;  ///< at most 100 printable ASCII characters; empty: it has none
+    std::string key;  ///< at most 100 printable ASCII characters; empty: no key
     StudyAction action;
 };
 
-/// {"key":"...","do":"add_mark","structure":1,"kind":"surface","world":[x,y,z]}: docs/study.md has all of them.
-/// @throws Error InvalidInput: the text is no such action. It may come from anywhere.
+/// {"key":"...","do":"add_mark","structure":1,"kind":"surface","world":[x,y,z]}: docs/study.md describes all of them.
+/// The text may come from an untrusted source.
+/// @throws Error InvalidInput: the text is not such an action.
 [[nodiscard]] COVOL_API KeyedAction parse_study_action(std::string_view json);
-/// @throws Error InvalidInput: a key that is none, or a text that is no UTF-8
+/// @throws Error InvalidInput: an invalid key, or a text that is not UTF-8
 [[nodiscard]] COVOL_API std::string to_json(const KeyedAction& action);
 
-/// Structures and what was done to them, without limit; nothing of files.
+/// Structures and the unlimited history of actions on them, in memory only.
 class COVOL_API StudyHistory {
 public:
-    /// @param image  that marks have to lie in
+    /// @param image  in which marks have to lie
     explicit StudyHistory(const ImageGeometry& image);
 
     [[nodiscard]] const StudyState& state() const noexcept { return state_; }
     [[nodiscard]] const StudyOptions& options() const noexcept { return options_; }
-    /// Null: there is none.
+    /// Null if there is no such structure.
     [[nodiscard]] std::shared_ptr<const StudyStructure> find(StudyId structure) const;
     [[nodiscard]] bool can_undo() const noexcept { return !done_.empty(); }
     [[nodiscard]] bool can_redo() const noexcept { return !undone_.empty(); }
 
-    /// What an action did.
+    /// The effect of an action.
     struct Changed {
-        std::vector<StudyId> structures;  ///< that changed, came or went; none: an undo of nothing
-        StudyId made = 0;                 ///< the number of the first structure, mark or the like that is new; 0: none
+        std::vector<StudyId> structures;  ///< that changed, were added or removed; none: an undo of nothing
+        StudyId made = 0;                 ///< id of the first new structure, mark or similar; 0: none
         bool options = false;             ///< whether the options changed
     };
-    /// The same actions in the same order give the same state, numbers included.
-    /// @throws Error InvalidInput: it cannot be done (no such structure, a name that is in use, a place outside of the
-    ///         image, a locked structure), and nothing changed.
+    /// The same actions in the same order give the same state, including ids.
+    /// @throws Error InvalidInput: the action is impossible (no such structure, a name that is in use, a position
+    ///     outside of the image, a locked structure), and nothing changed.
     Changed apply(const StudyAction& action) { return carry_out(plan(action)); }
 
-    /// Of one structure, where one of both may be null; or of the options.
+    /// The change of one structure, where `before` or `after` may be null; or of the options.
     struct Change {
         std::shared_ptr<const StudyStructure> before, after;
-        std::size_t place = 0;                                    ///< in the order
+        std::size_t place = 0;                                    ///< index in the order of the structures
         std::optional<std::array<StudyOptions, 2>> options = {};  ///< before and after
     };
-    /// An action that can be done: what is to be kept on the disk first is kept between plan() and carry_out().
+    /// A validated action. What has to be on the disk first is written between plan() and carry_out().
     struct Step {
         enum class Kind { Do, Undo, Redo } kind = Kind::Do;
-        std::vector<Change> changes;  ///< of Do
+        std::vector<Change> changes;  ///< for Do
         StudyId last_id = 0;          ///< after it
     };
     /// @throws Error as apply().
     [[nodiscard]] Step plan(const StudyAction& action) const;
-    /// @pre nothing was carried out since the step was planned
+    /// @pre nothing was carried out after the step was planned
     Changed carry_out(Step step);
 
 private:
@@ -261,21 +264,21 @@ private:
     StudyId last_id_ = 0;
 };
 
-/// The image that a study belongs to, as its journal says.
+/// The image that a study belongs to, from its journal.
 struct StudyImage {
-    std::string path;  ///< from the study's folder, where it is relative
+    std::string path;  ///< if relative, from the study's folder
     ImageGeometry geometry;
 };
 
-/// A study on the disk: a folder with a journal, to which each action is appended and flushed before it counts. One
-/// program at a time has it open.
+/// A study on the disk: a folder with a journal, to which each action is appended and flushed before it takes effect.
+/// Only one program at a time can open it.
 ///
-/// The journal (docs/study.md) is JSON lines: the first one names the image, the others are actions in their order. A
-/// last line that was cut off, by a full disk or a power failure, is the action that was not confirmed: it is dropped.
+/// The journal (docs/study.md) is JSON lines: the first one describes the image, the others are actions in their order.
+/// An incomplete last line, due to a full disk or a power failure, is an action that was not confirmed: it is dropped.
 class COVOL_API Study {
 public:
-    /// Opens a study, or begins one.
-    /// @param image  its geometry has to be that of the journal
+    /// Opens a study, or creates one.
+    /// @param image  its geometry has to equal that of the journal
     /// @throws Error Io (cannot be written; open elsewhere), InvalidInput (a damaged journal, another image).
     Study(std::string folder, const std::string& image_path, const ImageGeometry& image);
     ~Study();
@@ -285,16 +288,17 @@ public:
     [[nodiscard]] const std::string& folder() const noexcept { return folder_; }
     [[nodiscard]] const StudyHistory& history() const noexcept { return history_; }
     [[nodiscard]] const StudyState& state() const noexcept { return history_.state(); }
-    /// How many actions the journal holds.
+    /// Number of actions in the journal.
     [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_; }
-    /// What was left of a line that was cut off, in words; empty: the journal was whole.
+    /// Message about an incomplete line that was dropped; empty: the journal was complete.
     [[nodiscard]] const std::string& repaired() const noexcept { return repaired_; }
 
     struct Applied {
         StudyHistory::Changed changed;
-        bool is_new = true;  ///< false: an action with this key had been applied before; `made` is what it made then
+        bool is_new = true;  ///< false: an action with this key was applied before; `made` is the id that it made then
     };
-    /// On the disk when this returns. @throws Error InvalidInput (as StudyHistory::apply()), Io: nothing changed.
+    /// The action is on the disk when this returns. @throws Error InvalidInput (as StudyHistory::apply()), Io: nothing
+    /// changed.
     Applied apply(const KeyedAction& action);
 
 private:
@@ -308,26 +312,26 @@ private:
     std::string repaired_;
 };
 
-/// The image of a study that is only read, by a program that has no page. @throws Error Io, InvalidInput.
+/// The image of a study that is opened for reading only, by a program without a page. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyImage read_study_image(const std::string& folder);
-/// Its structures as they are now; another program may have it open. @throws Error Io, InvalidInput.
+/// Its current structures; another program may have it open. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyState read_study(const std::string& folder);
 
-/// How all of its structures are segmented. @throws Error Io, InvalidInput.
+/// The options with which all of its structures are segmented. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyOptions read_study_options(const std::string& folder);
 
-/// What a study's structures need to become marks.
+/// What is needed to convert a study's structures to marks.
 struct StudySite {
     ImageGeometry image;
-    /// Reads a guess, and checks its digest (StudyFiles); none: structures with a guess are an error.
+    /// Reads a guess and checks its digest (StudyFiles); none: structures with a guess are an error.
     std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess;
 };
-/// What segment_structures() takes of a structure.
+/// The input of segment_structures() for a structure.
 [[nodiscard]] COVOL_API Marks marks_of(const StudyStructure& structure, const StudySite& site);
-/// Of all structures that have evidence, in their order; guesses of label images keep their labels.
+/// For all structures with evidence, in their order; guesses from label images keep their labels.
 [[nodiscard]] COVOL_API std::vector<Marks> marks_of(const StudyState& state, const StudySite& site);
 
-/// The paint of a structure as a label image of the box around it, 1 where it is painted; none: nothing is.
+/// The paint of a structure as a label image of its bounding box, 1 where it is painted; none if nothing is painted.
 [[nodiscard]] COVOL_API std::optional<Image> paint_of(const StudyStructure& structure, const ImageGeometry& image);
 
 }  // namespace covol

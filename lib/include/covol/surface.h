@@ -19,15 +19,15 @@ namespace covol {
 
 struct ExtractOptions {
     double isovalue = 0.0;              ///< world units
-    double min_component_volume = 0.0;  ///< world units^3; smaller pieces are dropped; 0 keeps all
+    double min_component_volume = 0.0;  ///< world units^3; smaller components are dropped; 0 keeps all
 };
 
 template <>
 inline constexpr auto kOptions<ExtractOptions> =
     std::tuple{Option{"isovalue", &ExtractOptions::isovalue, kAnyLength, single_step(Group::MeshFiles),
-                      "extract this level outside the surface", "0"},
+                      "extract the level set at this distance outside the surface", "0"},
                Option{"min_component", &ExtractOptions::min_component_volume, kVolume, Group::MeshFiles,
-                      "drop pieces of the mesh that are smaller than a cube of this edge"}};
+                      "drop pieces of the mesh that are smaller than a cube of this edge length"}};
 
 /// Closed, manifold, outward triangles of the zero level set, in world units.
 [[nodiscard]] COVOL_API TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},
@@ -40,14 +40,15 @@ inline constexpr auto kOptions<ExtractOptions> =
 /// Distances from points to the zero level set (world units), exact to the extracted triangles.
 struct FitStatistics {
     double mean = 0, p95 = 0, max = 0;
-    double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the
-                      ///< surface is too small
+    /// only from segment(): mean of the signed distances; > 0 if the points lie outside, so that the surface is too
+    /// small
+    double bias = 0;
 };
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
                                                   const RunContext& run = {});
 
-/// The same without the mesh: distances that are interpolated within the level set's half width, and at most 0.12
-/// voxels too large beyond it. @throws Error InvalidInput (no point)
+/// The same without the mesh: distances are interpolated within the level set's half width, and at most 0.12 voxels too
+/// large beyond it. @throws Error InvalidInput (no point)
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface,
                                                   const RunContext& run = {});
 

@@ -10,9 +10,9 @@
 
 namespace covol {
 
-/// How the values of a .vdb file are packed. Blosc is the fastest and what OpenVDB's own programs write; a reader that
-/// was built without it fails on such a file, or crashes. Zip is for grids that are neither level sets nor fog volumes:
-/// those OpenVDB then leaves as they are.
+/// Compression of the values of a .vdb file. Blosc is the fastest, and the default of OpenVDB's own programs; a reader
+/// that was built without it fails on such a file, or crashes. Zip only affects grids that are neither level sets nor
+/// fog volumes, because OpenVDB leaves those uncompressed.
 enum class VdbCompression { None, Zip, Blosc };
 template <>
 inline constexpr auto kWords<VdbCompression> = std::array{"none", "zip", "blosc"};
@@ -24,39 +24,38 @@ struct WriteVdbOptions {
 };
 
 template <>
-inline constexpr auto kOptions<WriteVdbOptions> = std::tuple{
-    Option{"half", &WriteVdbOptions::half, Group::Output, "store values in .vdb files as 16-bit floats"},
-    Option{
-        "compression", &WriteVdbOptions::compression, Group::Output,
-        "of .vdb files: zip and none open where a program has no Blosc, or another one; under zip OpenVDB leaves level "
-        "sets and fog volumes as they are"}};
+inline constexpr auto kOptions<WriteVdbOptions> =
+    std::tuple{Option{"half", &WriteVdbOptions::half, Group::Output, "store values in .vdb files as 16-bit floats"},
+               Option{"compression", &WriteVdbOptions::compression, Group::Output,
+                      "compression of .vdb files: zip and none can also be read by programs without Blosc, or with "
+                      "another version of it; with zip, OpenVDB leaves level sets and fog volumes uncompressed"}};
 
 /// Writes the grids in order, with statistics metadata and creator "covol VERSION".
-/// Whole or not at all. @throws Error Io, InvalidInput (names empty or not unique).
+/// The file is written completely or not at all. @throws Error Io, InvalidInput (names empty or not unique).
 COVOL_API void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids,
                          const WriteVdbOptions& options = {});
 
-/// NanoVDB, for viewers and GPUs: the same grids, values as floats, without compression and without the metadata that
-/// `options` and grids hold; only the name, class, transform and values of a grid are kept, and nothing here reads it.
-/// Whole or not at all. @throws Error as write_vdb; Unsupported (covol was built without NanoVDB's headers).
+/// NanoVDB, for viewers and GPUs: the same grids, values as floats, uncompressed and without metadata; only the name,
+/// class, transform and values of a grid are kept. covol does not read such files. The file is written completely or
+/// not at all. @throws Error as write_vdb; Unsupported (covol was built without NanoVDB's headers).
 COVOL_API void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids);
 
-/// A grid as people name it, "FILE.vdb:name".
+/// A grid as the user gives it, "FILE.vdb:name".
 struct VdbGridName {
-    std::string path, grid;  ///< no grid where none is named, or where a file has the whole text as its name
+    std::string path, grid;  ///< no grid if none is given, or if a file with the whole text as its name exists
 };
 [[nodiscard]] COVOL_API VdbGridName split_grid_name(const std::string& text);
 
 /// The grid of that name; with an empty name the one in the path ("FILE.vdb:name"), else the file's first float grid.
-/// @throws Error Io, InvalidInput (no such grid; not a float grid: says which grids there are).
+/// @throws Error Io, InvalidInput (no such grid; not a float grid: lists the grids that exist).
 [[nodiscard]] COVOL_API FloatGridPtr read_vdb(const std::string& path, const std::string& name = {});
 
-/// The level set that the path names ("FILE.vdb:name"); else "surface", else the file's first level set, else its first
-/// float grid that is no fog volume. A file with several of them to choose from is a warning that names them.
+/// The level set in the path ("FILE.vdb:name"); else "surface", else the file's first level set, else its first float
+/// grid that is not a fog volume. Warns, with their names, if a file has several to choose from.
 /// @throws Error as read_vdb; Unsupported (a fog volume).
 [[nodiscard]] COVOL_API FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run = {});
 
-/// One line per grid for people and for `covol info`.
+/// Properties of a grid, which `covol info` prints in one line.
 struct VdbGridInfo {
     std::string name, type, grid_class;
     double voxel_size = 0;

@@ -7,16 +7,16 @@
 #define COVOL_VERSION_MINOR 1
 #define COVOL_VERSION_PATCH 0
 #define COVOL_VERSION_STRING "0.1.0"
-/// For #if: 100 as 0.1.0, 10203 as 1.2.3.
+/// For #if: 100 for 0.1.0, 10203 for 1.2.3.
 #define COVOL_VERSION_NUMBER (COVOL_VERSION_MAJOR * 10000 + COVOL_VERSION_MINOR * 100 + COVOL_VERSION_PATCH)
 
 namespace covol {
 
-/// COVOL_VERSION_STRING of the library that the program runs with; the macros are of that which it was compiled with.
+/// COVOL_VERSION_STRING of the library in use at run time; the macros are those of the library at compile time.
 [[nodiscard]] COVOL_API const char* version() noexcept;
 
-/// How the library was built: "GCC 12.2.0, x86_64, OpenVDB 10.0.1", and the revision of its source where the build was
-/// told one (the CMake variable COVOL_REVISION).
+/// How the library was built: "GCC 12.2.0, x86_64, OpenVDB 10.0.1", and the revision of its source if the build was
+/// given one (the CMake variable COVOL_REVISION).
 [[nodiscard]] COVOL_API const char* build_text() noexcept;
 
 }  // namespace covol

@@ -20,7 +20,7 @@
 namespace covol {
 namespace {
 
-constexpr int kMeshLatticeVoxels = 256;        // along the longest side, where only meshes are compared
+constexpr int kMeshLatticeVoxels = 256;        // along the longest side, if only meshes are compared
 constexpr std::int64_t kSlabVoxels = 1 << 26;  // voxels held at a time
 constexpr double kMaxLatticeVoxels = 1e12;
 constexpr double kMaxSamples = 4e6;  // on a surface
@@ -213,7 +213,7 @@ WorldBox box_of(const Shape& a, const Shape& b, const std::function<Vec3(const V
     return box;
 }
 
-/// The lattice's orientation, spacing and alignment, over both solids and no further.
+/// A lattice with the orientation, spacing and alignment of one of the solids, restricted to the box of both.
 ImageGeometry common_lattice(const Shape& a, const Shape& b) {
     const auto finer = [](const Shape& p, const Shape& q) {
         return voxel_volume(*p.lattice()) <= voxel_volume(*q.lattice()) ? *p.lattice() : *q.lattice();
@@ -279,7 +279,7 @@ void compare_overlap(Shape& a, Shape& b, const ImageGeometry& lattice, const Run
 
 // ---------------------------------------------------------------------------------------------------------- distances
 
-/// Points on a surface, each with the area that it stands for; the mesh's vertices have none, but count for the
+/// Points on a surface, each with the area that it represents; the mesh's vertices have area 0, but count for the
 /// maximum.
 struct Samples {
     std::vector<Vec3> points;

@@ -1,4 +1,4 @@
-// What the surface rests on, slice by slice, and where marks are missing.
+// What supports the surface, slice by slice, and where marks are missing.
 #include "covol/evidence.h"
 
 #include <openvdb/openvdb.h>
@@ -47,7 +47,7 @@ std::vector<float> strengths_on(const TriangleMesh& mesh, const FloatGrid* edge)
     return result;
 }
 
-/// One triangle of the surface, as the slices see it.
+/// One triangle of the surface, with its values for the slices.
 struct Piece {
     Vec3 center;                   ///< world
     std::array<double, 3> levels;  ///< the corners' third image index, ascending
@@ -57,7 +57,7 @@ struct Piece {
     bool unsupported;
 };
 
-/// The share of a triangle's area below a level, its corners' levels ascending.
+/// The fraction of a triangle's area below a level; the levels of its corners are ascending.
 double fraction_below(const std::array<double, 3>& l, double level) {
     if (level <= l[0]) return 0;
     if (level >= l[2]) return 1;
@@ -65,11 +65,11 @@ double fraction_below(const std::array<double, 3>& l, double level) {
     return 1 - (l[2] - level) * (l[2] - level) / ((l[2] - l[1]) * (l[2] - l[0]));
 }
 
-/// The judging, over one mesh.
-class Judge {
+/// The assessment of one mesh.
+class EvidenceAssessment {
 public:
-    Judge(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const ImageGeometry& geometry,
-          const EvidenceOptions& options, const RunContext& run)
+    EvidenceAssessment(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const ImageGeometry& geometry,
+                       const EvidenceOptions& options, const RunContext& run)
         : mesh_(mesh), marks_(marks), geometry_(geometry), options_(options), run_(run) {}
 
     Evidence go(const FloatGrid* edge) {
@@ -172,7 +172,7 @@ private:
 
     // ---- suggestions ---------------------------------------------------------------------------------------------
 
-    /// Where each slice's plane cuts the surface: the middle of each triangle's cut, world.
+    /// The intersection of each slice's plane with the surface: the middle of each triangle's cut, world.
     [[nodiscard]] std::vector<std::vector<Vec3>> outlines() const {
         std::vector<std::vector<Vec3>> result(geometry_.size[2]);
         for (const auto& t : mesh_.triangles) {
@@ -196,7 +196,7 @@ private:
             for (int axis = 0; axis < 3; ++axis) sum[axis] += from[axis] + x * (to[axis] - from[axis]);
             ++count;
         }
-        // The plane may touch a corner alone.
+        // The plane may touch only a corner.
         if (count == 0) return mesh_.place(t[0]);
         for (double& x : sum) x /= count;
         return sum;
@@ -205,15 +205,15 @@ private:
     /// For each slice the unsupported pieces that lie within the reach of its outline.
     [[nodiscard]] std::vector<std::vector<std::uint32_t>> coverage(
         const std::vector<std::vector<Vec3>>& outline) const {
-        std::vector<std::uint32_t> wanting;
+        std::vector<std::uint32_t> unsupported_pieces;
         for (std::size_t n = 0; n < pieces_.size(); ++n)
-            if (pieces_[n].unsupported) wanting.push_back(static_cast<std::uint32_t>(n));
+            if (pieces_[n].unsupported) unsupported_pieces.push_back(static_cast<std::uint32_t>(n));
         const double levels = options_.reach / geometry_.spacing[2];
         std::vector<std::vector<std::uint32_t>> result(outline.size());
         tbb::parallel_for(std::size_t(0), outline.size(), [&](std::size_t k) {
             if (outline[k].empty()) return;
             const detail::KdTree tree(outline[k]);
-            for (const std::uint32_t n : wanting)
+            for (const std::uint32_t n : unsupported_pieces)
                 if (pieces_[n].levels[0] - double(k) <= levels && double(k) - pieces_[n].levels[2] <= levels &&
                     tree.nearest(pieces_[n].center) <= options_.reach * options_.reach)
                     result[k].push_back(n);
@@ -245,8 +245,7 @@ private:
         }
     }
 
-    /// The point of the outline with the most of the pieces' area around it; of many points and pieces a sample
-    /// decides.
+    /// The point of the outline with the largest area of pieces around it; estimated from a sample if there are many.
     [[nodiscard]] Vec3 place(const std::vector<Vec3>& outline, const std::vector<std::uint32_t>& covered) const {
         constexpr std::size_t kSample = 2000;
         const std::size_t step = covered.size() / kSample + 1, stride = outline.size() / kSample + 1;
@@ -285,7 +284,7 @@ Evidence assess(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const 
     require_valid(options, "assess_evidence");
     if (mesh.empty()) throw Error(Errc::InvalidInput, "mesh: expected a surface, got an empty one");
     Evidence result;
-    with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });
+    with_threads(run, [&] { result = EvidenceAssessment(mesh, marks, geometry, options, run).go(edge); });
     return result;
 }
 
@@ -307,7 +306,7 @@ double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid
         double total = 0, bare = 0;
     } areas;
     with_threads(run, [&] {
-        // The same splits, and so the same bits, on any number of threads.
+        // The same splits, and therefore the same bits, for any number of threads.
         areas = tbb::parallel_deterministic_reduce(
             tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Areas{},
             [&](const tbb::blocked_range<std::size_t>& range, Areas sum) {

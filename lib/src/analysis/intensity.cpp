@@ -12,7 +12,7 @@
 namespace covol {
 namespace {
 
-/// The image's held voxels that the surface may enclose; none: there are none.
+/// The image's held voxels that the surface may enclose; none if there is no such voxel.
 std::optional<VoxelBox> voxels_within(const Image& image, const FloatGrid& surface) {
     const openvdb::CoordBBox active = surface.evalActiveVoxelBoundingBox();
     if (active.empty()) return {};
@@ -50,7 +50,8 @@ IntensityStatistics measure_intensity(const Image& image, const FloatGrid& surfa
     IntensityStatistics result;
     const std::optional<VoxelBox> all = voxels_within(image, surface);
     if (!all) return result;
-    // By layers of some slices: nothing of the image's size is held. Sums about the first value lose no digits.
+    // In layers of a few slices, so that nothing of the image's size is held. Sums relative to the first value lose no
+    // digits.
     const double slice = double(all->size()[0]) * all->size()[1];
     const int layers = std::max(1, int(std::min(double(all->size()[2]), double(1 << 22) / slice)));
     double shift = 0, sum = 0, squares = 0;

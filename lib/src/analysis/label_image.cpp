@@ -46,12 +46,12 @@ private:
 
 constexpr std::uint8_t kContested = 255;
 
-/// Decides the voxels that two structures claim, and those that none does where two touch.
-class Arbiter {
+/// Decides the voxels that two structures claim, and those that no structure claims where two touch.
+class ConflictResolver {
 public:
-    /// @param box  that the claims are of: that of the voxels to decide, and one more around it in the image
-    Arbiter(const std::vector<Structure>& structures, const ImageGeometry& geometry, const VoxelBox& box,
-            const std::vector<std::uint8_t>& claims)
+    /// @param box  of the claims: the box of the voxels to decide, and one more voxel around it within the image
+    ConflictResolver(const std::vector<Structure>& structures, const ImageGeometry& geometry, const VoxelBox& box,
+                     const std::vector<std::uint8_t>& claims)
         : structures_(structures), geometry_(geometry), box_(box), claims_(claims), distances_(structures) {
         touching_ = 0.5F * static_cast<float>(structures.front().surface->voxelSize()[0]);
     }
@@ -59,7 +59,7 @@ public:
     [[nodiscard]] std::uint8_t decide(int i, int j, int k) const {
         const std::uint8_t claim = claims_[at(i, j, k)];
         if (claim != 0 && claim != kContested) return claim;
-        const std::vector<std::size_t> candidates = claim == kContested ? everyone() : neighbours(i, j, k);
+        const std::vector<std::size_t> candidates = claim == kContested ? all_structures() : neighbours(i, j, k);
         if (candidates.size() < 2) return 0;
         const Vec3 world = geometry_.index_to_world({double(i), double(j), double(k)});
         std::size_t best = 0;
@@ -82,12 +82,12 @@ private:
         const Index3 size = box_.size();
         return (std::size_t(k - box_.min[2]) * size[1] + (j - box_.min[1])) * size[0] + (i - box_.min[0]);
     }
-    [[nodiscard]] std::vector<std::size_t> everyone() const {
+    [[nodiscard]] std::vector<std::size_t> all_structures() const {
         std::vector<std::size_t> all(structures_.size());
         for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
         return all;
     }
-    /// The different labels of the six neighbours, ascending. A slit of no width has both within one voxel.
+    /// The distinct labels of the six neighbours, ascending. A slit of zero width has both within one voxel.
     [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
         std::vector<std::size_t> found;
         const Index3 here{i, j, k};
@@ -112,7 +112,7 @@ private:
     float touching_;
 };
 
-/// The values of structures: bytes where they are.
+/// The type for values of structures: bytes if all of them fit.
 PixelType type_of(const std::vector<int>& values) {
     return std::all_of(values.begin(), values.end(), [](int v) { return v >= 0 && v <= 255; }) ? PixelType::UInt8
                                                                                                : PixelType::Int32;
@@ -153,7 +153,7 @@ public:
             for (std::size_t v = 0; v < count; ++v)
                 if (solid[v] != 0) claims[v] = claims[v] == 0 ? static_cast<std::uint8_t>(n + 1) : kContested;
         }
-        const Arbiter arbiter(structures_, geometry_, wide, claims);
+        const ConflictResolver arbiter(structures_, geometry_, wide, claims);
         for (int k = box.min[2]; k <= box.max[2]; ++k)
             for (int j = box.min[1]; j <= box.max[1]; ++j)
                 for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = arbiter.decide(i, j, k);
@@ -171,7 +171,7 @@ public:
     }
 
 private:
-    /// Whether a slit is one shows in the voxels beside it.
+    /// The box with the neighbouring voxels, by which slits are recognised.
     [[nodiscard]] VoxelBox widened(VoxelBox box) const {
         for (int a = 0; a < 3; ++a) {
             box.min[a] = std::max(box.min[a] - 1, 0);
@@ -185,7 +185,7 @@ private:
     std::vector<std::unique_ptr<detail::Rasterizer>> solids_;
 };
 
-/// What was written of one structure.
+/// The voxels of one structure written so far.
 struct Written {
     std::uint64_t voxels = 0;
     VoxelBox extent;
@@ -214,7 +214,7 @@ struct LabelImage::State {
           numbers(structures, geometry),
           written(structures.size()) {}
 
-    /// Structures with a value of `row`'s, run by run.
+    /// Adds the voxels of all structures that `row` contains, run by run.
     template <typename T>
     void count(const VoxelBox& box, const T* row, std::vector<Written>& found) const {
         const int length = box.size()[0];
@@ -313,7 +313,7 @@ std::vector<std::pair<std::string, std::string>> LabelImage::metadata() const {
     const Index3 last{size[0] - 1, size[1] - 1, size[2] - 1};
     for (std::size_t n = 0; n < state_->structures.size(); ++n) {
         names.push_back(state_->structures[n].name);
-        // Before the voxels are known, numbers as wide as they can become.
+        // Before the voxels are known, the numbers have their maximum width.
         extents.push_back(before ? VoxelBox{last, last} : state_->written[n].extent);
     }
     return make_slicer_segments(names, extents, state_->values);
@@ -334,7 +334,7 @@ std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structu
     with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
         run.check();
         const Numbers numbers(structures, geometry);
-        // Slabs of a few slices, for each is looked at with one more slice on both sides.
+        // Slabs of a few slices, because each is rasterized with one more slice on both sides.
         constexpr int kSlab = 8;
         tbb::parallel_for(0, (nk + kSlab - 1) / kSlab, [&](int slab) {
             const int first = slab * kSlab;

@@ -48,7 +48,7 @@ double gaussian(std::uint64_t seed, std::uint64_t index) {
     return std::sqrt(-2 * std::log(u)) * std::cos(2 * kPi * v);  // Box and Muller 1958
 }
 
-/// What makes a kind of phantom.
+/// The definition of a kind of phantom.
 struct PhantomShape {
     const char* name;
     std::function<double(const Vec3&)> distance;             ///< to the true surface, negative inside
@@ -56,7 +56,7 @@ struct PhantomShape {
     std::function<Vec3(Random&)> point;                      ///< on the true surface
 };
 
-/// A bright solid; the share of a voxel that lies inside is taken from the distance at its centre.
+/// A bright solid; the fraction of a voxel that lies inside is computed from the distance at its centre.
 PhantomShape solid(const char* name, const std::function<double(const Vec3&)>& distance,
                    std::function<Vec3(Random&)> point) {
     auto intensity = [distance](const Vec3& p, double h) { return std::clamp(0.5 - distance(p) / h, 0.0, 1.0); };
@@ -97,7 +97,7 @@ double distance_to_box(const Vec3& p, const Vec3& half) {
 }
 
 Vec3 point_on_box(const Vec3& half, Random& random) {
-    // An axis by the share of its two faces in the area.
+    // Chooses an axis with a probability proportional to the area of its two faces.
     const Vec3 area = {half[1] * half[2], half[2] * half[0], half[0] * half[1]};
     double at = random.uniform(0, area[0] + area[1] + area[2]);
     int axis = 0;

@@ -1,4 +1,4 @@
-// Several solids in one space: disjoint, and without slits where they touch.
+// Makes several solids in one space disjoint, without slits where they touch.
 #include "covol/structures.h"
 
 #include <openvdb/openvdb.h>
@@ -52,7 +52,7 @@ public:
         carve();
         deepen();
         std::vector<FloatGridPtr> surfaces;
-        for (std::size_t i = 0; i < phi_.size(); ++i) surfaces.push_back(settled(i));
+        for (std::size_t i = 0; i < phi_.size(); ++i) surfaces.push_back(separated(i));
         return {surfaces, report_};
     }
 
@@ -127,7 +127,7 @@ private:
         phi_ = carved;
     }
 
-    // The middle of an overlap is where both distances are equal: both must be known as deep as that.
+    // In the middle of an overlap both distances are equal, so both must be known to that depth.
     void deepen() {
         if (report_.overlaps.empty()) return;
         const double margin = 2 * h_;
@@ -139,7 +139,7 @@ private:
                 if (common(cores[overlap.a], cores[overlap.b]) > 0) shallow.insert({overlap.a, overlap.b});
             if (shallow.empty()) return;
             run_.check();
-            // All alike, or a shallow distance would lose against a deep one.
+            // All to the same depth, because a shallow distance would lose against a deep one.
             for (FloatGridPtr& phi : phi_)
                 phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface",
                                          run_);
@@ -158,7 +158,7 @@ private:
         return g;
     }
 
-    /// The distances of the others in one leaf: their minimum, where it can matter.
+    /// The minimum of the distances of the other structures in one leaf, if it can matter.
     struct Nearest {
         std::array<float, kLeafSize> value;
         bool matters = false;
@@ -179,7 +179,7 @@ private:
         }
     }
 
-    /// `at` lies between i and one of those at the distance m: towards one is away from the other.
+    /// Whether `at` lies between i and a structure at the distance m: moving towards one is moving away from the other.
     [[nodiscard]] bool is_between(std::size_t i, float m, const Coord& at, const std::vector<Accessor>& phi) const {
         const openvdb::Vec3d mine = gradient(phi[i], at);
         for (std::size_t j = 0; j < phi.size(); ++j)
@@ -187,8 +187,8 @@ private:
         return false;
     }
 
-    /// The surface of structure i among the others.
-    FloatGridPtr settled(std::size_t i) {
+    /// The surface of structure i, separated from the others.
+    FloatGridPtr separated(std::size_t i) {
         run_.check();
         const FloatGridPtr u = phi_[i]->deepCopy();
         std::vector<FloatGrid::TreeType::LeafNodeType*> leaves;
@@ -200,7 +200,7 @@ private:
             Nearest nearest;
             for (std::size_t n = range.begin(); n != range.end(); ++n) {
                 gather(i, leaves[n]->origin(), nearest);
-                if (nearest.matters && settle(i, *leaves[n], nearest, phi)) moved = true;
+                if (nearest.matters && separate_leaf(i, *leaves[n], nearest, phi)) moved = true;
             }
         });
         if (!moved && !report_.changed[i]) return structures_[i].surface;
@@ -215,13 +215,13 @@ private:
     }
 
     template <typename Leaf>
-    bool settle(std::size_t i, Leaf& leaf, const Nearest& nearest, const std::vector<Accessor>& phi) const {
+    bool separate_leaf(std::size_t i, Leaf& leaf, const Nearest& nearest, const std::vector<Accessor>& phi) const {
         float* values = leaf.buffer().data();
         const float gap = static_cast<float>(gap_);
         bool moved = false;
         for (int p = 0; p < kLeafSize; ++p) {
             const float mine = values[p], other = nearest.value[p];
-            const float between = mine + other;  // the width of the gap, negative where both claim the voxel
+            const float between = mine + other;  // the width of the gap, negative if both claim the voxel
             if (!(between < gap)) continue;
             const Coord at = leaf.origin().offsetBy(p >> 6, p >> 3 & 7, p & 7);
             if (!(between <= 0) && !is_between(i, other, at, phi)) continue;
@@ -268,7 +268,7 @@ std::vector<std::string> make_grid_names(const std::vector<std::string>& names) 
 }
 
 std::array<std::uint8_t, 3> structure_color(std::size_t n) {
-    // Paul Tol's "bright" scheme and then "muted" ones: told apart by colour-blind readers too.
+    // Paul Tol's "bright" scheme and then "muted" ones, which colour-blind readers can distinguish too.
     static constexpr std::array<std::array<std::uint8_t, 3>, 12> kColors{{{68, 119, 170},
                                                                           {238, 102, 119},
                                                                           {34, 136, 51},

@@ -1,13 +1,14 @@
 #pragma once
 #include <cstdint>
 
-// For functions on eight floats that are compiled twice, without and with AVX2, and chosen at run time. No fused
-// multiply-add, so that both give the same bits. What they call has to be inlined.
+// Functions on eight floats that are compiled twice, without and with AVX2, and chosen at run time. Fused multiply-add
+// is not used, so both give bitwise equal results. The functions that they call have to be inlined.
 
-// Vectors are only passed to functions that are inlined, so that their calling convention does not matter.
+// Vectors are only passed to inlined functions, so their calling convention does not matter.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-// Under the thread sanitizer there is one: it would instrument the functions that choose, which run before it is ready.
+// With the thread sanitizer, only one version is compiled: it would instrument the resolver functions, which run before
+// it is initialized.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_THREAD__)
 #define COVOL_CLONES __attribute__((target_clones("default", "avx2")))
 #else
@@ -20,7 +21,7 @@ namespace covol::detail {
 using Float8 = float __attribute__((vector_size(32)));
 using Int8 = std::int32_t __attribute__((vector_size(32)));
 
-/// From an address of any alignment.
+/// Loads from an address of any alignment.
 template <typename Vector, typename T>
 COVOL_INLINE Vector load(const T* from) {
     Vector v;

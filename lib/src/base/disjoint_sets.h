@@ -8,19 +8,19 @@
 
 namespace covol::detail {
 
-/// Sets under union, by any number of threads at once; each is known by its least member. Anderson and Woll, Wait-free
-/// parallel algorithms for the union-find problem, STOC 1991.
+/// Disjoint sets whose unions may be computed by any number of threads at once; each is represented by its smallest
+/// member. Anderson and Woll, Wait-free parallel algorithms for the union-find problem, STOC 1991.
 class DisjointSets {
 public:
     explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
     [[nodiscard]] std::size_t size() const noexcept { return parent_.size(); }
-    /// While others unite, one that was the root a moment ago.
+    /// The representative of a set. During concurrent unions the result may already be outdated.
     std::uint32_t root(std::uint32_t i) {
         for (;;) {
             const std::uint32_t parent = load(i);
             if (parent == i) return i;
             const std::uint32_t next = load(parent);
-            // What is no root any more never becomes one: nobody else links it.
+            // A node that is no longer a root never becomes one again, so no unite() changes its parent.
             if (next != parent) std::atomic_ref(parent_[i]).store(next, std::memory_order_relaxed);
             i = next;
         }

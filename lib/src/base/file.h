@@ -3,14 +3,14 @@
 
 namespace covol::detail {
 
-/// What lies at one path lies at the other after; for a moment neither may be there where a file system cannot do it at
-/// once. @returns whether it did, errno says why not.
+/// Exchanges two paths. If the file system does not support this atomically, one of them may not exist for a moment.
+/// @returns whether it succeeded; otherwise errno gives the reason.
 bool swap_paths(const std::string& one, const std::string& other);
 
-/// "a.zarr" of "a.zarr/", as a shell completes it.
+/// "a.zarr" for "a.zarr/", which is what a shell completes it to.
 std::string without_end_slash(const std::string& path);
 
-/// "gz" is looked through: extension("a.nii.gz") is ".nii.gz"; always lower case.
+/// The extension in lower case; "gz" is combined with the one before it: extension("a.nii.gz") is ".nii.gz".
 std::string extension(const std::string& path);
 
 }  // namespace covol::detail

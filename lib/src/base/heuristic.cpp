@@ -1,4 +1,4 @@
-// Part of the sensitivity build alone.
+// Only compiled in the sensitivity build.
 #include "base/heuristic.h"
 
 #include <cstdlib>

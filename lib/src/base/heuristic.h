@@ -1,10 +1,10 @@
 #pragma once
 // Heuristic constants: thresholds, factors and counts that were chosen by judgement or measurement and change results.
-// Each folder keeps its own in heuristics.h, one struct for each step; docs/heuristics.md shows what half and twice of
-// each does.
+// Each folder keeps its own in heuristics.h, with one struct for each step; docs/heuristics.md shows the effect of
+// halving and doubling each of them.
 //
-// In the build that measures this (-DCOVOL_SENSITIVITY=ON, never installed) each is multiplied at start-up by what the
-// environment says: COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
+// In the build that measures this (-DCOVOL_SENSITIVITY=ON, never installed), each is multiplied at start-up by a factor
+// from the environment: COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
 #ifdef COVOL_SENSITIVITY
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,7 @@
 namespace covol {
 
 #ifdef COVOL_SENSITIVITY
-/// The factor that COVOL_SCALE has for the name, else 1.
+/// The factor that COVOL_SCALE gives for the name; 1 by default.
 [[nodiscard]] double heuristic_scale(const char* name);
 
 /// Counts are rounded, and at least 1.

@@ -11,16 +11,16 @@
 
 namespace covol::detail {
 
-/// Memory for arrays that are walked leaf by leaf: aligned to cache lines, and from some megabytes on to huge pages,
-/// which the kernel is asked for. A sweep then rarely waits for address translation, and the first touch costs one
-/// fault in 2 MiB.
+/// Memory for arrays that are traversed leaf by leaf: aligned to cache lines, and from some megabytes on to huge pages,
+/// which are requested from the kernel. A sweep then causes few TLB misses, and the first access causes one page fault
+/// per 2 MiB.
 template <typename T>
 struct LargeAllocator {
     using value_type = T;
 
     LargeAllocator() = default;
     template <typename U>
-    LargeAllocator(const LargeAllocator<U>&) noexcept {}  // NOLINT: an allocator converts
+    LargeAllocator(const LargeAllocator<U>&) noexcept {}  // NOLINT: allocators convert implicitly
 
     [[nodiscard]] T* allocate(std::size_t count) {
         if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_alloc();
@@ -30,11 +30,11 @@ struct LargeAllocator {
         void* memory = std::aligned_alloc(unit, bytes);
         if (memory == nullptr) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-        if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it all works, slower
+        if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // optional: without huge pages it is only slower
 #endif
         return static_cast<T*>(memory);
     }
-    /// Values without a constructor stay unset: who fills them does it in parallel.
+    /// Values without a constructor remain uninitialized, so that they can be initialized in parallel.
     template <typename U>
     void construct(U* at) noexcept {
         ::new (static_cast<void*>(at)) U;

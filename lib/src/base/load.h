@@ -6,7 +6,7 @@
 
 namespace covol::detail {
 
-/// The number that begins at `data`. @param swap  its byte order is not this machine's
+/// The number stored at `data`. @param swap  whether its byte order differs from this machine's
 template <typename T>
 [[nodiscard]] T load(const char* data, bool swap) {
     std::array<char, sizeof(T)> bytes;

@@ -6,20 +6,20 @@
 
 namespace covol::detail {
 
-/// floor() is a call where the instruction set has no rounding. @pre |x| < 2^31
+/// Faster than floor(), which is a function call on instruction sets without rounding. @pre |x| < 2^31
 inline int round_down(double x) {
     const int i = int(x);
     return i - (double(i) > x);
 }
 
-/// A number as messages show it: six digits.
+/// A number for messages, with six digits.
 inline std::string number(double value) {
     std::ostringstream text;
     text << value;
     return text.str();
 }
 
-/// A place as messages show it.
+/// A position for messages.
 inline std::string to_text(const Vec3& p) {
     return "(" + number(p[0]) + ", " + number(p[1]) + ", " + number(p[2]) + ")";
 }

@@ -23,7 +23,7 @@ void RunContext::check() const {
 }
 
 void with_threads(const RunContext& run, const std::function<void()>& work) {
-    // TBB prints a warning where an arena asks for more than the process may have.
+    // TBB prints a warning if an arena requests more threads than the process may use.
     const auto maximum = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     const int width = std::min(run.threads, int(maximum));
     if (run.threads <= 0 || width == tbb::this_task_arena::max_concurrency()) {

@@ -92,7 +92,7 @@ namespace {
 
 struct Character {
     char32_t code = 0;
-    std::size_t length = 0;  ///< bytes; 0: no UTF-8
+    std::size_t length = 0;  ///< in bytes; 0: invalid UTF-8
 };
 
 /// The first character of a text that is not empty.
@@ -100,7 +100,7 @@ Character first_of(std::string_view text) {
     const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[n]); };
     if (byte(0) < 0x80) return {byte(0), 1};
     const std::size_t length = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-    constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter forms of the same character are refused
+    constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};  // overlong encodings are rejected
     if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < length) return {};
     char32_t code = byte(0) & (0x7FU >> length);
     for (std::size_t n = 1; n < length; ++n) {

@@ -1,5 +1,5 @@
 #pragma once
-// What the readers of text files share.
+// Code that is common to the readers of text files.
 #include <charconv>
 #include <optional>
 #include <string>
@@ -10,9 +10,9 @@ namespace covol::detail {
 
 [[nodiscard]] inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 [[nodiscard]] std::string_view trim(std::string_view text);
-/// ASCII letters alone.
+/// Converts ASCII letters only.
 [[nodiscard]] std::string lower(std::string_view text);
-/// What a message may quote of a file: short, and no control characters.
+/// A quotation from a file for messages: shortened, and without control characters.
 [[nodiscard]] std::string quote(std::string_view text);
 
 template <typename T = double>
@@ -24,17 +24,17 @@ template <typename T = double>
     return value;
 }
 
-/// The lines of a text, counted from 1. Unix, DOS and old Macintosh line ends.
+/// The lines of a text, counted from 1. Accepts line ends of Unix, DOS and old Macintosh systems.
 class Lines {
 public:
     explicit Lines(std::string_view text);
-    /// The next line, blanks at both ends removed; false at the end of the text.
+    /// The next line, with blanks removed at both ends; false at the end of the text.
     bool next(std::string_view& line);
-    /// With its blanks: a leading tab is an empty first column.
+    /// The same without removing blanks, because a leading tab means an empty first column.
     bool next_untrimmed(std::string_view& line);
-    /// The next line that holds more than a comment, which '#' begins, without that comment.
+    /// The next line that holds more than a comment (from '#' on), without its comment.
     bool next_content(std::string_view& line);
-    /// Likewise, and its words between blanks.
+    /// The same, split into words at blanks.
     bool next_words(std::string_view& line, std::vector<std::string_view>& words);
     [[nodiscard]] std::size_t number() const { return number_; }
     [[nodiscard]] std::string_view rest() const { return rest_; }
@@ -58,7 +58,7 @@ private:
     return word;
 }
 
-/// Cuts a line at `delimiter`, outside double quotes; ' ' stands for any run of blanks.
+/// Splits a line at `delimiter`, except within double quotes; ' ' means any run of blanks.
 void split(std::string_view line, char delimiter, std::vector<std::string_view>& fields);
 
 }  // namespace covol::detail

@@ -5,9 +5,10 @@
 
 namespace covol::detail {
 
-/// Holds one Switch, which sets something process-wide of another library and sets it back in its destructor, while any
-/// of these lives: calls from several threads that overlap leave it as the first of them found it.
-/// As visible as its Switch, so that shared libraries may count together.
+/// Holds one Switch while at least one object of this class exists. A Switch changes a global setting of another
+/// library, and restores it in its destructor; after overlapping calls from several threads the setting is the same as
+/// before.
+/// Has the visibility of its Switch, so that shared libraries can use a common count.
 template <typename Switch>
 class __attribute__((visibility("default"))) WhileAny {
 public:

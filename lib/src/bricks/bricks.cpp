@@ -1,4 +1,4 @@
-// A job in bricks: lib/include/covol/bricks.h says how.
+// A job in bricks, see lib/include/covol/bricks.h.
 #include "covol/bricks.h"
 
 #include <openvdb/openvdb.h>
@@ -26,37 +26,37 @@ namespace {
 
 using namespace pipeline;
 
-constexpr double kCoarseVoxels = 400;     // most across the points, on the lattice of the coarse solve
-constexpr double kMinFactor = 2;          // voxels: least size of that lattice's voxels
-constexpr int kStateLayers = 8;           // around a brick, that its state holds
-constexpr int kSurfaceLayers = 8;         // around a brick: its distance to the surface rests on no more
-constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
+constexpr double kCoarseVoxels = 400;     // maximum across the points, on the lattice of the coarse solve
+constexpr double kMinFactor = 2;          // voxels: minimum voxel size of that lattice
+constexpr int kStateLayers = 8;           // around a brick, that its state includes
+constexpr int kSurfaceLayers = 8;         // around a brick: the distance to its surface depends on no more
+constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is sampled to fix the parameters of g
 
-void require_bricks_can(const Problem& problem, const Resolved& resolved) {
-    const auto refuse = [](const std::string& what) {
+void require_supported(const Problem& problem, const Resolved& resolved) {
+    const auto reject = [](const std::string& what) {
         throw Error(Errc::Unsupported,
                     "bricks: " + what +
                         ": such a surface rests on all of them at once; solve it in one piece, "
                         "with a larger `voxel_size` where memory does not do",
                     "voxel_size");
     };
-    if (problem.options.contours) refuse("contours, got some");
-    if (problem.options.guess) refuse("expected no guess to correct, got one");
+    if (problem.options.contours) reject("contours, got some");
+    if (problem.options.guess) reject("expected no guess to correct, got one");
     if (resolved.choices.start == StartMethod::Guess)
-        refuse(std::to_string(resolved.marks.attracting.size()) +
+        reject(std::to_string(resolved.marks.attracting.size()) +
                " marks are a guess; `model = paper`, or more marks, flow");
 }
 
-/// The voxels of one lattice that a coarse solve's domain covers.
+/// The voxels of the fine lattice that the domain of a coarse solve covers.
 Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domain& coarse) {
     const Domain own = problem.domain(resolved.choices.h, resolved.marks.attracting, 0);
     if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
-    // A body that the image cuts is solved beyond its end, too.
+    // A body that the image cuts off is solved beyond the image's end, too.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
     return beyond > 2 * coarse.voxel_size ? widened(own, kStarts.tagged_beyond_voxels) : own;
 }
 
-/// The fine band at some leaves of the coarse one, spread over all of it.
+/// The fine band at a sample of the coarse band's leaves, spread over all of it.
 FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const RunContext& run) {
     std::vector<const FloatGrid::TreeType::LeafNodeType*> leaves;
     for (auto leaf = coarse.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
@@ -77,7 +77,7 @@ FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const Ru
     return band;
 }
 
-/// What all flows in bricks have in common: a band that follows a surface that is near its end.
+/// What all flows in bricks have in common: a band that follows a surface close to its steady state.
 StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vector<Vec3> points) {
     StartFacts facts;
     facts.origin = StartOrigin::CoarseLevel;
@@ -89,7 +89,7 @@ StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vec
     return facts;
 }
 
-/// K and the range of intensities, as they would be found on all of the band.
+/// K and the range of intensities, as they would be determined on the whole band.
 EdgeOptions fixed_edge(const Problem& problem, const Choices& choices, const FloatGrid& coarse, const Domain& domain) {
     if (!uses_image(choices.evolve)) return choices.edge;
     return find_edges(problem, facts_of_brick(choices, domain, {}), *sample_band(coarse, domain, problem.run),
@@ -97,7 +97,7 @@ EdgeOptions fixed_edge(const Problem& problem, const Choices& choices, const Flo
         .options;
 }
 
-/// Points that act in the part.
+/// Points that act in `part`.
 std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     const std::vector<Vec3>& points = resolved.marks.attracting;
     const double range = resolved.choices.evolve.attraction_range.value_or(0);
@@ -113,7 +113,7 @@ std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     return near;
 }
 
-/// In the plan's order, in which states that overlap are summed: sums of three depend on it in their last bits.
+/// In the plan's order, in which overlapping states are summed: the last bits of sums of three depend on it.
 std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
     std::vector<std::size_t> all = plan.bricks[brick].neighbours;
     all.push_back(brick);
@@ -133,7 +133,7 @@ std::vector<std::size_t> bricks_reaching(const BrickPlan& plan, const Domain& pa
     return found;
 }
 
-/// The level set that a brick starts from; null where there is none.
+/// The level set that a brick starts from; null if there is none.
 FloatGridPtr start_of(const BrickPlan& plan, std::size_t brick, const BrickStates& states, const Domain& part,
                       const RunContext& run) {
     const FloatGridPtr known =
@@ -178,7 +178,7 @@ struct BrickJob::Parts {
           problem(image ? &*image : nullptr, points, options, run) {
         with_threads(run, [&] {
             resolved = resolve(problem);
-            require_bricks_can(problem, resolved);
+            require_supported(problem, resolved);
             const Choices& choices = resolved.choices;
             if (choices.cloud) field = std::make_unique<const cloud::CloudField>(*choices.cloud, choices.h, cloud, run);
         });
@@ -194,7 +194,7 @@ struct BrickJob::Parts {
                                                 ": plan again, with `voxel_size`");
     }
 
-    /// The field on all of the lattice.
+    /// The joined field on the whole lattice.
     [[nodiscard]] Solution join(const BrickPlan& plan, const BrickStates& states) const {
         Solution solution = solution_on(plan);
         StartFacts& facts = solution.start;
@@ -203,13 +203,14 @@ struct BrickJob::Parts {
             facts.origin = StartOrigin::Cloud;
             facts.cloud = cloud;
             cloud::settle(*solution.u, *resolved.choices.cloud, facts.cloud, run);
-            if (!rests(problem, facts, EdgeFeature::Slope)) solution.u = start_from_grid(plan.domain, *solution.u, run);
+            if (!is_final_start(problem, facts, EdgeFeature::Slope))
+                solution.u = start_from_grid(plan.domain, *solution.u, run);
         }
-        solution.solve = report_of_rest(*solution.u);
+        solution.solve = steady_report(*solution.u);
         return solution;
     }
 
-    /// The surface brick by brick: nothing but it is held of the whole, unless fields are wanted.
+    /// Extracts the surface brick by brick: nothing else of the whole is held in memory, unless fields are requested.
     /// @param solution  gets u, and the size of its band
     [[nodiscard]] FloatGridPtr join_surfaces(const BrickPlan& plan, const BrickStates& states,
                                              Solution& solution) const {
@@ -228,7 +229,7 @@ struct BrickJob::Parts {
             set_clip(*u, clip);
             try {
                 bricks::copy_leaves(*extract_surface(*u, run), core, *surface);
-            } catch (const NoSurface&) {  // a neighbour's band reaches it, and no surface does
+            } catch (const NoSurface&) {  // a neighbour's band reaches this brick, but no surface does
             }
         }
         detail::flood_tiles(*surface, plan.domain);
@@ -238,7 +239,7 @@ struct BrickJob::Parts {
         return surface;
     }
 
-    /// Of all bricks.
+    /// For all bricks, without u.
     [[nodiscard]] Solution solution_on(const BrickPlan& plan) const {
         Solution solution;
         solution.start = facts_of_brick(resolved.choices, plan.domain, resolved.marks.attracting);
@@ -247,7 +248,7 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// The coarser lattice on which the whole is some hundred voxels wide.
+    /// Factor to the coarser lattice on which the whole is a few hundred voxels wide.
     [[nodiscard]] double coarse_factor() const {
         const std::vector<Vec3>& attracting = resolved.marks.attracting;
         const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);
@@ -271,7 +272,7 @@ struct BrickJob::Parts {
         coarse_options.holes = {};
         coarse_options.extract = {};
         coarse_options.without_fields = false;
-        // Where the structure is too fine for so coarse a lattice, a finer one may do.
+        // If the structure is too fine for such a coarse lattice, a finer one may work.
         for (double factor = coarse_factor();; factor /= 2) {
             coarse_options.voxel_size = factor * h();
             try {
@@ -358,7 +359,7 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
     with_threads(run, [&] {
         StepReport before = choices.report;
         if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
-        // Whatever else is made of the surface, it has the same bits.
+        // The surface is bit-identical, whatever else is made from it.
         FloatGridPtr surface;
         Solution solution = parts_->field ? parts_->join(plan, states) : parts_->solution_on(plan);
         if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);

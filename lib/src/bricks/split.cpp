@@ -30,7 +30,7 @@ std::vector<Place> places_of(const Domain& domain, const FloatGrid& coarse) {
 
 class Splitter {
 public:
-    /// @param weight  voxels of the fine band that one place stands for
+    /// @param weight  number of voxels of the fine band that one place represents
     Splitter(const Domain& domain, double weight, const BrickOptions& options)
         : domain_(domain), weight_(weight), maximum_(double(options.max_voxels)) {}
 
@@ -84,7 +84,7 @@ bool are_near(const VoxelBox& a, const VoxelBox& b, int voxels) {
 
 std::vector<Brick> split(const Domain& domain, const FloatGrid& coarse, const BrickOptions& options) {
     std::vector<Place> places = places_of(domain, coarse);
-    // A band is as many voxels wide on either lattice.
+    // A band has the same width in voxels on both lattices.
     const double factor = coarse.voxelSize()[0] / domain.voxel_size;
     Splitter splitter(domain, factor * factor, options);
     splitter.split({domain.min, domain.max}, places.begin(), places.end());

@@ -14,10 +14,10 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr int kFrameLayers = 4;     // the scheme looks two voxels far, redistancing one more
-constexpr int kBlend = 8;           // voxels: states reach so far beyond their cores
-constexpr int kSeamLayers = 3;      // of one brick's voxels beside another, where their surfaces are compared
-constexpr double kBeyondAll = 1e3;  // voxels: a bound that binds nothing
+constexpr int kFrameLayers = 4;  // the scheme reads two voxels beyond, redistancing one more
+constexpr int kBlend = 8;        // voxels: states extend this far beyond their cores
+constexpr int kSeamLayers = 3;   // layers of one brick's voxels beside another in which their surfaces are compared
+constexpr double kUnboundedVoxels = 1e3;  // voxels: a bound without effect
 
 CoordBBox bounds(const VoxelBox& box) { return {Coord(box.min.data()), Coord(box.max.data())}; }
 
@@ -45,7 +45,7 @@ void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels,
     }
 }
 
-/// Where states overlap, one goes over into the other within kBlend voxels on either side of the seam.
+/// Where states overlap, blends from one to the other within kBlend voxels on either side of the seam.
 class SeamBlend {
 public:
     SeamBlend(const BrickPlan& plan, const CoordBBox& box)
@@ -123,7 +123,7 @@ FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::ve
 
 Frame make_frame(const FloatGrid& start, const Domain& part, const Domain& whole) {
     const double h = part.voxel_size;
-    const auto free = float(kBeyondAll * h), limit = float(kHalfWidthVoxels * h);
+    const auto free = float(kUnboundedVoxels * h), limit = float(kHalfWidthVoxels * h);
     VoxelBox inner{part.min, part.max};
     for (int a = 0; a < 3; ++a) {
         if (part.min[a] > whole.min[a]) inner.min[a] += kFrameLayers;
@@ -171,7 +171,7 @@ double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box) 
                 if ((*value < 0) == (next < 0)) continue;
                 float first = 0, second = 0;
                 const bool known = b_at.probeValue(p, first) && b_at.probeValue(q, second);
-                // b where a is 0: slopes may differ with the phase in which the flow stopped.
+                // The value of b at the zero of a: the slopes may differ with the phase in which the flow stopped.
                 const double there = double(*value) / (double(*value) - next);
                 largest = std::max(largest, known ? std::abs(first + there * (second - first)) : kHalfWidthVoxels * h);
             }

@@ -1,5 +1,5 @@
 #pragma once
-// Level sets of bricks, put together and taken apart leaf by leaf.
+// Level sets of bricks, assembled and split leaf by leaf.
 #include "covol/bricks.h"
 
 namespace covol::bricks {
@@ -10,16 +10,16 @@ namespace covol::bricks {
 /// Adds the leaves of `from` that meet the box, with their masks. @pre `to` has none of them
 void copy_leaves(const FloatGrid& from, const VoxelBox& box, FloatGrid& to);
 
-/// Adds the active voxels and leaves of the box.
+/// Adds the active voxels and leaves in the box to the counts.
 void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels, std::int64_t& leaves);
 
-/// A level set on `domain`: from each brick of the list the leaves of its core, as far as the domain goes. Beside seams
-/// it goes over from one state to the other, weighted by how deep in its core, or how far beyond it, a voxel lies.
-/// @throws Error InvalidInput where one has no state.
+/// A level set on `domain`: from each brick in the list the leaves of its core, limited by the domain. Near seams the
+/// states are blended, weighted by how deep in its core, or how far beyond it, a voxel lies.
+/// @throws Error InvalidInput if a brick has no state.
 [[nodiscard]] FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
                                     const BrickStates& states);
 
-/// Bounds that hold a level set at the faces where its part ends and the whole goes on, and nowhere else.
+/// Bounds that fix a level set at the faces where its part ends but the whole continues, and nowhere else.
 struct Frame {
     FloatGridPtr floor, obstacle;
 };
@@ -28,7 +28,7 @@ struct Frame {
 /// The voxels of `other` that lie next to those of `core`.
 [[nodiscard]] VoxelBox beside(const VoxelBox& core, const VoxelBox& other);
 
-/// Largest distance from the surface of `a` to that of `b` between the voxels of `box`, voxels; kHalfWidthVoxels where
+/// Maximum distance from the surface of `a` to that of `b` between the voxels of `box`, in voxels; kHalfWidthVoxels if
 /// it is not within b's band.
 [[nodiscard]] double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box);
 

@@ -28,7 +28,7 @@ Clip make_clip(const WorldBox& box) {
 
 Clip make_clip(const ImageGeometry& geometry) {
     if (geometry.is_axis_aligned()) return make_clip(geometry.world_box());
-    // Of sheared axes the faces' normals are no axes.
+    // The face normals of sheared axes are not parallel to the axes.
     const Matrix3 normals = detail::inverse(geometry.direction);
     Clip clip;
     for (int a = 0; a < 3; ++a) {

@@ -17,14 +17,14 @@ namespace {
 
 using Accessor = FloatGrid::ConstAccessor;
 
-constexpr double kMinCell = 0.1;        // voxels: a layer closer to the face than this is moved onto it
-constexpr float kSameDistance = 1e-3F;  // voxels: a distance that is the face's own
+constexpr double kMinCell = 0.1;        // voxels: layers closer to the face are moved onto it
+constexpr float kSameDistance = 1e-3F;  // voxels: maximum deviation of a distance that equals the face's
 
 openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
 }
 
-/// Trilinear samples of a grid that is known on a domain, carried on linearly beyond the last voxel centres.
+/// Trilinear samples of a grid that is known on a domain, extrapolated linearly beyond the last voxel centres.
 class DomainSampler {
 public:
     DomainSampler(const FloatGrid& grid, const Domain& domain) : accessor_(grid.getConstAccessor()), domain_(domain) {}
@@ -83,7 +83,7 @@ public:
                 evaluate(origins[n], sample, accessor, results[n]);
         });
         for (std::size_t n = 0; n < origins.size(); ++n) {
-            // A tile that stays one needs no leaf.
+            // A tile that does not change needs no leaf.
             if (!any_on(results[n].active) && grid_.tree().probeConstLeaf(origins[n]) == nullptr &&
                 grid_.tree().getValue(origins[n]) == results[n].values[0])
                 continue;
@@ -106,7 +106,7 @@ private:
         return domain_.index_to_world({double(voxel[0]), double(voxel[1]), double(voxel[2])});
     }
 
-    /// Whether a box of voxels may hold some that lie beyond the clip, or within it in the band along its boundary.
+    /// Whether a box of voxels may contain some beyond the clip or within the band along its boundary.
     [[nodiscard]] bool near_clip(const openvdb::CoordBBox& box) const {
         const Vec3 lo = world(box.min()), hi = world(box.max());
         double highest = -LatticeClip::kFar;
@@ -121,7 +121,7 @@ private:
         return highest > -width_;
     }
 
-    /// Blocks of 8^3 of a box that the clip may pass.
+    /// Appends blocks of 8^3 within a box that the clip may change.
     void add_blocks(const openvdb::CoordBBox& box, std::vector<Coord>& blocks) const {
         if (!near_clip(box)) return;
         const int longest = int(box.dim().maxIndex());
@@ -134,7 +134,7 @@ private:
         add_blocks(high, blocks);
     }
 
-    /// All that the cut can change: near the clip, and in the solid or beside it.
+    /// All blocks that the cut can change: near the clip, and in the solid or adjacent to it.
     [[nodiscard]] std::vector<Coord> blocks() const {
         std::vector<Coord> solid;
         for (auto leaf = grid_.tree().cbeginLeaf(); leaf; ++leaf)
@@ -179,7 +179,8 @@ private:
     double width_;  // of the band, world units
 };
 
-/// Undoes the cut, face by face: each column that ends at the face is followed inward to where the wall is nearer.
+/// Undoes the cut face by face: each column that ends at the face is followed inward until the wall, the solid's own
+/// surface, is nearer than the face.
 class Restorer {
 public:
     Restorer(const FloatGrid& surface, const LatticeClip& clip, const Clip& planes, FaceLayer layer)
@@ -206,7 +207,7 @@ public:
     }
 
 private:
-    static constexpr int kDepth = 5;  ///< layers within: the band is three voxels wide, and a slope needs one more
+    static constexpr int kDepth = 5;  ///< layers inside: the band is three voxels wide, and a slope needs one more
 
     /// @return whether the solid meets this face.
     bool restore(int axis, bool upper) {
@@ -246,7 +247,7 @@ private:
         return meets;
     }
 
-    /// The wall's distance in the layers from `at` inward.
+    /// The distance to the wall in the layers from `at` inward.
     [[nodiscard]] [[nodiscard]] std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at,
                                                                  int axis, int inward) const {
         std::array<float, kDepth> wall;
@@ -277,7 +278,7 @@ private:
     float width_;
 };
 
-/// None where a plane is not a lattice plane.
+/// None if a plane is not parallel to the lattice.
 std::optional<LatticeClip> on_lattice(const Clip& planes, const Domain& domain) {
     LatticeClip clip;
     for (const HalfSpace& plane : planes) {

@@ -1,5 +1,5 @@
 #pragma once
-// Half-spaces, and directions beside and within their planes.
+// Half-spaces, and directions along and perpendicular to their planes.
 #include <array>
 #include <cmath>
 
@@ -8,14 +8,14 @@
 
 namespace covol::detail {
 
-/// n·x - offset: how far beyond the plane a position lies, negative within.
+/// n·x - offset: distance of a position beyond the plane, negative within.
 [[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) { return dot(plane.normal, x) - plane.offset; }
 
 [[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
     return plus(x, times(by, direction));
 }
 
-/// The nearest position in the clip, found by projecting onto its planes in turn; of a box it is exact.
+/// The nearest position in the clip, found by projecting onto its planes in turn; exact for a box.
 [[nodiscard]] inline Vec3 projected(const Clip& clip, Vec3 x) {
     constexpr int kProjections = 8;
     for (int round = 0; round < kProjections; ++round) {
@@ -31,7 +31,7 @@ namespace covol::detail {
     return x;
 }
 
-/// Two perpendicular directions in the plane; of a plane along two of the world's axes, these.
+/// Two perpendicular directions in the plane; if it is parallel to two of the world's axes, these axes.
 [[nodiscard]] inline std::array<Vec3, 2> directions_in(const HalfSpace& plane) {
     const Vec3& n = plane.normal;
     int across = 0;

@@ -1,31 +1,30 @@
 #pragma once
-// Clouds of bodies that the image cuts off: what closes them for tagging, whose flood comes in from every side.
+// Points that close bodies cut off by the image, for tagging, whose flood fill comes from all sides.
 #include <vector>
 
 #include "covol/clip.h"
 
 namespace covol::detail {
 
-/// A face of the image's box, and how far apart the slices along it are.
+/// A face of the image's box, with the distance between the slices parallel to it.
 struct ImageFace {
     HalfSpace plane;
     double spacing = 1;
-    /// Of a position inside, >= 0.
+    /// Depth of a position inside, >= 0.
     [[nodiscard]] double depth(const Vec3& x) const;
 };
 [[nodiscard]] std::vector<ImageFace> faces_of(const ImageGeometry& geometry);
 
-/// Points of the last slice along a face: not deeper than the slices are apart.
+/// Whether a position is on the last slice along a face: not deeper than the distance between slices.
 [[nodiscard]] bool on_end_slice(const ImageFace& face, const Vec3& x);
 
-/// The section on each end slice goes on beyond the face: its points again and again, up to `length` beyond. Where
-/// marks lie within the section, too, they close it there, and the flood passes above a surface that leaves the image
-/// slowly.
+/// Continues the section on each end slice beyond the face by repeating its points up to `length` beyond. Marks inside
+/// the section close it there, and the flood fill passes above a surface that leaves the image at a shallow angle.
 [[nodiscard]] std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                            double length);
 
-/// The points' mirror images beyond each face that some of them lie nearer to than `reach`: with its own mirror image a
-/// body that is open there is closed, and meets the face at a right angle.
+/// The points' mirror images in each face that some points are nearer to than `reach`: an open body is closed by its
+/// own mirror image, and meets the face at a right angle.
 [[nodiscard]] std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                          double reach);
 

@@ -9,7 +9,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kLongestPiece = 1e6;  // points on one piece: a step that is far too small must not take all memory
+constexpr double kLongestPiece = 1e6;  // points on one piece: limits the memory if the step is much too small
 
 Vec3 mix(const Vec3& a, const Vec3& b, double t) {
     return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
@@ -17,7 +17,7 @@ Vec3 mix(const Vec3& a, const Vec3& b, double t) {
 
 int pieces(double length, double step) { return std::max(1, int(std::ceil(std::min(length / step, kLongestPiece)))); }
 
-/// Barry and Goldman's pyramid: the curve through p[1] and p[2] at the fraction s between them.
+/// Barry and Goldman's pyramidal scheme: the curve through p[1] and p[2] at the fraction s between them.
 Vec3 catmull_rom(const std::array<Vec3, 4>& p, double s) {
     std::array<double, 4> t{0, 0, 0, 0};
     for (int n = 1; n < 4; ++n) t[n] = t[n - 1] + std::sqrt(length(minus(p[n - 1], p[n])));
@@ -25,7 +25,7 @@ Vec3 catmull_rom(const std::array<Vec3, 4>& p, double s) {
     std::array<Vec3, 4> level = p;
     for (int width = 1; width < 4; ++width)
         for (int n = 0; n + width < 4; ++n) {
-            // The last round spans the middle piece alone.
+            // The last round uses the middle interval alone.
             const double begin = width == 3 ? t[1] : t[n], end = width == 3 ? t[2] : t[n + width];
             level[n] = mix(level[n], level[n + 1], (at - begin) / (end - begin));
         }
@@ -52,7 +52,7 @@ std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed,
     if (count < 3) return marks;
     const auto at = [&](std::ptrdiff_t n) -> Vec3 {
         if (closed) return marks[std::size_t((n + count) % count)];
-        // Beyond an open end: the neighbour, mirrored at the end.
+        // Beyond an open end the neighbour is mirrored at the end.
         if (n < 0) return mix(marks[1], marks[0], 2);
         if (n >= count) return mix(marks[std::size_t(count - 2)], marks[std::size_t(count - 1)], 2);
         return marks[std::size_t(n)];

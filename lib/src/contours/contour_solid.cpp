@@ -20,26 +20,25 @@ using detail::Vec2;
 
 namespace {
 
-/// The dome's profile: how far inside the last contour the body ends at the fraction t of the dome's height. A
-/// paraboloid, whose area falls linearly.
+/// The dome's profile: the distance of the body's wall from the last contour at the fraction t of the dome's height. A
+/// paraboloid, whose area decreases linearly.
 double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
 
-/// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, 0
-/// where they differ in sign (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not
-/// overshoot.
+/// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, or
+/// 0 if their signs differ (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not overshoot.
 double monotone_slope(double secant_left, double left, double secant_right, double right) {
     if (!(secant_left * secant_right > 0)) return 0;
     const double a = 2 * right + left, b = right + 2 * left;
     return (a + b) / (a / secant_left + b / secant_right);
 }
 
-/// Cubic from 0 to 1 by Hermite's basis; slopes times the interval's length.
+/// Cubic Hermite interpolation from 0 to 1; slopes are multiplied by the interval's length.
 double hermite(double v0, double v1, double m0, double m1, double t) {
     const double s = 1 - t;
     return s * s * ((1 + 2 * t) * v0 + t * m0) + t * t * ((1 + 2 * s) * v1 - s * m1);
 }
 
-/// One stretch of the body along the slices' normal, with the level inside it.
+/// One interval of the body along the slices' normal, with the level inside it.
 class Interval {
 public:
     enum class Kind { Below, Between, Above };
@@ -67,7 +66,8 @@ public:
         if (kind_ == Kind::Below) return w < slice().w;
         return slice().w <= w && (kind_ == Kind::Above || w < data_.slices[n_ + 1].w);
     }
-    /// Levels over (x, y) for w, which is in this interval, w + dw, ... @return for how many of `count`, those in it
+    /// Levels over (x, y) for w, which is in this interval, w + dw, ... @return the number of the `count` values that
+    /// lie in it
     [[nodiscard]] int levels_over(double x, double y, double w, double dw, int count, float* values) const {
         const Column c = is_shifted() ? Column{} : column(place(x, y));
         int n = 0;
@@ -76,12 +76,13 @@ public:
         while (at = w + dw * ++n, n < count && holds(at));
         return n;
     }
-    /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
+    /// Range of the level within a ball around a position of the plane, for all w; the upper bound is not needed on
+    /// domes.
     [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
         const SlicePlace p = place(x, y);
         const double here = at(slice(), p);
         if (kind_ != Kind::Between && slice().open) {
-            // Neither section's level changes faster than the position does.
+            // The level of each section changes at most as fast as the position.
             const double height = slice().end + radius, fraction = height / std::abs(slice().w - inner().w);
             return {std::min(here, carried_on(column(p), height)) - (1 + 2 * fraction) * radius,
                     std::numeric_limits<double>::max()};
@@ -91,17 +92,17 @@ public:
         const double reach = radius + std::hypot(slice().shift[0], slice().shift[1]);
         return {std::min(here, there) - reach, std::max(here, there) + reach};
     }
-    /// The surface's points strictly inside the interval: one for each lattice line that it crosses along the axis its
-    /// normal is closest to. In the frame (x, y, w).
+    /// Appends the surface's points strictly inside the interval: one for each lattice line that it crosses along the
+    /// axis closest to its normal. In the frame (x, y, w).
     void append_surface(double step, std::vector<Vec3>& points) const;
 
 private:
     [[nodiscard]] SlicePlace place(double x, double y) const { return place_in(data_.grid, x, y); }
     [[nodiscard]] double at(const SolidSlice& section, const SlicePlace& p) const { return section.at(data_.grid, p); }
 
-    /// What the level is made of along w over a position of the plane, where the sections are not shifted.
+    /// The data of the level along w over a position of the plane, if the sections are not shifted.
     struct Column {
-        double here, there;  ///< levels of this slice and the next one; of an open end, the one within
+        double here, there;  ///< levels of this slice and the next one; for an open end, of the inner neighbour
         double begin, end;   ///< slopes times the length between the two
     };
     [[nodiscard]] Column column(const SlicePlace& p) const {
@@ -118,14 +119,14 @@ private:
         const double height = std::abs(w - slice().w);
         return slice().open ? std::max(carried_on(c, height), height - slice().end) : c.here + beyond(height);
     }
-    /// Beyond an open end a wall that came inward goes on as it came. One that went outward slows down as a paraboloid
-    /// does whose pole is the wall of the slice before, and leans outward by 45 degrees at most: bodies are round, and
-    /// a section that grew fast does not grow for ever.
+    /// Beyond an open end a wall that converges is continued linearly. One that diverges slows down like a paraboloid
+    /// whose pole is the wall of the previous slice, with a slope of at most 45 degrees: bodies are round, and a
+    /// section that grows fast does not grow indefinitely.
     [[nodiscard]] double carried_on(const Column& c, double height) const {
         const double t = height / std::abs(slice().w - inner().w), change = c.here - c.there;
         return c.here + (change > 0 ? t * change : std::max((std::sqrt(1 + t) - 1) * change, -height));
     }
-    /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
+    /// Slopes of the level along w at the interval's two slices; beyond an end slice that of the dome.
     [[nodiscard]] double slope_below(const SlicePlace& p, double here, double secant, double length) const {
         if (n_ == 0 && slice().open) return secant;
         if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
@@ -144,7 +145,7 @@ private:
     [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
     [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
-    /// Whether an end slice's section does not overlap its neighbour's, which then tells nothing of where it goes.
+    /// Whether an end slice's section does not overlap its neighbour's, which then gives no direction for it.
     [[nodiscard]] bool is_apart() const { return kind_ == Kind::Below ? slice().apart : inner().apart; }
     [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
@@ -158,7 +159,7 @@ private:
     std::size_t n_;
 };
 
-/// Whether the surface can pass the columns at a node and at its next ones.
+/// Whether the surface can cross the columns at a node and at its next ones.
 bool Interval::may_cross(int i, int j) const {
     if (is_shifted()) return true;
     const SliceGrid& grid = data_.grid;
@@ -205,7 +206,7 @@ void Interval::append_surface(double step, std::vector<Vec3>& points) const {
                     if (std::abs(slope[a]) > std::abs(slope[axis])) axis = a;
                 if ((next[axis] < 0) == (here < 0)) continue;
                 Vec3 p{x, y, w};
-                // On a slice itself the contour lies there already.
+                // Points on a slice itself are given by its contour.
                 if (axis != 2 && layer == 0 && kind_ != Kind::Below) continue;
                 p[axis] -= here / slope[axis];
                 points.push_back(p);
@@ -213,7 +214,7 @@ void Interval::append_surface(double step, std::vector<Vec3>& points) const {
         }
 }
 
-/// The interval that holds w; the domes hold all that lies beyond.
+/// The interval that contains w; the domes contain everything beyond the end slices.
 Interval interval_at(const ContourSolid::Data& data, double w) {
     const auto above = std::upper_bound(data.slices.begin(), data.slices.end(), w,
                                         [](double value, const SolidSlice& s) { return value < s.w; });
@@ -229,7 +230,7 @@ std::vector<Interval> intervals(const ContourSolid::Data& data) {
     return all;
 }
 
-/// The deepest node of each part of the outside that does not reach the grid's border.
+/// The deepest node of each part of the outside that is not connected to the grid's border.
 std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceGrid& grid) {
     std::vector<char> seen(level.size(), 0);
     std::vector<std::size_t> stack;
@@ -246,7 +247,7 @@ std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceG
             const auto i = int(node % std::size_t(grid.nx)), j = int(node / std::size_t(grid.nx));
             if (i == 0 || j == 0 || i == grid.nx - 1 || j == grid.ny - 1) {
                 at_border = true;
-                continue;  // beyond a row along the border nothing is left to tell
+                continue;  // the part is known to be connected to the border
             }
             for (const std::ptrdiff_t to :
                  {std::ptrdiff_t(-1), std::ptrdiff_t(1), -std::ptrdiff_t(grid.nx), std::ptrdiff_t(grid.nx)}) {
@@ -282,7 +283,7 @@ void ContourSolid::levels(const Vec3& first, const Vec3& step, int count, float*
     const Vec3 p = data_->frame.from_world(first);
     const Vec3 next = data_->frame.from_world({first[0] + step[0], first[1] + step[1], first[2] + step[2]});
     const Vec3 d{next[0] - p[0], next[1] - p[1], next[2] - p[2]};
-    // Along the slices' normal a column serves all positions in its interval.
+    // Along the slices' normal one column is valid for all positions in its interval.
     const bool along_w = d[0] == 0 && d[1] == 0;
     for (int n = 0; n < count;) {
         const double x = p[0] + n * d[0], y = p[1] + n * d[1], w = p[2] + n * d[2];
@@ -313,7 +314,7 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    // An open end may widen, by as much as it is high.
+    // An open end may widen by as much as its height.
     double wider = 0;
     for (const SolidSlice* end : {&slices.front(), &slices.back()})
         if (end->open) wider = std::max(wider, end->end);
@@ -341,7 +342,7 @@ std::vector<Vec3> ContourSolid::surface_points(double step, const RunContext& ru
 std::vector<Vec3> ContourSolid::hole_seeds() const {
     std::vector<std::vector<Vec2>> parts(data_->slices.size());
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t n) {
-        // A single contour that does not cross itself has no hole.
+        // A single contour without self-intersections has no hole.
         if (data_->slices[n].polygons > 1) parts[n] = deepest_in_holes(data_->slices[n].level, data_->grid);
     });
     std::vector<Vec3> seeds;

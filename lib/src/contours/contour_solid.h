@@ -7,7 +7,7 @@
 
 namespace covol::detail {
 
-/// Right-angled coordinates (x, y, w) of world length along an image's axes: w is the slices' normal.
+/// Orthogonal coordinates (x, y, w) with world lengths along an image's axes: w is the slices' normal.
 class SliceFrame {
 public:
     SliceFrame() = default;
@@ -44,21 +44,21 @@ private:
 
 /// A slice with closed contours.
 struct SolidSlice {
-    double w = 0;              ///< where it lies along the normal
+    double w = 0;              ///< position along the normal
     std::vector<float> level;  ///< signed distance within the plane, on the grid
     std::size_t polygons = 0;
-    double area = 0;     ///< inside
+    double area = 0;     ///< of the inside
     double depth = 0;    ///< of the deepest node inside
-    double cap = 0;      ///< height of the dome, on the first and the last slice; of what goes on where there is none
-    bool open = false;   ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
-    double end = 0;      ///< height of the flat end of what goes on, beyond all that a band at the image's end reads
+    double cap = 0;      ///< height of the dome at the first and last slice, or of the continuation
+    bool open = false;   ///< no dome: the image ends here, and the body continues beyond it as its sections indicate
+    double end = 0;      ///< height of the continuation's flat end, beyond all that a band at the image's end reads
     bool apart = false;  ///< this section and the next slice's do not overlap
-    Vec2 shift{0, 0};    ///< to the next slice's section, where it is carried over to that
+    Vec2 shift{0, 0};    ///< to the next slice's section, if this section is translated to that one
 
     [[nodiscard]] double at(const SliceGrid& grid, const SlicePlace& place) const {
         return sample_slice(level, grid, place);
     }
-    /// Beyond it nothing is inside.
+    /// Above it nothing is inside.
     [[nodiscard]] double highest() const { return open ? end : cap; }
 };
 

@@ -26,14 +26,14 @@ constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
 struct Line {
-    std::vector<Vec3> index;  ///< marks as voxels, or along a frame of the contours' own
+    std::vector<Vec3> index;  ///< marks in voxels, or in a frame of the contours' own
     std::vector<Vec3> world;
     bool closed = true;
     std::string name;  ///< for messages: file, and the line's own name
     std::array<bool, 3> constant{false, false, false};
 };
 
-/// Without neighbours that are the same mark twice.
+/// Without repeated neighbouring marks.
 std::vector<Vec3> without_repeats(const std::vector<Vec3>& marks, bool closed) {
     std::vector<Vec3> kept;
     for (const Vec3& mark : marks)
@@ -42,7 +42,7 @@ std::vector<Vec3> without_repeats(const std::vector<Vec3>& marks, bool closed) {
     return kept;
 }
 
-/// The whole job over one structure's clouds.
+/// Densifies the contours of one structure.
 class Densifier {
 public:
     Densifier(const ImageGeometry* geometry, const ContourOptions& options, const RunContext& run)
@@ -90,8 +90,8 @@ private:
 
     ImageGeometry geometry_;
     bool has_image_;
-    bool along_image_;        // the frame's axes are the image's
-    bool has_loose_ = false;  // marks that belong to no line
+    bool along_image_;        // whether the frame's axes are the image's
+    bool has_loose_ = false;  // whether there are marks that belong to no line
     ContourOptions options_;
     const RunContext& run_;
     std::vector<Line> lines_;
@@ -166,8 +166,8 @@ void Densifier::find_planes(Line& line) const {
     }
 }
 
-/// Whether each closed line lies across one of the image's axes; without an image, across the frame's: there no axis
-/// comes before others.
+/// Whether each closed line lies across one of the image's axes; without an image, across the frame's, because no axis
+/// is preferred there.
 bool Densifier::lies_in_slices() const {
     return std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) {
         return !line.closed ||
@@ -175,8 +175,8 @@ bool Densifier::lies_in_slices() const {
     });
 }
 
-/// Parallel planes of another direction than the image's: a frame of their own, beside which the image's end is no
-/// plane. @returns whether closed lines lie in such
+/// Chooses parallel planes that are tilted against the image, with a frame of their own, in which the image's end is
+/// not a plane. @returns whether closed lines lie in such planes
 bool Densifier::choose_tilted_plane() {
     const Line* longest = nullptr;
     for (const Line& line : lines_)
@@ -204,7 +204,7 @@ bool Densifier::choose_tilted_plane() {
     return true;
 }
 
-/// The plane that most marks of closed lines lie in; a line that fits several counts for none.
+/// The plane that contains most marks of closed lines; lines that lie in several planes are not counted.
 void Densifier::choose_plane() {
     std::array<std::size_t, 3> votes{0, 0, 0};
     for (const Line& line : lines_) {
@@ -212,22 +212,22 @@ void Densifier::choose_plane() {
         for (int a = 0; a < 3; ++a)
             if (line.constant[a]) votes[a] += line.index.size() * (line.closed ? 2 : 1);
     }
-    // Slices of a stack are k: it wins a tie.
+    // The slices of a stack are perpendicular to k, which is preferred in a tie.
     int best = 2;
     for (const int a : {1, 0})
         if (votes[a] > votes[best]) best = a;
     frame_ = SliceFrame(geometry_, best);
 }
 
-/// Where a contour runs along a side of the image, in its last row of voxels, the image cuts the section: it goes on
-/// beyond.
+/// If a contour follows a side of the image, in its last row of voxels, the image cuts the section, which is continued
+/// beyond that side.
 std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const {
     for (int side = 0; side < 4; ++side) {
         const int a = side / 2, axis = a == 0 ? frame_.x_axis() : frame_.y_axis();
         const double spacing = geometry_.spacing[axis], out = side % 2 == 0 ? -1.0 : 1.0;
         const double face = (side % 2 == 0 ? -0.5 : geometry_.size[axis] - 0.5) * spacing;
         const auto at_side = [&](const Vec3& p) { return (face - p[a]) * out <= spacing; };
-        // Begin with a mark that does not lie there, so that no run is cut in two.
+        // Begin with a mark that does not lie there, so that no run is split.
         const auto first = std::find_if_not(curve.begin(), curve.end(), at_side);
         if (first == curve.end()) return curve;
         std::rotate(curve.begin(), first, curve.end());
@@ -259,7 +259,7 @@ std::vector<Vec3> Densifier::curve_through(const Line& line, const std::vector<V
                                                   : marks;
 }
 
-/// Planes of several directions: marks along all lines, and places whose side the sections tell.
+/// Planes of several directions: marks along all lines, and positions whose side follows from the sections.
 void Densifier::make_network() {
     std::vector<std::vector<Vec3>> open, closed;
     double length = 0;
@@ -304,7 +304,7 @@ void Densifier::join_lines() {
     }
 }
 
-/// The even-odd rule would take a contour that is there twice for none.
+/// By the even-odd rule two copies of a contour would cancel.
 void Densifier::drop_repeated_loops() {
     std::sort(loops_.begin(), loops_.end());
     const auto last = std::unique(loops_.begin(), loops_.end());
@@ -332,7 +332,7 @@ void Densifier::make_solid() {
         polygons.back().push_back(std::move(polygon));
     }
     fill_slices(*data, polygons);
-    // A slice whose contours enclose no node of the grid says nothing about the body.
+    // A slice whose contours enclose no node of the grid gives no information about the body.
     for (std::size_t n = data->slices.size(); n-- > 0;)
         if (data->slices[n].depth == 0) {
             data->slices.erase(data->slices.begin() + std::ptrdiff_t(n));
@@ -380,7 +380,7 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
     run_.check();
 }
 
-/// Sections that do not overlap: a single one is carried over, several end and begin anew.
+/// For sections that do not overlap: a single one is translated to the next, several end and begin anew.
 void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons) {
     std::vector<char> apart(data.slices.size(), 0);
     tbb::parallel_for(std::size_t(0), data.slices.size() - 1, [&](std::size_t n) {
@@ -428,7 +428,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         slices[end].cap =
             std::max(compute_cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
         if (!along_image_ || alone) return;
-        // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end
+        // On the image's last slice, or if the next slice to be marked would lie beyond it and the sections do not end
         // before.
         const double left =
             first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis()] - 0.5) * spacing - slices[end].w;

@@ -1,30 +1,31 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder: docs/heuristics.md shows the effect of halving and doubling each.
 #include "base/heuristic.h"
 
 namespace covol {
 
 /// Slices of contours: contours.cpp.
 struct ContoursHeuristics {
-    /// [voxels] Marks of one slice may differ by this.
+    /// [voxels] Maximum deviation of marks from their common slice.
     double same_slice = heuristic("contours.same_slice", 0.1);
     /// [of the line's extent] The same without an image.
     double same_slice_of_extent = heuristic("contours.same_slice_of_extent", 1e-4);
-    /// [cells] Around the contours within a slice.
+    /// [cells] Margin around the contours within a slice.
     double margin_cells = heuristic("contours.margin_cells", 2);
-    /// [cells] The same across the slices: the end of it lies where nothing is computed.
+    /// [cells] By which a section that a side of the image cuts is continued beyond it: its end lies where nothing is
+    /// computed.
     double side_cells = heuristic("contours.side_cells", 10);
-    /// [cells] That a body goes on beyond the image's end: more than a band's half width.
+    /// [cells] By which a body is continued beyond the image's end: more than a band's half width.
     double open_cells = heuristic("contours.open_cells", 6);
-    /// [cells] That its flat end lies beyond the image's: a band's half width more than the domain goes on.
+    /// [cells] Distance of its flat end from the image's end: a band's half width more than the domain extends.
     double end_cells = heuristic("contours.end_cells", 10);
-    /// [count] Marks along contours in planes of several directions.
+    /// [count] Approximate maximum of marks along contours in planes of several directions.
     double network_marks = heuristic("contours.network_marks", 1500);
-    /// [count] Places of each side that a plane of them tells, at most.
+    /// [count] Maximum number of positions on each side that are taken from one of these planes.
     double network_discs = heuristic("contours.network_discs", 64);
-    /// [of the section's extent] Around its contours, where its outside is told.
+    /// [of the section's extent] Margin around its contours, in which positions outside are taken.
     double network_around = heuristic("contours.network_around", 0.25);
-    /// [of a contour's step] Beside a contour, where its outside is looked for.
+    /// [of a contour's step] Distance from a contour at which its outside is determined.
     double network_beside = heuristic("contours.network_beside", 1e-3);
 };
 COVOL_HEURISTICS ContoursHeuristics kContours{};

@@ -16,27 +16,27 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kMaxFieldNodes = 6'000'000;
-constexpr std::size_t kMaxStops = 20'000'000;  // edges of the lattice that end on planes; 16 bytes each
+constexpr std::size_t kMaxStops = 20'000'000;  // crossings of the lattice's edges with planes; 16 bytes each
 constexpr int kCoarsest = 16;                  // nodes along the longest side
-constexpr float kSettled = 1e-4F;              // largest change of a value in a sweep
+constexpr float kSettled = 1e-4F;              // maximum change of a value in a sweep
 constexpr int kMaxSweeps = 400;
 constexpr std::size_t kFolds = 6;
-constexpr float kClosest = 1e-3F;  // cells from a plane; a node that is closer has the plane's value
+constexpr float kClosest = 1e-3F;  // cells from a plane; a closer node has the plane's value
 
 using Size = std::array<int, 3>;
 using Planes = std::vector<const SectionLevels*>;
 
-/// Where an edge of the lattice ends on a plane.
-struct Stop {
+/// The crossing of an edge of the lattice with a plane.
+struct PlaneCrossing {
     std::uint32_t node;
-    std::uint8_t direction;  // 2 axis, + 1 towards larger indices
+    std::uint8_t direction;  // 2 * axis, + 1 towards larger indices
     float distance, value;   // in cells; the plane's value
 };
 
-/// A node with a plane beside it: the value that its neighbours ask for.
-struct Beside {
+/// The equation of a node beside a plane.
+struct NodeEquation {
     std::array<float, 6> weight{};  // of neighbours, by direction
-    float known = 0;                // of planes
+    float known = 0;                // contribution of the planes
 };
 
 struct Lattice {
@@ -77,10 +77,10 @@ double trilinear(const std::vector<float>& values, const Lattice& lattice, const
     return sum;
 }
 
-/// All edges of the lattice that one of the planes crosses, at both their nodes.
-std::vector<Stop> stops_of(const Planes& planes, const Lattice& lattice, const RunContext& run) {
+/// All edges of the lattice that one of the planes crosses, listed at both their nodes.
+std::vector<PlaneCrossing> crossings_of(const Planes& planes, const Lattice& lattice, const RunContext& run) {
     const auto stride = lattice.strides();
-    std::vector<std::vector<Stop>> found(planes.size());
+    std::vector<std::vector<PlaneCrossing>> found(planes.size());
     tbb::parallel_for(std::size_t(0), planes.size(), [&](std::size_t n) {
         const SectionPlane& plane = planes[n]->plane;
         for (int a = 0; a < 3; ++a) {
@@ -106,9 +106,9 @@ std::vector<Stop> stops_of(const Planes& planes, const Lattice& lattice, const R
         }
     });
     run.check();
-    std::vector<Stop> stops;
-    for (const std::vector<Stop>& some : found) stops.insert(stops.end(), some.begin(), some.end());
-    tbb::parallel_sort(stops, [](const Stop& a, const Stop& b) {
+    std::vector<PlaneCrossing> stops;
+    for (const std::vector<PlaneCrossing>& some : found) stops.insert(stops.end(), some.begin(), some.end());
+    tbb::parallel_sort(stops, [](const PlaneCrossing& a, const PlaneCrossing& b) {
         return std::tie(a.node, a.direction, a.distance, a.value) < std::tie(b.node, b.direction, b.distance, b.value);
     });
     return stops;
@@ -119,11 +119,11 @@ class Solver {
 public:
     Solver(const Planes& planes, const Lattice& lattice, const RunContext& run)
         : lattice_(lattice), run_(run), entry_(lattice.count(), -1) {
-        make_entries(stops_of(planes, lattice, run));
+        make_entries(crossings_of(planes, lattice, run));
     }
 
     /// By successive over-relaxation.
-    /// @param across  cells between planes, which the best factor depends on
+    /// @param across  cells between planes, which determine the optimal factor
     void solve(std::vector<float>& values, double across) const {
         const auto factor = float(2 / (1 + std::sin(std::numbers::pi / std::max(across, 3.0))));
         for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
@@ -134,7 +134,7 @@ public:
     }
 
 private:
-    void make_entries(const std::vector<Stop>& stops) {
+    void make_entries(const std::vector<PlaneCrossing>& stops) {
         for (std::size_t n = 0; n < stops.size();) {
             const std::uint32_t node = stops[n].node;
             std::array<float, 6> distance, value{};
@@ -142,12 +142,12 @@ private:
             std::array<bool, 6> is_stopped{};
             for (; n < stops.size() && stops[n].node == node; ++n) {
                 const int d = stops[n].direction;
-                if (is_stopped[d]) continue;  // by a nearer plane
+                if (is_stopped[d]) continue;  // by a closer plane
                 is_stopped[d] = true;
                 distance[d] = stops[n].distance;
                 value[d] = stops[n].value;
             }
-            Beside beside;
+            NodeEquation beside;
             float sum = 0;
             for (int d = 0; d < 6; ++d) sum += beside.weight[d] = 2 / (distance[d] * (distance[d] + distance[d ^ 1]));
             for (int d = 0; d < 6; ++d) {
@@ -156,12 +156,12 @@ private:
                 beside.known += beside.weight[d] * value[d];
                 beside.weight[d] = 0;
             }
-            entry_[node] = std::int32_t(beside_.size());
-            beside_.push_back(beside);
+            entry_[node] = std::int32_t(equations_.size());
+            equations_.push_back(beside);
         }
     }
 
-    /// Nodes of one colour, which ask for those of the other alone. @return the largest change
+    /// Updates the nodes of one colour, which depend on those of the other alone. @return the maximum change
     double half_sweep(std::vector<float>& values, int colour, float factor) const {
         const auto [di, dj, dk] = lattice_.strides();
         return tbb::parallel_reduce(
@@ -176,7 +176,7 @@ private:
                             if (entry < 0) {
                                 wanted = (v[-di] + v[di] + v[-dj] + v[dj] + v[-dk] + v[dk]) / 6;
                             } else {
-                                const Beside& b = beside_[std::size_t(entry)];
+                                const NodeEquation& b = equations_[std::size_t(entry)];
                                 wanted = b.known + b.weight[0] * v[-di] + b.weight[1] * v[di] + b.weight[2] * v[-dj] +
                                          b.weight[3] * v[dj] + b.weight[4] * v[-dk] + b.weight[5] * v[dk];
                             }
@@ -192,7 +192,7 @@ private:
     const Lattice& lattice_;
     const RunContext& run_;
     std::vector<std::int32_t> entry_;  // of each node in beside_, or -1
-    std::vector<Beside> beside_;
+    std::vector<NodeEquation> equations_;
 };
 
 WorldBox box_of(const std::vector<Section>& sections) {
@@ -203,10 +203,10 @@ WorldBox box_of(const std::vector<Section>& sections) {
     return bounding_box(places);
 }
 
-/// Of the part of the plane that lies in the box, counted on a grid.
+/// Area of the part of the plane in the box, counted on a grid.
 double area_within(const SectionPlane& plane, const WorldBox& box) {
     constexpr int kAlong = 64;
-    // The projection along the axis that the normal is closest to.
+    // Project along the axis closest to the normal.
     int a = 0;
     for (int b = 1; b < 3; ++b)
         if (std::abs(plane.normal[b]) > std::abs(plane.normal[a])) a = b;
@@ -229,7 +229,7 @@ struct Field {
     std::vector<float> values;
 };
 
-/// From coarse lattices to one with this cell.
+/// Solves on successively finer lattices, down to this cell size.
 /// @param across  the planes' distance
 Field solve_between(const Planes& planes, const WorldBox& box, double finest, double across, const RunContext& run) {
     double cell = finest;
@@ -253,7 +253,7 @@ Field solve_between(const Planes& planes, const WorldBox& box, double finest, do
     return field;
 }
 
-/// The level that parts inside from outside best in planes that the field was not made from.
+/// The level that best separates inside from outside in held-out planes.
 float cross_validated_level(const Planes& planes, const WorldBox& box, double cell, double across,
                             const RunContext& run) {
     if (planes.size() < kFolds) return 0;
@@ -276,7 +276,7 @@ float cross_validated_level(const Planes& planes, const WorldBox& box, double ce
         }
     }
     std::sort(found.begin(), found.end());
-    // Those below the level that are outside, and those above it that are inside.
+    // Outside below the level, and inside above it.
     auto wrong = std::ptrdiff_t(std::count_if(found.begin(), found.end(), [](const auto& f) { return f.second; }));
     std::ptrdiff_t fewest = wrong;
     float best = 0;
@@ -298,7 +298,7 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     for (int a = 0; a < 3; ++a) volume *= box.max[a] - box.min[a];
     for (const Section& section : sections) area += area_within(section.plane, box);
     plane_distance_ = area > 0 ? volume / area : longest_side(box);
-    // The body ends half way to a further plane, as between slices.
+    // The body ends halfway to the next plane, as between slices.
     double nodes = 1;
     for (int a = 0; a < 3; ++a) {
         box.min[a] = origin[a] + h * std::floor((box.min[a] - plane_distance_ - origin[a]) / h);

@@ -7,27 +7,28 @@
 
 namespace covol::detail {
 
-/// What lies between sections in planes of any direction: -1 inside and 1 outside on each plane, by the even-odd rule,
-/// and harmonic between the planes. A place's value tells how often a random walk from there meets the outside before
-/// the inside (Grady, Random walks for image segmentation, IEEE PAMI 28(11), 2006, with planes for seeds). By the
-/// maximum principle each part of the body, and of its outside, reaches a section that says so.
+/// Interpolates between sections in planes of any direction: -1 inside and 1 outside on each plane, by the even-odd
+/// rule, and harmonic between the planes. The value at a position is the probability that a random walk from there
+/// reaches the outside before the inside, scaled to [-1, 1] (Grady, Random walks for image segmentation, IEEE PAMI
+/// 28(11), 2006, with planes as seeds). By the maximum principle each part of the body, and of its outside, is
+/// connected to a section with that label.
 ///
-/// The surface is the level that parts the sides best in planes that are left out in turn: at 0 thin parts vanish
-/// between their sections, where a walk is soon outside.
+/// The surface is the level that best separates the sides in cross-validation on the planes: at level 0 thin parts
+/// vanish between their sections, where a random walk soon reaches the outside.
 ///
 /// Second order: beside a plane the Laplacian's differences end on it (Shortley and Weller, J. Appl. Phys. 9, 1938).
 class SectionField {
 public:
     /// @param sections  at least one, each with a polygon
-    /// @param h         distance of the lattice's nodes, world units; a multiple of it where they would be too many
-    /// @param origin    a place on that lattice
+    /// @param h         distance of the lattice's nodes, world units; a multiple of it if there would be too many nodes
+    /// @param origin    a position on that lattice
     /// @throws Error Cancelled.
     SectionField(const std::vector<Section>& sections, double h, const Vec3& origin, const RunContext& run);
 
     /// Trilinear values, negative inside, at from + n * step, n < count.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
 
-    /// The box's volume over the area of the planes in it: of parallel planes their distance, world units.
+    /// The box's volume over the area of the planes in it, which for parallel planes is their distance, world units.
     [[nodiscard]] double plane_distance() const { return plane_distance_; }
 
 private:

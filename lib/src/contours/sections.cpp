@@ -12,9 +12,9 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMaxNodes = 1u << 20;  // of a plane's grid
+constexpr std::size_t kMaxSectionNodes = 1u << 20;  // of a plane's grid
 
-/// Greedily: the largest disc first, none whose centre lies in another.
+/// Greedy selection: the largest disc first, no centre within another disc.
 std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceGrid& grid, bool inside,
                                    double minimum) {
     std::vector<std::size_t> order;
@@ -61,7 +61,7 @@ SliceGrid grid_around(const std::vector<Polygon>& polygons, double cell) {
     const double margin = kContours.network_around * std::max(high[0] - low[0], high[1] - low[1]) + 2 * cell;
     const double width = high[0] - low[0] + 2 * margin, height = high[1] - low[1] + 2 * margin;
     SliceGrid grid;
-    grid.cell = std::max(cell, std::sqrt(width * height / double(kMaxNodes)));
+    grid.cell = std::max(cell, std::sqrt(width * height / double(kMaxSectionNodes)));
     grid.origin = {low[0] - margin, low[1] - margin};
     grid.nx = int(width / grid.cell) + 2;
     grid.ny = int(height / grid.cell) + 2;
@@ -110,7 +110,7 @@ double extent_of(const std::vector<Vec3>& points) {
 }
 
 std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance) {
-    // Long contours tell their plane best.
+    // The plane is estimated best from long contours.
     std::vector<std::size_t> order(contours.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(),
@@ -142,7 +142,7 @@ SectionMarks marks_along(const std::vector<Section>& sections, double step) {
                            after = section.plane.flat(places[(n + 1) % places.size()]);
                 Vec2 out{after[1] - before[1], before[0] - after[0]};
                 const double length = std::hypot(out[0], out[1]);
-                if (!(length > 0)) continue;  // of a contour of one or two places
+                if (!(length > 0)) continue;  // a contour of one or two positions
                 out = {out[0] / length, out[1] / length};
                 const double off = kContours.network_beside * step;
                 const Vec2 beside{at[0] + off * out[0], at[1] + off * out[1]};

@@ -6,7 +6,7 @@
 
 namespace covol::detail {
 
-/// A plane of any direction, with right-angled coordinates in it.
+/// A plane of any direction, with orthogonal coordinates in it.
 struct SectionPlane {
     Vec3 origin{0, 0, 0}, u{1, 0, 0}, v{0, 1, 0}, normal{0, 0, 1};  ///< unit, right-handed
 
@@ -15,10 +15,10 @@ struct SectionPlane {
     [[nodiscard]] Vec3 world(const Vec2& p) const;
 };
 
-/// The plane that the points lie closest to, by least squares. @pre three or more
+/// The plane of minimum squared distance to the points. @pre three or more
 [[nodiscard]] SectionPlane plane_through(const std::vector<Vec3>& points);
 
-/// How far along a direction the points reach.
+/// The extent of the points along a direction.
 [[nodiscard]] double thickness_along(const std::vector<Vec3>& points, const Vec3& direction);
 
 /// The longest side of their box.
@@ -37,25 +37,25 @@ struct SectionLevels {
     std::vector<float> level;
     [[nodiscard]] double at(const Vec2& p) const { return sample_slice(level, grid, place_in(grid, p[0], p[1])); }
 };
-/// @param cell  of the grid, which holds the polygons and something around them; larger where it would have too many
+/// @param cell  of the grid, which contains the polygons and a margin; larger if the grid would have too many nodes
 [[nodiscard]] SectionLevels levels_of(const Section& section, double cell);
 
-/// Contours by plane: those that lie within `tolerance` of one share it.
+/// Contours by plane: those within `tolerance` of a common plane form one section.
 [[nodiscard]] std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance);
 
-/// Places along contours, and the direction within its plane, of length 1, that points out of the section there.
+/// Positions along contours, and the unit direction within its plane that points out of the section there.
 struct SectionMarks {
     std::vector<Vec3> places, outward;
 };
 [[nodiscard]] SectionMarks marks_along(const std::vector<Section>& sections, double step);
 
-/// Places whose side the sections tell by the even-odd rule.
+/// Positions whose side follows from the sections by the even-odd rule.
 struct Sides {
     std::vector<Vec3> inside, outside;
 };
-/// The centres of discs in the planes that no contour meets, the largest first, none within another: they tell where a
-/// section's parts and holes lie with few places.
-/// @param cell  of the grid that they are looked for on, and the smallest disc's radius
+/// The centres of discs in the planes that intersect no contour, the largest first, none within another: few positions
+/// that represent the parts and holes of a section.
+/// @param cell  of the grid that is searched, and the minimum radius of a disc
 [[nodiscard]] Sides sides_of(const std::vector<Section>& sections, double cell);
 
 }  // namespace covol::detail

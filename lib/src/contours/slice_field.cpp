@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kSeedPiece = 8;  // cells; a long edge is walked in pieces, for the box around it would be large
+constexpr double kSeedPiece = 8;  // cells; a long edge is processed in pieces, because its box would be large
 
 struct Edge {
     float x, y, dx, dy, inverse;  // in cells; inverse of the squared length
@@ -78,7 +78,7 @@ private:
         }
     }
 
-    /// Takes from row j + before and along the row, both ways.
+    /// Propagates from row j + before, and along the row in both directions.
     void row(int j, int before) {
         const int other = j + before;
         const bool has_other = other >= 0 && other < grid_.ny;
@@ -97,7 +97,7 @@ private:
     std::vector<std::int32_t> edge_;
 };
 
-/// Where each row of nodes crosses the edges, sorted.
+/// The sorted crossings of each row of nodes with the edges.
 std::vector<std::vector<double>> crossings_by_row(const std::vector<Polygon>& polygons, const SliceGrid& grid) {
     std::vector<std::vector<double>> rows(static_cast<std::size_t>(grid.ny));
     for (const Polygon& polygon : polygons)
@@ -105,7 +105,7 @@ std::vector<std::vector<double>> crossings_by_row(const std::vector<Polygon>& po
             Vec2 a = polygon[n], b = polygon[(n + 1) % polygon.size()];
             if (a[1] > b[1]) std::swap(a, b);
             const auto row_of = [&](double y) { return (y - grid.origin[1]) / grid.cell; };
-            // A row at a vertex belongs to the edge that begins there: each vertex counts once or twice, as it should.
+            // A row at a vertex belongs to the edge that begins there, so that parity is correct at vertices.
             const int first = std::max(int(std::ceil(row_of(a[1]))), 0);
             for (int j = first; j < grid.ny && j < row_of(b[1]); ++j) {
                 const double t = (j - row_of(a[1])) / (row_of(b[1]) - row_of(a[1]));
@@ -148,7 +148,7 @@ PolygonMoments moments(const Polygon& polygon) {
     PolygonMoments m;
     Vec2 mean{0, 0};
     double twice = 0;
-    // About the first vertex: far from the origin the formula loses digits.
+    // Relative to the first vertex: far from the origin the formula loses precision.
     for (std::size_t n = 0; n < polygon.size(); ++n) {
         const Vec2 &o = polygon[0], &p = polygon[n], &q = polygon[(n + 1) % polygon.size()];
         const double ax = p[0] - o[0], ay = p[1] - o[1], bx = q[0] - o[0], by = q[1] - o[1];

@@ -16,16 +16,16 @@ struct SliceGrid {
     [[nodiscard]] std::size_t size() const { return std::size_t(nx) * std::size_t(ny); }
 };
 
-/// Signed distance to the polygons at the grid's nodes (i fastest), negative where the even-odd rule over all of them
-/// says inside. Exact beside the polygons; elsewhere the distance to the nearest edge that two sweeps over the grid
-/// found, which is the nearest one nearly everywhere.
+/// Signed distance to the polygons at the grid's nodes (i fastest), negative inside by the even-odd rule over all of
+/// them. Exact beside the polygons; elsewhere the distance to the nearest edge found by two sweeps over the grid, which
+/// is almost always the nearest one.
 [[nodiscard]] std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polygons,
                                                              const SliceGrid& grid);
 
-/// A position in a grid's plane, found once for all slices.
+/// A position in a grid's plane, computed once for all slices.
 struct SlicePlace {
-    std::size_t node = 0;  ///< of the cell's four the least
-    double s = 0, t = 0;   ///< in the cell
+    std::size_t node = 0;  ///< the one with the lowest indices of the cell's four
+    double s = 0, t = 0;   ///< within the cell
     double beyond = 0;     ///< distance from the grid, in its units
 };
 [[nodiscard]] SlicePlace place_in(const SliceGrid& grid, double x, double y);

@@ -14,19 +14,19 @@
 namespace covol::detail {
 namespace {
 
-// Measured: peak memory over voxels.
-constexpr double kTubeBytes = 12;      ///< for each voxel of a distance tube
-constexpr double kBandBytes = 200;     ///< for each active voxel of a band that is solved on
-constexpr double kCoarseVoxels = 1e6;  // on which volumes are measured
-constexpr double kBandVoxels = 10;     // a band that follows, with the leaves that it cuts, is this wide
-constexpr double kLeafVoxels = 4;      // a tube's leaves reach this far beyond it on the mean
-constexpr double kGrowth = 1.02;       // of the voxel size, while one is sought that fits
-constexpr double kBaseBytes = 8e7;     // of a program that has done nothing yet
-constexpr double kDoubt = 1.2;         // estimates were up to this much too high
-constexpr double kComfort = 0.8;       // share of the budget that the proposed one takes
+// Measured: peak memory divided by the number of voxels.
+constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
+constexpr double kBandBytes = 200;       ///< for each active voxel of a band on which a flow is solved
+constexpr double kCoarseVoxels = 1e6;    // of the grid on which volumes are measured
+constexpr double kBandVoxels = 10;       // width of a following band, including the leaves that it cuts
+constexpr double kLeafVoxels = 4;        // mean distance by which a tube's leaves extend beyond it
+constexpr double kGrowth = 1.02;         // of the voxel size, in the search for one that fits
+constexpr double kBaseBytes = 8e7;       // of a program before any computation
+constexpr double kOverestimate = 1.2;    // estimates were too high by up to this factor
+constexpr double kBudgetFraction = 0.8;  // fraction of the budget that the proposed voxel size takes
 constexpr int kMaxGrowths = 2000;
 
-/// Volume of {d <= r} by r, on a grid that is coarse enough for any domain.
+/// Volume of {d <= r} as a function of r, on a grid that is coarse enough for any domain.
 class CloudVolume {
 public:
     CloudVolume(const std::vector<Vec3>& points, const Domain& domain, const RunContext& run)
@@ -48,13 +48,13 @@ public:
     }
 
     double operator()(double r) const {
-        // Below the coarse voxels a tube is as wide as its radius says, as around a surface.
+        // Below the coarse voxel size, the volume is proportional to the radius, as around a surface.
         const double counted = std::max(r, coarse_);
         const auto inside = std::upper_bound(sorted_.begin(), sorted_.end(), float(counted)) - sorted_.begin();
         return std::min(double(inside) * std::pow(coarse_, 3) * (r / counted), points_ * 4.19 * r * r * r);
     }
 
-    /// Of the surface that the points mark, where a tube of radius r has no gaps.
+    /// Area of the surface that the points sample, if a tube of radius r has no gaps.
     [[nodiscard]] double area(double r) const {
         const double wide = std::max(r, coarse_);
         return (*this)(wide) / (2 * wide);
@@ -71,10 +71,10 @@ using BytesAt = std::function<double(double voxel_size)>;
 
 void require(const BytesAt& bytes_at, double voxel_size, const char* where, const RunContext& run) {
     const double budget = double(run.memory_budget), needed = bytes_at(voxel_size);
-    if (!(needed > kDoubt * budget) || kComfort * budget <= kBaseBytes)
-        return;  // a bound that no voxel size would keep
+    if (!(needed > kOverestimate * budget) || kBudgetFraction * budget <= kBaseBytes)
+        return;  // no voxel size would satisfy this limit
     double fits = voxel_size;
-    for (int n = 0; n < kMaxGrowths && bytes_at(fits) > kComfort * budget; ++n) fits *= kGrowth;
+    for (int n = 0; n < kMaxGrowths && bytes_at(fits) > kBudgetFraction * budget; ++n) fits *= kGrowth;
     std::ostringstream text;
     text.precision(2);
     text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "

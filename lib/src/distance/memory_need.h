@@ -7,16 +7,16 @@
 
 namespace covol::detail {
 
-/// A tube around the points, {d <= reach + voxels * h}, and how much is kept for its voxels.
+/// A tube around the points, {d <= reach + voxels * h}, and what is stored for its voxels.
 struct TubeNeed {
     double reach = 0, voxels = 0;
-    bool solved = false;  ///< a band within it is solved on
+    bool solved = false;  ///< a flow is solved on a band within it
 };
 
-/// Refuses a tube that does not fit into run.memory_budget, before memory is taken for it; free where all of the domain
-/// fits.
+/// Rejects a tube that does not fit into run.memory_budget before memory is allocated for it; costs nothing if the
+/// whole domain fits.
 /// @param where  the caller's name, for messages.
-/// @throws Error InvalidOptions that says about how much is needed, and with which voxel size it would fit.
+/// @throws Error InvalidOptions with the approximate memory needed and a voxel size that would fit.
 void require_tube_memory(const std::vector<Vec3>& points, const Domain& domain, const TubeNeed& need, const char* where,
                          const RunContext& run);
 

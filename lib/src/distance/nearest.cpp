@@ -73,12 +73,12 @@ private:
     const std::function<bool(const Coord&)>& enters_;
     std::unordered_map<Key, std::int32_t> lookup_;
     std::unordered_map<Key, Bin> bins_;
-    std::vector<std::array<std::int8_t, 3>> local_;  // of each point, its voxel in its leaf
+    std::vector<std::array<std::int8_t, 3>> local_;  // voxel of each point within its leaf
     std::vector<std::int32_t> colours_[8];
     const std::array<LeafMask, 27> borders_ = border_masks();
 };
 
-/// Keeps the points that can reach the box, sorted by leaf; widens the box so that it holds them all.
+/// Keeps the points that can reach the box, sorted by leaf; enlarges the box so that it contains all of them.
 void Sweeper::take(const std::vector<Vec3>& points, const char* where) {
     const auto reaches = [this](const Vec3& p) {
         double squared = 0;
@@ -247,7 +247,7 @@ void load_interior(const NearestField& field, const NearestLeaf& leaf, NearestBl
 void Sweeper::load(const NearestLeaf& leaf, NearestBlock& block) const {
     load_interior(field, leaf, block);
     PointReader reader(field, leaf.origin);
-    // First and last voxel, seen from this leaf, of what it reads from a neighbour at -1, 0, 1.
+    // First and last voxel, in indices of this leaf, that it reads from a neighbour at -1, 0, 1.
     constexpr int kFirst[3] = {-1, 0, 8}, kLast[3] = {-1, 7, 8};
     for (int slot = 0; slot < 27; ++slot) {
         if (slot == 13) continue;
@@ -267,19 +267,20 @@ void Sweeper::visit(NearestLeaf& leaf) {
     sweep_nearest(block);
     const float reach = float(radius_ * radius_);
     LeafMask changed;
-    take_points(block, reach, !leaf.visited, leaf.nearest.data(), changed.data());
+    store_points(block, reach, !leaf.visited, leaf.nearest.data(), changed.data());
     leaf.visited = true;
-    leaf.wanted = 0;
-    // Neighbours may round a tie differently: only a leaf that has changed speaks up, so that this ends.
+    leaf.affected = 0;
+    // Neighbours may round a tie differently: only a leaf that has changed notifies its neighbours, so that this ends.
     if (!any_on(changed)) return;
-    const unsigned faces = faces_with_news(block, reach);
-    for (int face = 0; face < 6; ++face) leaf.wanted |= (faces >> face & 1) << kFaceSlots[face];
-    // Neighbours that exist hear of a change through the faces; only the ones to be made need the edges and corners.
+    const unsigned faces = improved_faces(block, reach);
+    for (int face = 0; face < 6; ++face) leaf.affected |= (faces >> face & 1) << kFaceSlots[face];
+    // Existing neighbours are notified of a change through the faces; edges and corners matter only for those to be
+    // created.
     for (int slot = 0; slot < 27; ++slot) {
         std::uint64_t any = 0;
         if (leaf.neighbours[slot] < 0)
             for (int word = 0; word < 8; ++word) any |= changed[word] & borders_[slot][word];
-        leaf.wanted |= std::uint32_t(any != 0) << slot;
+        leaf.affected |= std::uint32_t(any != 0) << slot;
     }
 }
 
@@ -297,7 +298,7 @@ void Sweeper::sweep(const RunContext& run) {
             for (const std::int32_t id : list) {
                 const NearestLeaf& leaf = field.leaves[id];
                 for (int slot = 0; slot < 27; ++slot) {
-                    if (!(leaf.wanted >> slot & 1)) continue;
+                    if (!(leaf.affected >> slot & 1)) continue;
                     if (leaf.neighbours[slot] >= 0) {
                         field.leaves[leaf.neighbours[slot]].queued = true;
                     } else {

@@ -13,7 +13,7 @@ struct NearestLeaf {
     Coord origin;
     std::array<std::int32_t, 27> neighbours;  // -1: no such leaf
     std::array<std::int32_t, kLeafSize> nearest;
-    std::uint32_t wanted = 0;  // neighbours that this leaf's last change concerns, by neighbour_slot
+    std::uint32_t affected = 0;  // neighbours that this leaf's last change affects, by neighbour_slot
     bool queued = false;
     bool visited = false;
 };
@@ -21,26 +21,25 @@ struct NearestLeaf {
 /// The voxels around a set of points, each with the index of its nearest point.
 struct NearestField {
     std::vector<Vec3> points;          ///< index space, sorted by leaf
-    std::vector<std::int32_t> source;  ///< where points[n] stood in the input
+    std::vector<std::int32_t> source;  ///< index of points[n] in the input
     std::deque<NearestLeaf> leaves;
     int rounds = 0;
 };
 
 /// Sweeps point indices through the tube of `radius` voxels around the points, within `box`.
 ///
-/// Every leaf that the tube meets is there; voxels further away than `radius` may hold a point that is not the nearest.
-/// Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is visited
-/// again when a neighbour has changed the voxels next to it.
-/// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it where they need
-/// it.
+/// Every leaf that the tube meets is included; voxels farther away than `radius` may have a point that is not the
+/// nearest. Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is
+/// visited again if a neighbour has changed the voxels next to it.
+/// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it if necessary.
 /// @param where   the caller's name, for messages.
-/// @param enters  which leaves, by their origins, are in it; null: all
-/// @throws Error InvalidInput when the box is longer than 2^24 voxels; Cancelled.
+/// @param enters  whether a leaf, given by its origin, is included; null: all are
+/// @throws Error InvalidInput if the box is longer than 2^24 voxels; Cancelled.
 [[nodiscard]] NearestField nearest_points(const std::vector<Vec3>& points, const CoordBBox& box, double radius,
                                           const char* where, const RunContext& run,
                                           const std::function<bool(const Coord&)>& enters = nullptr);
 
-/// Squared distances, in voxels, of a leaf's voxels to the points they hold; huge where there is none.
+/// Squared distances, in voxels, of a leaf's voxels from their points; very large if a voxel has none.
 void squared_distances(const NearestField& field, const NearestLeaf& leaf, float* squared);
 
 }  // namespace covol::detail

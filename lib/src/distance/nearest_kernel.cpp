@@ -22,7 +22,7 @@ COVOL_INLINE Points8 broadcast(const NearestBlock& b, int at) {
     return {zero + b.x[at], zero + b.y[at], zero + b.z[at], Int8{} + b.index[at]};
 }
 
-/// A row of voxels with the points they hold and their squared distances.
+/// A row of voxels with their points and squared distances.
 struct Row {
     Float8 i, j, k;
     Points8 p;
@@ -55,7 +55,8 @@ struct Row {
     }
 };
 
-// Lanes moved up or down by n; the lanes that become free take the halo's point. Any point may be offered to any voxel.
+// Lanes shifted up or down by N; the lanes that become free take the halo's point. Any point may be offered to any
+// voxel.
 template <int N>
 COVOL_INLINE Points8 moved_up(const Points8& p, const Points8& halo) {
     const auto shift = [](const auto& v, const auto& h) __attribute__((always_inline)) {
@@ -129,15 +130,15 @@ COVOL_INLINE Points8 load_points(const NearestBlock& b, int at, int stride) {
     return p;
 }
 
-/// True where a voxel of the halo layer beyond a face would take a point, within reach, from the face's voxels.
-/// `normal` leads from the face to the halo, `row` along the eight rows, `along` along the eight voxels of a row.
-COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&normal)[3], const int (&row)[3],
+/// Whether a voxel of the halo layer beyond a face would take a point, within reach, from the face's voxels. `normal`
+/// points from the face to the halo, `row` along the eight rows, `along` along the eight voxels of a row.
+COVOL_INLINE bool face_improves(const NearestBlock& b, float reach, const int (&normal)[3], const int (&row)[3],
                                 const int (&along)[3]) {
     constexpr int kStride[3] = {NearestBlock::kSlice, NearestBlock::kRow, 1};
     const auto stride = [&](const int(&v)[3]) { return v[0] * kStride[0] + v[1] * kStride[1] + v[2] * kStride[2]; };
     const int outward = stride(normal), next_row = stride(row), next = stride(along);
     const Float8 lanes{0, 1, 2, 3, 4, 5, 6, 7};
-    Int8 news{};
+    Int8 improved{};
     for (int r = 0; r < 8; ++r) {
         int at[3];  // the first voxel of the row, in the halo
         for (int a = 0; a < 3; ++a) at[a] = (normal[a] > 0 ? 8 : normal[a] < 0 ? -1 : 0) + r * row[a];
@@ -149,22 +150,22 @@ COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&
         const Float8 known = halo.distance_to(load_points(b, offset, next));
         for (int n = -1; n <= 1; ++n) {
             const Float8 s = halo.distance_to(load_points(b, offset - outward + n * next_row, next));
-            news |= (s < known) & (s <= reach);
+            improved |= (s < known) & (s <= reach);
         }
     }
-    return any(news);
+    return any(improved);
 }
 
 }  // namespace
 
-COVOL_CLONES unsigned faces_with_news(const NearestBlock& b, float reach) {
+COVOL_CLONES unsigned improved_faces(const NearestBlock& b, float reach) {
     constexpr int kI[3] = {1, 0, 0}, kJ[3] = {0, 1, 0}, kK[3] = {0, 0, 1};
     constexpr int kDown[3][3] = {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
-    return unsigned(face_has_news(b, reach, kDown[0], kJ, kK)) | unsigned(face_has_news(b, reach, kI, kJ, kK)) << 1 |
-           unsigned(face_has_news(b, reach, kDown[1], kI, kK)) << 2 |
-           unsigned(face_has_news(b, reach, kJ, kI, kK)) << 3 |
-           unsigned(face_has_news(b, reach, kDown[2], kI, kJ)) << 4 |
-           unsigned(face_has_news(b, reach, kK, kI, kJ)) << 5;
+    return unsigned(face_improves(b, reach, kDown[0], kJ, kK)) | unsigned(face_improves(b, reach, kI, kJ, kK)) << 1 |
+           unsigned(face_improves(b, reach, kDown[1], kI, kK)) << 2 |
+           unsigned(face_improves(b, reach, kJ, kI, kK)) << 3 |
+           unsigned(face_improves(b, reach, kDown[2], kI, kJ)) << 4 |
+           unsigned(face_improves(b, reach, kK, kI, kJ)) << 5;
 }
 
 COVOL_CLONES void sweep_nearest(NearestBlock& block) {
@@ -172,17 +173,17 @@ COVOL_CLONES void sweep_nearest(NearestBlock& block) {
     for (int i = 7; i >= 0; --i) sweep_slice(block, i, i + 1);
 }
 
-COVOL_CLONES void take_points(const NearestBlock& block, float reach, bool all, std::int32_t* nearest,
-                              std::uint64_t* changed) {
-    const Int8 bit = {1, 2, 4, 8, 16, 32, 64, 128}, any_news = Int8{} - int(all);
+COVOL_CLONES void store_points(const NearestBlock& block, float reach, bool all, std::int32_t* nearest,
+                               std::uint64_t* changed) {
+    const Int8 bit = {1, 2, 4, 8, 16, 32, 64, 128}, report_all = Int8{} - int(all);
     for (int i = 0; i < 8; ++i) {
         changed[i] = 0;
         for (int j = 0; j < 8; ++j) {
             const Row row(block, i, j);
             std::int32_t* to = nearest + (i * 8 + j) * 8;
-            const Int8 news = (row.squared <= reach) & (any_news | (row.p.index != load<Int8>(to))) & bit;
+            const Int8 improved = (row.squared <= reach) & (report_all | (row.p.index != load<Int8>(to))) & bit;
             std::uint64_t bits = 0;
-            for (int k = 0; k < 8; ++k) bits |= std::uint64_t(news[k]);
+            for (int k = 0; k < 8; ++k) bits |= std::uint64_t(improved[k]);
             changed[i] |= bits << (8 * j);
             std::memcpy(to, &row.p.index, sizeof row.p.index);
         }

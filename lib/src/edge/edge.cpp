@@ -1,4 +1,4 @@
-// The edge detector g(s) = 1/(1 + K s²), Eq. (2), where the band needs it: s = |∇G_σ * I|, or the brightness of lines.
+// The edge detector g(s) = 1/(1 + K s²), Eq. (2), near the band: s = |∇G_σ * I|, or the brightness of lines.
 #include "covol/edge.h"
 
 #include <openvdb/openvdb.h>
@@ -30,14 +30,14 @@ using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kHeatTolerance = 1e-4;  // of the brightness range
 
-// The band's leaves and enough around them, with the normalised image.
+// The band's leaves with a sufficient margin, and the normalised image on them.
 struct Window {
     LeafBand band;
-    HaloField image;  // missing neighbours are filled per load: homogeneous Neumann
+    HaloField image;  // missing neighbours are filled in when loaded: homogeneous Neumann
 };
 
-// Which of a leaf's neighbours are missing, as bounds for mirror_outside. A neighbour that exists on a diagonal but
-// not on a face is ignored with it, far from where the result is used.
+// Which of a leaf's neighbours are missing, as bounds for mirror_outside. A neighbour that exists on a diagonal but not
+// on the face is ignored as well; this is far from where the result is used.
 LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t leaf) {
     LeafBounds bounds(domain, band.origin(leaf));
     const auto& n = band.neighbours(leaf);
@@ -53,7 +53,8 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     return bounds;
 }
 
-// Between these a mapped image gives its pages back. Each of a leaf's 64 rows may lie in a page of its own: 0.5 GB.
+// Number of leaves after which a mapped image's pages are released. Each of a leaf's 64 rows may be on a separate page:
+// 0.5 GB.
 constexpr std::size_t kLeavesAtOnce = 1 << 11;
 
 Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
@@ -84,8 +85,8 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     return window;
 }
 
-// The brightness that becomes 0 and 1. Percentiles of what the window holds: those of the whole image would need all of
-// it, and a part of an image would have others than the whole.
+// The brightness values that become 0 and 1. These are percentiles within the window: those of the whole image would
+// require reading all of it, and would differ between a part of an image and the whole.
 std::array<double, 2> brightness_range(const Window& window) {
     constexpr std::size_t kSamples = 4'000'000;
     const std::size_t all = window.band.size() * kLeafSize, step = all / kSamples + 1;
@@ -124,8 +125,8 @@ void for_each_padded(const Window& window, const Domain& domain, Work work) {
     });
 }
 
-/// A leaf and what lies across its faces, where the domain or the window ends in it or next to it: the nearest layer
-/// within again, so that nothing flows.
+/// A leaf and the values across its faces. If the domain or the window ends in the leaf or next to it, the nearest
+/// layer within is repeated, so that the flux is zero.
 class ClosedStar {
 public:
     ClosedStar(const detail::LeafStar& star, const LeafBounds& bounds) : star_(star) {
@@ -156,11 +157,12 @@ private:
 
     detail::LeafStar star_;
     alignas(64) float inner_[kLeafSize];
-    alignas(64) float layers_[6][kLeafSize];  // only the one that touches the leaf has values
+    alignas(64) float layers_[6][kLeafSize];  // only the layer that touches the leaf is set
 };
 
-// `steps` implicit steps of t h² divide a wave by (1 + 6t (1 - m))^steps, where m in [-1,1] is what the mean of the six
-// neighbours makes of it: a series in Chebyshev's polynomials of that mean, cut where the rest is below the tolerance.
+// `steps` implicit steps of t h² divide a wave by (1 + 6t (1 - m))^steps, where m in [-1,1] is the factor by which the
+// mean of the six neighbours scales it: a Chebyshev series in that mean, truncated when the remainder is below the
+// tolerance.
 std::vector<double> heat_series(double t, int steps) {
     const int nodes = 64 + 16 * int(std::ceil(std::sqrt(6 * t * steps)));
     std::vector<double> values(nodes);
@@ -178,7 +180,8 @@ std::vector<double> heat_series(double t, int steps) {
     return series;
 }
 
-// I_t = ΔI over time σ²/2 by implicit steps; all of them at once (C. W. Clenshaw, Math. Comp. 9, 1955).
+// I_t = ΔI over time σ²/2 by implicit steps, all at once by Clenshaw's recurrence (C. W. Clenshaw, Math. Comp. 9,
+// 1955).
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
     const int steps = int(std::ceil(time / kEdge.largest_heat_step - 1e-9));
@@ -186,7 +189,7 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
     const std::vector<double> series = heat_series(time / steps, steps);
     const LeafBand& band = window.band;
     const detail::LeafArray<float> image = window.image.values;
-    detail::LeafArray<float>& newest = window.image.values;  // of which the mean is taken
+    detail::LeafArray<float>& newest = window.image.values;  // whose mean is taken
     detail::LeafArray<float> other(band.size(), 0.0F, 1);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         for (int n = 0; n < kLeafSize; ++n) newest.leaf(leaf)[n] = float(series.back()) * image.leaf(leaf)[n];
@@ -216,7 +219,7 @@ std::vector<LeafNode*> leaves_of(FloatGrid& grid) {
     return leaves;
 }
 
-// K = 1/s² at the percentile of s over the topology's active voxels.
+// The value of s at the percentile over the topology's active voxels; K = 1/s².
 double contrast_of(FloatGrid& slopes, double percentile) {
     const std::vector<LeafNode*> leaves = leaves_of(slopes);
     std::vector<std::size_t> first{0};
@@ -228,7 +231,7 @@ double contrast_of(FloatGrid& slopes, double percentile) {
     });
     const float at = detail::nth_value(values, std::size_t(percentile * double(values.size() - 1)));
     if (at > 0.0F) return at;
-    // Edges rarer than the percentile: half of the steepest one.
+    // If edges are rarer than the percentile: half of the steepest slope.
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 

@@ -11,10 +11,10 @@ namespace covol::detail {
 namespace {
 
 constexpr int kBits = 12;
-constexpr std::size_t kBlock = 1 << 16;  // values
+constexpr std::size_t kBlock = 1 << 16;  // number of values
 using Histogram = std::array<std::uint32_t, std::size_t(1) << kBits>;
 
-/// The upper bits of a number that is ordered as the values are.
+/// The upper bits of an integer that has the same order as the values.
 std::uint32_t bin_of(float value) {
     std::uint32_t bits;
     std::memcpy(&bits, &value, sizeof bits);
@@ -32,7 +32,7 @@ float nth_value(const std::vector<float>& values, std::size_t n) {
     });
     std::uint32_t bin = 0;
     std::size_t before = 0;
-    std::vector<std::size_t> first(blocks + 1);  // of the bin's values, those of each block
+    std::vector<std::size_t> first(blocks + 1);  // index of each block's first value in the bin
     for (;; ++bin) {
         for (std::size_t block = 0; block < blocks; ++block) first[block + 1] = first[block] + counts[block][bin];
         if (n < before + first.back()) break;

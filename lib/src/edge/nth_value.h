@@ -4,8 +4,8 @@
 
 namespace covol::detail {
 
-/// What std::nth_element() would put at place n, on all threads; `values` stay as they are.
-/// @param values  none that is not a number
+/// The value that std::nth_element() would put at position n, in parallel; `values` are not changed.
+/// @param values  without NaN
 /// @param n       below their count
 [[nodiscard]] float nth_value(const std::vector<float>& values, std::size_t n);
 

@@ -27,7 +27,7 @@ constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// 1 up to r/2, falling to 0 at r, and its integral from 0: the points pull along -taper(d) ∇d = -∇potential(d).
+// 1 up to r/2, decreasing to 0 at r, and its integral from 0: the points attract by -taper(d) ∇d = -∇potential(d).
 struct Taper {
     double range;  // world units; 0: no limit
     [[nodiscard]] double ramp(double d) const { return std::clamp(2.0 * d / range - 1.0, 0.0, 1.0); }
@@ -43,7 +43,7 @@ struct Taper {
     }
 };
 
-// Values of active voxels through `convert`, kUnknown elsewhere; a field is asked for only on the faces.
+// Values of active voxels through `convert`, kUnknown elsewhere; of the halo only the faces are needed.
 template <typename Convert>
 HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert convert) {
     return gather(band, grid, false, [&](const LeafNode* leaf, float, float* block) {
@@ -53,8 +53,8 @@ HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert conv
     });
 }
 
-// The points' potential in voxels, weakened where no trusted mark is near. It is the potential that takes the weight,
-// not its slope: beside the points, where d is small, the two are alike.
+// The points' potential in voxels, reduced where no trusted mark is near. The weight applies to the potential, not to
+// its slope: near the points, where d is small, both are equivalent.
 HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight,
                            double h) {
     const FloatGrid* trusted = guess_weight < 1.0 ? fields.trusted : nullptr;
@@ -184,7 +184,7 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
     const double yields = options_.image_yields.value_or(0);
     if (options_.rho > 0 && yields > 0 && trusted != nullptr)
         image_weight_ = gather(band_, *trusted, false, [&](const LeafNode* leaf, float, float* block) {
-            for (int n = 0; n < kLeafSize; ++n)  // far from every mark where the distance is not known
+            for (int n = 0; n < kLeafSize; ++n)  // if the distance is unknown, every mark is far away
                 block[n] = leaf != nullptr && leaf->isValueOn(n)
                                ? static_cast<float>(1.0 - yields * taper(leaf->getValue(n)))
                                : 1.0F;
@@ -197,8 +197,9 @@ Motion BandSolver::step(double tau, Counts& counts) {
     const Rows rows = assemble(constants);
     counts.seconds_assembly += seconds_since(start);
     const auto solve_start = Clock::now();
-    // The largest row belongs to some voxel on the edge of the plateau, where W is of order 1/ε; relaxing for it
-    // costs every other voxel sweeps. Measured for delta of 0.5 to 5 voxels, this serves best.
+    // The largest row belongs to some voxel at the edge of the plateau, where W is of order 1/ε; optimising the
+    // relaxation for it costs sweeps for all other voxels. In measurements with delta of 0.5 to 5 voxels, this row was
+    // best.
     const double regular_row = 8.0 * constants.curvature + tau * (options_.theta + options_.rho);
     const double row = std::min(rows.largest, regular_row);
     const double jacobi = row / (1.0 + row);
@@ -230,7 +231,7 @@ void BandSolver::solve(double omega, double first, Counts& counts) {
     bool visit_all = true;
     for (int visit = 0; visit * kSolver.inner_sweeps < options_.max_sweeps; ++visit) {
         const double residual = sweep(static_cast<float>(omega), visit_all ? 0.0 : goal, counts);
-        if (visit == 0) start = std::max(first, residual);  // a guess that is worse than u^{n-1} is no divergence
+        if (visit == 0) start = std::max(first, residual);  // an initial value worse than u^{n-1} is not divergence
         visit_all = omega > 1.0 && !(residual <= kSolver.diverged * start);
         if (visit_all) {
             // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
@@ -253,7 +254,7 @@ void BandSolver::update_active_leaves(const std::vector<float>& motion, double t
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         unsigned char is_active = moved[leaf];
         for (const std::int32_t next : band_.neighbours(leaf)) is_active |= moved[next];
-        // The values of inactive leaves are those of the step before, too.
+        // Inactive leaves have the same values in the step before, too.
         if (!is_active) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         leaf_active_[leaf] = is_active && active_counts_[leaf] > 0;
     });
@@ -282,7 +283,7 @@ void BandSolver::redistance(double clamp) {
     hold_to_bounds();
 }
 
-// Steps resemble each other: the solve begins where the last one would lead to.
+// Consecutive steps are similar: the initial value of the solve extrapolates the last step.
 BandSolver::Rows BandSolver::assemble(const SchemeConstants& constants) {
     const SchemeKernels& kernel = kernels();
     std::vector<float> largest(band_.size(), 0.0F);
@@ -323,7 +324,7 @@ double BandSolver::root_mean_square() const {
     return std::sqrt(sum / static_cast<double>(active_count_));
 }
 
-// Its own residual or one across a face is above the goal; goal = 0: all leaves are visited.
+// Whether the residual of the leaf, or of one across a face, is above the goal; goal = 0: all leaves are visited.
 bool BandSolver::is_unconverged(std::size_t leaf, double goal) const {
     if (goal == 0.0) return true;
     const double per_voxel = kSolver.local_goal * goal * kSolver.local_goal * goal;

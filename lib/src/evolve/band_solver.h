@@ -13,20 +13,20 @@
 
 namespace covol::detail {
 
-/// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <=
-/// 0, Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
-/// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not
-/// world units.
+/// The linear system of one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq
+/// <= 0, Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
+/// starting from 2 u^{n-1} - u^{n-2}, until the residual is `solver_tolerance` times that of u^{n-1}. Values are in
+/// voxels, not world units.
 ///
 /// Work is done on active leaves only: a leaf becomes inactive once neither it nor any of the 26 around it has moved by
-/// more than a threshold, and active again once one of those has. Within a solve, a leaf that has converged, with
-/// neighbours across its faces that have, is not visited again.
+/// more than a threshold, and active again once one of those has. Within a solve, a leaf is not visited again if it and
+/// its neighbours across the faces have converged.
 class BandSolver {
 public:
     struct Counts {
         std::int64_t passes = 0;        ///< over the leaves
         std::int64_t visits = 0;        ///< of leaves
-        std::int64_t visits_saved = 0;  ///< that passes over all leaves would have had
+        std::int64_t visits_saved = 0;  ///< skipped, compared with passes over all leaves
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 
@@ -34,36 +34,37 @@ public:
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
-    /// Which leaves are active, and what the next step has to know of the steps before.
+    /// The active leaves, and what the next step needs from the steps before.
     struct LeafStates {
         LeafBand band;
         std::vector<unsigned char> active;
-        std::vector<float> pending_motion;  ///< not yet enough to make the leaves around active, voxels
+        std::vector<float> pending_motion;  ///< not yet enough to activate the leaves around, voxels
         std::vector<LeafMotion> motions;
     };
-    /// The solver is of no use afterwards.
+    /// The solver cannot be used afterwards.
     [[nodiscard]] LeafStates take_leaf_states();
-    /// Leaves that were inactive in the band before stay so.
-    /// @param changed  sorted origins of leaves with other values than there
+    /// Leaves that were inactive in the previous band stay inactive.
+    /// @param changed  sorted origins of leaves whose values differ from those
     void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
-    /// All that steps have changed, of the same band.
+    /// Everything that steps have changed, for the same band.
     void exchange(StateFile& file);
 
     /// One time step of length τ = tau * h on the active leaves.
     Motion step(double tau, Counts& counts);
-    /// Decides which leaves are active from here on: those that have moved, and the 26 around each.
-    /// @param motion     of each leaf since the last call, voxels; it adds up over calls until it counts
-    /// @param threshold  voxels, from which it counts
+    /// Decides which leaves are active from now on: those that have moved, and the 26 around each.
+    /// @param motion     of each leaf since the last call, voxels; accumulates over calls until it reaches the
+    ///     threshold
+    /// @param threshold  voxels
     void update_active_leaves(const std::vector<float>& motion, double threshold);
     /// max |u^n - u^{n-1}| of each leaf in the last step, voxels
     [[nodiscard]] std::vector<float> largest_changes() const;
     [[nodiscard]] bool is_leaf_active(std::size_t leaf) const { return leaf_active_[leaf] != 0; }
-    /// Makes u on the active leaves a distance again, clamped to `clamp` voxels; see LocalDistance.
+    /// Redistances u on the active leaves, clamped to `clamp` voxels; see LocalDistance.
     void redistance(double clamp);
-    /// Takes the last step back.
+    /// Undoes the last step.
     void restore_previous();
-    /// Active voxels into the grid that u came from; inactive ones keep their bits.
+    /// Writes active voxels to the grid that u came from; inactive ones keep their bits.
     void store(FloatGrid& u) const;
 
     [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
@@ -98,7 +99,7 @@ private:
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_, obstacle_, floor_;
     LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
-    bool has_previous_ = false;  // it is from the step before
+    bool has_previous_ = false;  // previous_ is from the step before
     static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Fraction);
     std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
     // One for each leaf:
@@ -106,7 +107,7 @@ private:
     std::vector<unsigned char> leaf_active_;
     std::vector<float> pending_motion_;
     std::vector<LeafMotion> motions_;
-    std::vector<double> residuals_;  // squared, as seen by the last visit
+    std::vector<double> residuals_;  // squared, as of the last visit
 };
 
 }  // namespace covol::detail

@@ -12,7 +12,7 @@ constexpr int kLanes = 8, kValues = 512;  // of a leaf
 
 COVOL_INLINE Float8 size_of(const Float8& x) { return x < 0.0F ? -x : x; }
 
-/// False also for what is not a number.
+/// False for NaN, too.
 COVOL_INLINE Int8 is_finite(const Float8& x) { return size_of(x) <= std::numeric_limits<float>::max(); }
 
 }  // namespace

@@ -2,14 +2,14 @@
 
 namespace covol::detail {
 
-/// Of the 512 values of a leaf after a step and before it.
+/// The change of the 512 values of a leaf by a step.
 struct Change {
-    float largest;  ///< max |now - before|; of what is not a number, unsaid
-    bool finite;    ///< all values now
+    float largest;  ///< max |now - before|; unspecified for NaN
+    bool finite;    ///< whether all values of `now` are
 };
 [[nodiscard]] Change change_of(const float* now, const float* before);
 
-/// Of the 512 values of a leaf.
+/// Whether the 512 values of a leaf are finite.
 [[nodiscard]] bool all_finite(const float* values);
 
 }  // namespace covol::detail

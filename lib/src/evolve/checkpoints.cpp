@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kJobFile = "job.txt";
 constexpr std::string_view kFlow = "flow-";
 
-/// Whether file() gives such a name: other files of a folder are not ours.
+/// Whether it is a name made by file(): other files in the folder are not ours.
 bool is_of_flow(const std::string& name) {
     const std::size_t digits = name.find_first_not_of("0123456789", std::min(kFlow.size(), name.size()));
     if (!name.starts_with(kFlow) || digits == std::string::npos || digits < kFlow.size() + 2) return false;
@@ -36,7 +36,7 @@ void remove_flows(const std::string& folder) noexcept {
     }
 }
 
-/// Whether the file holds that text, and nothing else is at the path; nothing of a stranger's file is believed.
+/// Whether a regular file at the path contains exactly that text; files of other origin are not trusted.
 bool holds(const fs::path& path, const std::string& text) {
     std::error_code status;
     if (!fs::is_regular_file(path, status) || fs::file_size(path, status) != text.size()) return false;
@@ -67,7 +67,7 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     const fs::path job_file = fs::path(folder) / kJobFile;
     state_->had_states = fs::exists(job_file, status);
     if (!state_->had_states) {
-        remove_flows(folder);  // of a run that was killed while it removed them
+        remove_flows(folder);  // of a run that was killed while removing them
         detail::write_atomically(job_file.string(), [&](const std::string& temporary) {
             std::ofstream file(temporary, std::ios::binary);
             file << job;
@@ -94,9 +94,9 @@ bool Checkpoints::had_states() const noexcept { return state_->had_states; }
 
 void Checkpoints::remove() noexcept {
     std::error_code status;
-    fs::remove(fs::path(state_->folder) / kJobFile, status);  // first: without it the others are nothing
+    fs::remove(fs::path(state_->folder) / kJobFile, status);  // first: without it the others are ignored
     remove_flows(state_->folder);
-    fs::remove(state_->folder, status);  // not where something else is in it
+    fs::remove(state_->folder, status);  // fails if something else is in it
 }
 
 int Checkpoints::begin_flow() {

@@ -1,7 +1,7 @@
 // The semi-implicit co-volume scheme of Kósa, Mikula et al., "3D image segmentation supported by a point cloud",
 // Eqs. (14)-(22), on the active voxels of a narrow band:
 //   u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1},   a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0.
-// Here is the loop over time; a step is in band_solver.cpp, the arithmetic on a leaf in scheme/scheme_kernels.cpp.
+// This is the loop over time; a step is in band_solver.cpp, the arithmetic on a leaf in scheme/scheme_kernels.cpp.
 #include "covol/evolve.h"
 
 #include <openvdb/openvdb.h>
@@ -38,8 +38,8 @@ bool has_active(const FloatGrid& u) {
     return false;
 }
 
-// A row's shares are right to half of 1/65535: a step so small moves at most 1.5 % too far or too little; after one so
-// large the share that holds a voxel, 1/(1 + 6 * step), is still above the smallest.
+// A row's fractions are accurate to half of 1/65535: the smallest step moves at most 1.5 % too far or too little; after
+// the largest one the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction.
 constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
 
 class Evolver {
@@ -53,7 +53,7 @@ public:
         if (fields.floor != nullptr) check_transform(*fields.floor, "floor");
         check_step();
         if (options.follow) {
-            // Before u changes. A fixed band is checked where it is read.
+            // Before u changes. A fixed band is checked when it is read.
             detail::expect_finite(u, "u");
             if (!has_active(u)) throw Error(Errc::InvalidInput, "evolve: expected active voxels in u, got none");
             for (const auto& [field, name] : {std::pair(fields.distance, "distance"), std::pair(fields.edge, "edge"),
@@ -62,7 +62,7 @@ public:
                 if (field != nullptr) detail::expect_finite(*field, name);
         }
         if (states_.any()) {
-            go_on();
+            resume();
             return;
         }
         if (options.follow && is_held())
@@ -76,7 +76,7 @@ public:
         if (is_finished_) return report_;
         report_.stop_reason = StopReason::MaxSteps;
         while (report_.steps < options_.max_steps) {
-            if (states_.is_due() || (states_.are_kept() && run_.cancelled())) keep_state();
+            if (states_.is_due() || (states_.are_enabled() && run_.cancelled())) save_state();
             if (run_.cancelled()) {
                 report_.stop_reason = StopReason::Cancelled;
                 break;
@@ -100,7 +100,7 @@ public:
             const double settled = options_.follow ? track(motion.mean) : keep_band(motion.mean);
             if (!solver_) {
                 report_.stop_reason = StopReason::Vanished;
-                keep_end();
+                save_final_state();
                 return report_;
             }
             if (settled < options_.tolerance * tau_) {
@@ -117,7 +117,7 @@ public:
         report_.seconds_sweeps = counts_.seconds_sweeps;
         report_.active_voxels = solver_->active_count();
         report_.leaf_count = static_cast<std::int64_t>(solver_->band().size());
-        keep_end();
+        save_final_state();
         return report_;
     }
 
@@ -152,7 +152,7 @@ private:
                     options_.tau ? "tau" : "delta");
     }
 
-    // A state is that between two steps: u as the band was made of it, and what the steps since have changed.
+    // A state lies between two steps: u from which the band was made, and what the steps since then have changed.
     void exchange(detail::StateFile& file) {
         file.value(is_finished_);
         file.value(tau_);
@@ -176,7 +176,7 @@ private:
         marks_.exchange(file);
     }
 
-    void go_on() {
+    void resume() {
         const detail::FlowStates::Grids grids = states_.read_grids();
         check_transform(*grids.u, "checkpoint");
         u_.setTree(grids.u->treePtr());
@@ -186,58 +186,58 @@ private:
                   std::to_string(report_.steps) + " steps");
     }
 
-    void keep_state() {
+    void save_state() {
         const FloatGrid* u = is_band_new_ ? &u_ : nullptr;
         states_.write(u, options_.follow ? fields_.edge : nullptr, [&](detail::StateFile& file) { exchange(file); });
         is_band_new_ = false;
     }
 
-    void keep_end() {
-        if (!states_.are_kept() || report_.stop_reason == StopReason::Cancelled) return;
+    void save_final_state() {
+        if (!states_.are_enabled() || report_.stop_reason == StopReason::Cancelled) return;
         is_finished_ = is_band_new_ = true;
-        keep_state();
+        save_state();
     }
 
     void make_solver() {
         is_band_new_ = true;
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         if (!options_.follow) return;
-        front_displacement_.remember(solver_->u(), solver_->band().size());
+        front_displacement_.set_references(solver_->u(), solver_->band().size());
         marks_.resize(solver_->band().size());
     }
 
     [[nodiscard]] double inactive_below() const { return kEvolve.inactive_fraction * options_.tolerance * tau_; }
 
-    // A fixed band. @return how much the surface still moves, voxels a step
+    // For a fixed band. @return remaining motion of the surface, voxels per step
     double keep_band(double motion) {
         solver_->update_active_leaves(solver_->largest_changes(), inactive_below());
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
     }
 
-    // Points and edges hold the surface: where it comes to rest counts, not its way there.
+    // Points and edges hold the surface: only its steady state matters, not the path to it.
     [[nodiscard]] bool is_held() const { return options_.theta > 0 || options_.rho > 0; }
 
-    // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice, so every few
-    // steps u is looked at, and made a distance again where |grad u| on the front says that it no longer is one, or
-    // where the band has to move. Each time moves the front a little: where it need not be done, it is not. The
-    // front's displacement is measured just before that, at the same phase of each cycle.
+    // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice. Therefore u is
+    // examined every few steps, and redistanced if |grad u| on the front shows that it is no longer a distance, or if
+    // the band has to move. Each redistancing moves the front slightly, so it is done only if necessary. The front's
+    // displacement is measured just before that, at the same phase of each cycle.
     double track(double motion) {
         if (report_.steps % kEvolve.cycle != 0) return motion;
         std::vector<float> largest;
         const Front front = measure_front(largest);
-        const std::vector<std::size_t> left = front_displacement_.leaves_left(solver_->u());
+        const std::vector<std::size_t> left = front_displacement_.due_leaves(solver_->u());
         if (!left.empty() || (!is_held() && !front.is_distance))
-            remake_band(left, largest);
+            rebuild_band(left, largest);
         else if (!front.is_distance)
             solver_->redistance(tracking_clamp(options_));
-        // Only now, so that a leaf becomes inactive in the phase in which the others are at the end.
+        // Only now, so that a leaf becomes inactive in the same phase that the others have at the end.
         if (solver_) solver_->update_active_leaves(largest, kEvolve.cycle * inactive_below());
         return std::min(motion, front.moved / kEvolve.cycle);
     }
 
     struct Front {
         double moved;      // its mean displacement since the last call, voxels
-        bool is_distance;  // |grad u| on it, in no leaf too flat or too steep
+        bool is_distance;  // |grad u| on it is neither too small nor too large in any leaf
     };
     // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
     Front measure_front(std::vector<float>& largest) {
@@ -262,13 +262,13 @@ private:
                 *flattest >= detail::kFlattest && *steepest <= detail::kSteepest};
     }
 
-    // Leaves no solver where no surface is left. @param largest  in: of each leaf before; out: of each leaf now
-    void remake_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
+    // Leaves no solver if no surface remains. @param largest  in: for each previous leaf; out: for each new leaf
+    void rebuild_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
         const detail::BandSolver::LeafStates states = solver_->take_leaf_states();
-        solver_.reset();  // its memory first
+        solver_.reset();  // frees its memory first
         std::vector<detail::Coord> changed;
         if (is_held())
             changed = detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
@@ -301,7 +301,7 @@ private:
         if (motion > kEvolve.fast_motion) tau_ = std::max(tau_ / kEvolve.tau_growth, 1.0);
     }
 
-    // Steps and the fall of the change, whichever is further.
+    // By steps or by the decrease of the change, whichever is further.
     [[nodiscard]] double progress() const {
         const double by_steps = double(report_.steps) / options_.max_steps;
         if (!(report_.last_change > 0) || !(options_.tolerance > 0)) return by_steps;

@@ -15,7 +15,7 @@ namespace {
 constexpr const char *kGrids = ".vdb", *kNumbers = ".state";
 
 FloatGridPtr named(const FloatGrid& grid, const char* name) {
-    FloatGridPtr copy = std::const_pointer_cast<FloatGrid>(grid.copy());  // the tree is shared, and written only
+    FloatGridPtr copy = std::const_pointer_cast<FloatGrid>(grid.copy());  // shares the tree, only written to a file
     copy->setName(name);
     return copy;
 }

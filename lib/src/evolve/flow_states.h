@@ -8,26 +8,26 @@
 
 namespace covol::detail {
 
-/// The states of one flow, where the run has checkpoints.
+/// The states of one flow, if the run has checkpoints.
 class FlowStates {
 public:
     using Exchange = std::function<void(StateFile& file)>;
     struct Grids {
-        FloatGridPtr u, edge;  ///< no edge: that which the flow began with
+        FloatGridPtr u, edge;  ///< null edge: the one that the flow began with
     };
 
-    /// @param all  null: none are kept
+    /// @param all  null: no states are kept
     explicit FlowStates(Checkpoints* all) : all_(all), number_(all != nullptr ? all->begin_flow() : 0) {}
 
-    /// Whether there is one to go on from.
+    /// Whether there is a state to resume from.
     [[nodiscard]] bool any() const;
     /// @throws Error InvalidInput (damaged), Io.
     [[nodiscard]] Grids read_grids() const;
     void read(const Exchange& exchange) const;
 
-    [[nodiscard]] bool are_kept() const { return all_ != nullptr; }
+    [[nodiscard]] bool are_enabled() const { return all_ != nullptr; }
     [[nodiscard]] bool is_due() const { return all_ != nullptr && all_->is_due(); }
-    /// Puts a state in place of the one before. @param u  null: as before, like the edge. @throws Error Io.
+    /// Replaces the previous state. @param u  null: unchanged, like the edge. @throws Error Io.
     void write(const FloatGrid* u, const FloatGrid* edge, const Exchange& exchange);
 
 private:

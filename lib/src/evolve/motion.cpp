@@ -127,7 +127,7 @@ CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* 
             }
         squared_counts += (double(now.size()) - first) * (double(now.size()) - first);
     }
-    // A plane's crossings are as many along an axis as its normal's component there, and so large are their jumps.
+    // A plane crosses edges along an axis in proportion to its normal's component there, and so are the jumps.
     const double slope = now.size() >= kFewJumps ? jumps / std::sqrt(squared_counts) : 1.0;
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
@@ -173,7 +173,7 @@ FrontDisplacement::Reference::Reference(const float* values)
     for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kMotion.deep) << (n & 63);
 }
 
-void FrontDisplacement::remember(const LeafArray<float>& u, std::size_t leaves) {
+void FrontDisplacement::set_references(const LeafArray<float>& u, std::size_t leaves) {
     references_.resize(leaves);
     tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { references_[leaf] = Reference(u.leaf(leaf)); });
 }
@@ -186,7 +186,7 @@ void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const 
     references_ = std::move(references);
 }
 
-std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& u) const {
+std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u) const {
     enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
     std::vector<State> states(references_.size());
     tbb::parallel_for(std::size_t(0), references_.size(), [&](std::size_t leaf) {

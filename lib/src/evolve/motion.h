@@ -8,7 +8,7 @@ namespace covol::detail {
 
 class StateFile;
 
-/// What one step did to the level set in a leaf. Edges are those between voxels of the leaf.
+/// The effect of one step on the level set in a leaf. Edges are those between voxels of the leaf.
 struct LeafMotion {
     double displacement = 0.0;  ///< of the zero crossings along voxel edges, voxels, summed over the edges
     int edges = 0;              ///< crossed before or after
@@ -25,8 +25,9 @@ struct LeafMotion {
     }
 };
 
-/// An edge that is crossed before and after counts with the distance between the two crossings, one that is crossed
-/// only once with half an edge. Unlike the change of u this is 0 for a profile that grows steeper without moving.
+/// An edge that is crossed before and after contributes the distance between the two crossings, one that is crossed
+/// only once contributes half an edge. Unlike the change of u, this is 0 for a profile that becomes steeper without
+/// moving.
 [[nodiscard]] LeafMotion motion_of(const float* now, const float* before, bool is_active);
 
 /// The whole band's motion in a step.
@@ -37,36 +38,37 @@ struct Motion {
 };
 [[nodiscard]] Motion total(const std::vector<LeafMotion>& leaves);
 
-/// Edges that a surface of one voxel's area crosses, on the average over its directions.
+/// Number of voxel edges that a surface of the area of one voxel face crosses, averaged over its directions.
 inline constexpr double kCrossingsPerVoxel = 1.5;
 
-/// Net motion of the front: from the number of voxels that changed sign over a window of steps. Next to an edge of the
-/// image crossings oscillate by a few hundredths of a voxel around their place; the motion per step then stays above
-/// the tolerance, but the net motion falls below it.
+/// Net motion of the front, from the number of voxels that changed sign over a window of steps. Next to an edge of the
+/// image, crossings oscillate by a few hundredths of a voxel around their position; the motion per step then stays
+/// above the tolerance, but the net motion falls below it.
 class NetMotion {
 public:
     static constexpr int kWindow = 10;  ///< steps
-    /// Called once a step. @return mean motion per step over the last window, voxels; infinity while a window is not
+    /// Called once per step. @return mean motion per step over the last window, voxels; infinity until a window is
     /// complete
     double per_step(const LeafArray<float>& u, std::size_t leaves);
     void exchange(StateFile& file);
 
 private:
-    std::vector<LeafMask> signs_;  // at the window's begin
+    std::vector<LeafMask> signs_;  // at the beginning of the window
     int age_ = 0;
 };
 
-/// Zero crossings on the edges of voxels, leaf by leaf, kept to measure how far the front moves.
+/// Zero crossings on the edges of voxels, stored leaf by leaf to measure how far the front moves.
 class CrossingMarks {
 public:
     struct Displacement {
         double mean = 0.0, largest = 0.0;  ///< of the crossings of one leaf, voxels
-        double slope = 1.0;                ///< |grad u| on the front, the leaf's mean; 1 of a few crossings
+        double slope = 1.0;                ///< |grad u| on the front, mean over the leaf; 1 if there are few crossings
     };
-    /// Keeps the crossings of now. @return their displacement since those kept before; infinity the first time
+    /// Stores the current crossings. @return their displacement since those stored before; infinity the first time
     Displacement renew(std::size_t leaf, const float* u);
     void resize(std::size_t leaves) { leaves_.resize(leaves); }
-    /// The band was made again. @param old_leaf  for each new leaf the old one at the same place, or -1
+    /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one at the same position, or
+    /// -1
     void remake(const std::vector<std::int32_t>& old_leaf);
     [[nodiscard]] std::size_t count(std::size_t leaf) const { return leaves_[leaf].crossings.size(); }
     void exchange(StateFile& file);
@@ -83,16 +85,17 @@ private:
     std::vector<Leaf> leaves_;
 };
 
-/// The rebuild criterion of a tracked band: the front's displacement in a leaf since the band was made there. The leaf
-/// is due once it exceeds three quarters of a voxel on the mean, counted by voxels that changed sign, or once the front
-/// has passed a voxel that was 2 voxels deep.
+/// The rebuild criterion of a tracked band: the front's displacement in a leaf since the band was built there. A leaf
+/// is due once its mean displacement, estimated from voxels that changed sign, exceeds three quarters of a voxel, or
+/// once the front has passed a voxel that was 2 voxels deep.
 class FrontDisplacement {
 public:
-    void remember(const LeafArray<float>& u, std::size_t leaves);
-    /// The band was made again. @param old_leaf  for each new leaf the old one with the same values, or -1
+    void set_references(const LeafArray<float>& u, std::size_t leaves);
+    /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one with the same values, or
+    /// -1
     void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
-    /// The leaves that are due, or nearly; empty while the band need not be made again.
-    [[nodiscard]] std::vector<std::size_t> leaves_left(const LeafArray<float>& u) const;
+    /// The leaves that are due, or nearly so; empty if the band need not be rebuilt.
+    [[nodiscard]] std::vector<std::size_t> due_leaves(const LeafArray<float>& u) const;
     void exchange(StateFile& file);
 
 private:

@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31304554415453ULL << 8 | 'c';  // the version is in it
+constexpr std::uint64_t kMagic = 0x31304554415453ULL << 8 | 'c';  // includes the version
 
 std::uint32_t add_to(std::uint32_t checksum, const void* data, std::size_t count) {
     return std::uint32_t(::crc32_z(checksum, static_cast<const Bytef*>(data), count));
@@ -25,7 +25,7 @@ StateFile::StateFile(const std::string& path, Mode mode)
       file_(path, std::ios::binary | (mode == Mode::Read ? std::ios::in : std::ios::out | std::ios::trunc)) {
     if (!file_) throw Error(Errc::Io, path + ": cannot be opened");
     if (reads()) {
-        // All of it before any of it is used.
+        // The whole file is checked before any of it is used.
         std::error_code status;
         const std::uint64_t size = std::filesystem::file_size(path, status);
         if (status || size < sizeof checksum_) fail();

@@ -8,8 +8,8 @@
 
 namespace covol::detail {
 
-/// The numbers of a computation, to a file and back: what one sequence of calls writes, the same sequence reads. In the
-/// machine's byte order, with a checksum at the end.
+/// Writes the numbers of a computation to a file and reads them back: the sequence of calls that writes a file also
+/// reads it. In the machine's byte order, with a checksum at the end.
 class StateFile {
 public:
     enum class Mode { Write, Read };
@@ -23,7 +23,7 @@ public:
         static_assert(std::is_trivially_copyable_v<T>);
         bytes(&v, sizeof v);
     }
-    /// So many, whatever the file says.
+    /// Exactly `count` values, whatever the file contains.
     template <typename T>
     void array(T* values, std::size_t count) {
         static_assert(std::is_trivially_copyable_v<T>);
@@ -39,14 +39,14 @@ public:
         }
         array(values.data(), values.size());
     }
-    /// A number that is the same when read. @throws Error InvalidInput.
+    /// A number that has to be the same when it is read. @throws Error InvalidInput.
     void same(std::uint64_t number);
-    /// After the last value. @throws Error Io, InvalidInput.
+    /// To be called after the last value. @throws Error Io, InvalidInput.
     void finish();
 
 private:
     void bytes(void* data, std::size_t count);
-    /// Before memory is taken: whether the file has so many bytes more.
+    /// Called before memory is allocated: fails unless the file has that many more bytes.
     void expect(std::uint64_t bytes, std::uint64_t count) const;
     [[noreturn]] void fail() const;
 

@@ -20,10 +20,10 @@ namespace covol::detail {
 namespace fs = std::filesystem;
 namespace {
 
-/// Makes an empty file beside `target`, with a hidden name that nobody can foresee, and that no one else has.
+/// Makes an empty file next to `target`, with a hidden name that is unpredictable and unique.
 std::string new_file_beside(const fs::path& target, mode_t mode) {
     const std::string whole = target.filename().string();
-    // The ending, that writers go by; a name may be as long as the file system allows.
+    // Keeps the extension, which writers depend on; file systems limit the length of a name.
     constexpr std::size_t kEnd = 32;
     const std::string end = whole.substr(whole.size() - std::min(whole.size(), kEnd));
     std::random_device random;
@@ -51,7 +51,7 @@ void write_folder_atomically(const std::string& path, bool may_replace,
     const std::string temporary = (scratch.path() / target.filename()).string();
     if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
     write(temporary);
-    // All files of it reach the disk before its name does.
+    // All its files are flushed to the disk before the folder is renamed.
     const int folder = ::open(temporary.c_str(), O_RDONLY | O_DIRECTORY);
     const bool flushed = folder >= 0 && ::syncfs(folder) == 0;
     const int why = errno;
@@ -69,7 +69,7 @@ void write_atomically(const std::string& path, const std::function<void(const st
     if (fs::is_directory(target, status)) throw Error(Errc::Io, path + ": cannot write: it is a folder");
     if (exists && !fs::is_regular_file(target, status))
         throw Error(Errc::Io, path + ": cannot write: it is not a regular file");
-    // What only some may read is for none but this user meanwhile.
+    // Only this user may read the temporary file, because the old file may have been protected.
     const std::string temporary = new_file_beside(target, exists ? 0600 : 0666);
     struct Remover {
         const std::string& name;

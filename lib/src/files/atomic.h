@@ -4,14 +4,15 @@
 
 namespace covol::detail {
 
-/// Lets `write` fill a temporary file beside `path` (same ending, so that writers that go by the name work), then
-/// renames it onto `path`, or onto what `path` is a symbolic link to, with the permissions and the owner of what was
-/// there. When `write` throws, the temporary is removed and an old `path` stays as it was.
-/// @throws Error Io; whatever `write` throws.
+/// Lets `write` fill a temporary file next to `path` (with the same extension, because writers may depend on it), then
+/// renames it to `path`, or to the target of a symbolic link at `path`. Permissions and owner of the old file are kept.
+/// If `write` throws, the temporary file is removed and the old file at `path` is unchanged. @throws Error Io; whatever
+/// `write` throws.
 void write_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
 
-/// The same for a folder: `write` fills an empty one beside `path`. An old folder is replaced, at once.
-/// @param may_replace  whether what is there may go @throws Error Io; whatever `write` throws.
+/// The same for a folder: `write` fills an empty folder next to `path`. An old folder is replaced atomically.
+/// @param may_replace  whether an existing folder may be replaced
+/// @throws Error Io; whatever `write` throws.
 void write_folder_atomically(const std::string& path, bool may_replace,
                              const std::function<void(const std::string& temporary)>& write);
 

@@ -19,7 +19,7 @@ public:
     Descriptor(const Descriptor&) = delete;
     Descriptor& operator=(const Descriptor&) = delete;
     [[nodiscard]] int get() const noexcept { return file_; }
-    /// Gives the descriptor away.
+    /// Gives up ownership of the descriptor.
     int release() noexcept { return std::exchange(file_, -1); }
     void close() {
         if (file_ >= 0) ::close(release());
@@ -29,14 +29,14 @@ private:
     int file_;
 };
 
-/// What a file or folder is, by whatever path. 0, 0: there is none.
+/// Identifies a file or folder independently of its path. 0, 0: there is none.
 struct FileId {
     dev_t device = 0;
     ino_t inode = 0;
     auto operator<=>(const FileId&) const = default;
 };
 
-/// Of what the path names itself, a symbolic link for example.
+/// The identity of the entry at the path itself, without following a symbolic link.
 inline FileId id_of(const std::filesystem::path& path) {
     struct stat entry {};
     return ::lstat(path.c_str(), &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};

@@ -25,7 +25,7 @@ class Digest {
 public:
     Digest() { XXH3_128bits_reset(state_.get()); }
     void add(const void* bytes, std::size_t count) { XXH3_128bits_update(state_.get(), bytes, count); }
-    /// As xxh128sum prints it.
+    /// In the form that xxh128sum prints.
     [[nodiscard]] std::string hex() const {
         XXH128_canonical_t digest;
         XXH128_canonicalFromHash(&digest, XXH3_128bits_digest(state_.get()));
@@ -57,9 +57,10 @@ void add_file(const fs::path& path, Digest& hash) {
 }
 
 void add_metadata(const fs::path& folder, Digest& hash) {
-    const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json", "journal.jsonl"};  // or of a study
+    const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json",
+                                      "journal.jsonl"};  // of a Zarr store, or of a study
     std::set<fs::path> found;
-    // Chunks lie deeper, or beside these, in any number.
+    // Chunks are in deeper folders, or next to these files; there may be any number of them.
     std::vector<fs::path> level{folder};
     for (int depth = 0; depth < 3; ++depth) {
         std::vector<fs::path> next;

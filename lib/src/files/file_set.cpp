@@ -18,8 +18,8 @@ namespace covol {
 namespace fs = std::filesystem;
 namespace {
 
-/// What libraries do not say of a write that failed.
-std::string why_no_room(const std::string& message) {
+/// The reason for a failed write, which libraries do not report.
+std::string disk_full_reason(const std::string& message) {
     const int why = errno;
     if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};
     const std::string text = std::strerror(why);
@@ -37,10 +37,10 @@ struct Folder {
 
 struct FileSet::State {
     struct File {
-        std::string path;  ///< as it was given
+        std::string path;  ///< path as given by the caller
         fs::path target, temporary;
     };
-    /// By what they are, in the same order for all processes.
+    /// By their identities, so that all processes lock them in the same order.
     std::map<detail::FileId, Folder> folders;
     std::vector<File> files;
     File writing;
@@ -52,9 +52,9 @@ struct FileSet::State {
         return locks;
     }
 
-    /// The manifest of each scratch folder. @returns the set's number
+    /// Writes the manifest of each scratch folder. @returns the set's number
     [[nodiscard]] std::string write_manifests() const {
-        detail::Manifest manifest{detail::new_set_number(), {}, {}};
+        detail::Manifest manifest{detail::new_set_id(), {}, {}};
         for (const auto& [id, folder] : folders)
             manifest.scratches.push_back({folder.scratch.path(), detail::id_of(folder.scratch.path()).inode, id.inode});
         for (const auto& [id, folder] : folders) {
@@ -68,17 +68,17 @@ struct FileSet::State {
         return manifest.set;
     }
 
-    /// Puts back what was there before the first `count` files took its place.
+    /// Restores the files that the first `count` outputs have replaced.
     void put_back(std::size_t count, const std::string& set) noexcept {
         try {
-            detail::write_commit(folders.begin()->second.scratch.path(), set, detail::Fate::PutBack);
+            detail::write_commit(folders.begin()->second.scratch.path(), set, detail::SetOutcome::PutBack);
         } catch (const std::exception&) {
-            // A kill from here on would be taken for one on the way forwards.
+            // Without the commit, the set is only completed instead of undone if the process is killed from here on.
         }
         while (count-- > 0) static_cast<void>(detail::exchange_back(files[count].temporary, files[count].target));
     }
 
-    /// The commit goes last: without it what is left elsewhere would be thrown away.
+    /// The commit is removed last: without it, outputs remaining in other folders would be discarded.
     void remove_manifests() const noexcept {
         for (auto folder = folders.rbegin(); folder != folders.rend(); ++folder) {
             const fs::path& scratch = folder->second.scratch.path();
@@ -107,7 +107,7 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     try {
         write(temporary.string());
     } catch (const Error& error) {
-        throw Error(error.code(), shown(error.what()) + why_no_room(error.what()));
+        throw Error(error.code(), shown(error.what()) + disk_full_reason(error.what()));
     }
     std::error_code status;
     if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
@@ -118,14 +118,14 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
 void FileSet::publish(const RunContext& run) {
     std::vector<State::File>& files = state_->files;
     if (files.empty()) return state_->folders.clear();
-    // Of two runs that end at the same time with the same outputs, one set after the other.
+    // If two runs end at the same time with the same outputs, one set is published after the other.
     const auto one_at_a_time = state_->lock_folders(run);
     for (const State::File& file : files) detail::keep_attributes(file.target, file.temporary);
     const std::string set = state_->write_manifests();
-    // A thread that ends the process must leave the rest to the next run.
+    // If another thread ends the process, the next run has to complete the publication.
     for (auto& [id, folder] : state_->folders) folder.scratch.keep_for_next_run();
     if (state_->folders.size() > 1)
-        detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::Fate::Complete);
+        detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::SetOutcome::Complete);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (!detail::exchange(files[n].temporary, files[n].target)) {
             const int why = errno;
@@ -134,7 +134,7 @@ void FileSet::publish(const RunContext& run) {
             throw Error(Errc::Io, files[n].path + ": cannot write: " + std::strerror(why));
         }
     for (const auto& [id, folder] : state_->folders) detail::flush_folder(folder.path);
-    // What was replaced goes with the folders, and no one is to put it back.
+    // The replaced files are deleted with the scratch folders, and must not be restored.
     state_->remove_manifests();
     files.clear();
     state_->folders.clear();

@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// "process 712 (rsync)", from the system's list of locks.
+/// The process that holds a lock, as "process 712 (rsync)", from the system's list of locks.
 std::string holder_of(const FileId& file) {
     char place[64];
     std::snprintf(place, sizeof place, " %02x:%02x:%ju ", ::major(file.device), ::minor(file.device),
@@ -28,7 +28,7 @@ std::string holder_of(const FileId& file) {
     for (std::string line; std::getline(locks, line);) {
         char kind[16] = {};
         long process = 0;
-        // "1: FLOCK  ADVISORY  WRITE 712 fe:01:1234 0 EOF"; "->" marks those that wait
+        // "1: FLOCK  ADVISORY  WRITE 712 fe:01:1234 0 EOF"; "->" marks waiting processes
         if (line.find(place) == std::string::npos ||
             std::sscanf(line.c_str(), "%*d: %15s %*s %*s %ld", kind, &process) != 2 ||
             std::strcmp(kind, "FLOCK") != 0 || process <= 0)

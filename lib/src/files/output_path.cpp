@@ -22,7 +22,7 @@ constexpr const char* kAccessList = "system.posix_acl_access";
     throw Error(Errc::Io, path + ": cannot write: " + why);
 }
 
-/// The folder that the system would put `at` in, without symbolic links.
+/// The folder in which the system would create `at`, without symbolic links.
 fs::path real_folder(const fs::path& at, const std::string& given) {
     const fs::path folder = at.has_parent_path() ? at.parent_path() : fs::path(".");
     std::error_code status;
@@ -40,9 +40,9 @@ bool is_in_proc(const fs::path& folder) {
     return ::statfs(folder.c_str(), &system) == 0 && system.f_type == kProc;
 }
 
-/// In a folder that everyone may write to, /tmp for example, a stranger's link leads nowhere, as the kernel has it
-/// (fs.protected_symlinks).
-void expect_own_link(const fs::path& folder, const struct stat& link, const std::string& given) {
+/// In a folder that everyone may write to, such as /tmp, another user's link is not followed, which is also the
+/// kernel's rule (fs.protected_symlinks).
+void require_own_link(const fs::path& folder, const struct stat& link, const std::string& given) {
     struct stat around {};
     if (::stat(folder.c_str(), &around) != 0) return;
     const bool for_all = (around.st_mode & S_ISVTX) != 0 && (around.st_mode & S_IWOTH) != 0;
@@ -53,7 +53,7 @@ void expect_own_link(const fs::path& folder, const struct stat& link, const std:
 }  // namespace
 
 OutputPlace place_of_output(const std::string& path) {
-    constexpr int kMaxLinks = 40;  // as the kernel
+    constexpr int kMaxLinks = 40;  // the kernel's limit
     fs::path at = path;
     for (int links = 0; links <= kMaxLinks; ++links) {
         at = detail::without_end_slash(at.string());
@@ -64,7 +64,7 @@ OutputPlace place_of_output(const std::string& path) {
         if (::lstat(at.c_str(), &entry) != 0 && errno == ENAMETOOLONG) refuse(path, std::strerror(errno));
         if (!S_ISLNK(entry.st_mode)) return {at, false};
         if (is_in_proc(folder)) return {at, true};
-        expect_own_link(folder, entry, path);
+        require_own_link(folder, entry, path);
         std::error_code status;
         at = folder / fs::read_symlink(at, status);
         if (status) refuse(path, status.message());
@@ -93,7 +93,7 @@ void keep_attributes(const fs::path& replaced, const fs::path& made) {
         as_before = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size()) == size &&
                     ::setxattr(made.c_str(), kAccessList, list.data(), list.size(), 0) == 0 && as_before;
     } else {
-        ::removexattr(made.c_str(), kAccessList);  // one that the folder hands on
+        ::removexattr(made.c_str(), kAccessList);  // an access list inherited from the folder
     }
     mode_t mode = old.st_mode & (S_ISDIR(old.st_mode) ? 07777 : 0777);
     if (!as_before) mode &= ~mode_t(S_IRWXG) | ((mode & S_IRWXO) << 3);

@@ -6,12 +6,12 @@
 
 namespace covol::detail {
 
-/// place_of_output() of what must be a file or folder. @throws Error Io.
+/// place_of_output() for an output that must be a file or folder. @throws Error Io.
 std::filesystem::path path_of_output(const std::string& path);
 
-/// Gives `made` the permissions, owner, group and access list of `replaced`, of the same kind, as far as this process
-/// may. Where the group cannot be kept, another one gets no more than all have. Does nothing where `replaced` is not
-/// there.
+/// Gives `made` the permissions, owner, group and access list of `replaced`, which is of the same kind, as far as this
+/// process may. If the group cannot be kept, the new group gets no more permissions than all users. Does nothing if
+/// `replaced` does not exist.
 void keep_attributes(const std::filesystem::path& replaced, const std::filesystem::path& made);
 
 }  // namespace covol::detail

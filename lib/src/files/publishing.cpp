@@ -22,10 +22,10 @@ namespace {
 constexpr const char* kManifestMagic = "covol manifest, format 2";
 constexpr const char* kCommitMagic = "covol commit, format 2";
 constexpr const char* kEnd = "end";
-// Longer than a run takes to clear a folder. The one that waits holds the lock of another folder.
+// Longer than a run takes to clear a folder, but short, because the waiting process holds the lock of another folder.
 constexpr std::chrono::milliseconds kShortPatience{2000};
 
-/// Texts with a zero behind each: names may hold anything else.
+/// Reads texts that each end with a zero, since names may contain any other character.
 class Fields {
 public:
     explicit Fields(const fs::path& path) {
@@ -82,17 +82,17 @@ std::optional<Manifest> read_manifest(const fs::path& scratch) {
     return manifest;
 }
 
-std::optional<Fate> read_commit(const fs::path& first, const std::string& set) {
+std::optional<SetOutcome> read_commit(const fs::path& first, const std::string& set) {
     Fields fields(first / kCommit);
     if (fields.next() != kCommitMagic || fields.next() != set) return std::nullopt;
-    return fields.next() == "complete" ? Fate::Complete : Fate::PutBack;
+    return fields.next() == "complete" ? SetOutcome::Complete : SetOutcome::PutBack;
 }
 
-/// What a process that was killed in FileSet::publish() left in one scratch folder, of which this process has the lock,
-/// as well as that of the folder around it.
-class Remains {
+/// The files that a process which was killed in FileSet::publish() left in one scratch folder. This process holds the
+/// locks of that folder and of its parent.
+class AbandonedSet {
 public:
-    Remains(fs::path scratch, const RunContext& run) : scratch_(std::move(scratch)), run_(run) {
+    AbandonedSet(fs::path scratch, const RunContext& run) : scratch_(std::move(scratch)), run_(run) {
         manifest_ = read_manifest(scratch_);
     }
 
@@ -100,20 +100,20 @@ public:
     bool finish() {
         if (!manifest_) return !fs::exists(fs::symlink_status(scratch_ / kManifest));
         const std::size_t self = own_number();
-        if (self == manifest_->scratches.size()) return false;  // it is about another folder
+        if (self == manifest_->scratches.size()) return false;  // the manifest belongs to another folder
         bool known = true;
-        std::optional<Fate> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
-        // In one folder the manifest itself says that the set is to be completed.
-        if (!fate && manifest_->scratches.size() == 1) fate = Fate::Complete;
+        std::optional<SetOutcome> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
+        // If there is only one folder, its manifest is also the commit.
+        if (!fate && manifest_->scratches.size() == 1) fate = SetOutcome::Complete;
         if (!known) return false;
-        if (!fate) return true;  // nothing was put in place yet
+        if (!fate) return true;  // no file has been put in place yet
         bool others = true;
         for (std::size_t n = 1; n < manifest_->scratches.size(); ++n)
             if (n != self) others = finish_other(manifest_->scratches[n], *fate, true) && others;
         const bool done = put(*fate);
         if (self == 0) return done && others;
         if (done) ::unlink((scratch_ / kManifest).c_str());
-        // The commit goes last: without it what is left elsewhere would be thrown away.
+        // The commit is removed last: without it, outputs remaining in other folders would be discarded.
         static_cast<void>(finish_other(manifest_->scratches[0], *fate, done && others));
         return done;
     }
@@ -132,40 +132,40 @@ private:
         return false;
     }
 
-    /// What the commit says, in another folder. @param known  false: that folder cannot be seen now
-    [[nodiscard]] std::optional<Fate> fate_elsewhere(bool& known) const {
+    /// Reads the commit, which is in another folder. @param known  false: that folder is inaccessible now
+    [[nodiscard]] std::optional<SetOutcome> fate_elsewhere(bool& known) const {
         const ScratchPlace& first = manifest_->scratches.front();
         known = id_of(first.path.parent_path()).inode == first.folder;
         if (known) {
             if (id_of(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
-            // It is gone once all is in place, and where it was thrown away before anything was.
+            // The commit is removed after all files are in place, or was never written.
             if (!any_in_place()) return std::nullopt;
         }
         known = any_in_place();
-        return Fate::Complete;
+        return SetOutcome::Complete;
     }
 
-    /// Puts this folder's files in place, or back. @returns whether that is done
-    bool put(Fate fate) {
+    /// Puts this folder's files in place, or restores the old ones. @returns whether that succeeded
+    bool put(SetOutcome fate) {
         const fs::path folder = scratch_.parent_path();
         bool done = true;
         for (const Manifest::File& file : manifest_->files) {
             const fs::path temporary = scratch_ / file.name, target = folder / file.name;
             const Stamp there = stamp_of(target), here = stamp_of(temporary);
-            // What was put there since is not ours to replace.
-            if (fate == Fate::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
+            // Files that were put there by others since are not replaced.
+            if (fate == SetOutcome::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
                 done = exchange(temporary, target) && done;
-            if (fate == Fate::PutBack && there == file.made) done = exchange_back(temporary, target) && done;
-            // Where a file system cannot exchange two files at once, that was cut short half way.
-            if (fate == Fate::PutBack && there == Stamp{} && here == file.replaced && here != Stamp{})
+            if (fate == SetOutcome::PutBack && there == file.made) done = exchange_back(temporary, target) && done;
+            // On file systems without atomic exchange, the exchange may have been interrupted half way.
+            if (fate == SetOutcome::PutBack && there == Stamp{} && here == file.replaced && here != Stamp{})
                 done = ::rename(temporary.c_str(), target.c_str()) == 0 && done;
         }
         flush_folder(folder);
         return done;
     }
 
-    /// The same in another folder of the set, if that is free. @returns whether that is done
-    [[nodiscard]] bool finish_other(const ScratchPlace& place, Fate fate, bool may_remove) const {
+    /// The same in another folder of the set, unless it is locked. @returns whether that succeeded
+    [[nodiscard]] bool finish_other(const ScratchPlace& place, SetOutcome fate, bool may_remove) const {
         const fs::path folder = place.path.parent_path();
         if (id_of(folder).inode != place.folder) return false;
         try {
@@ -173,9 +173,9 @@ private:
             const FileId id = id_of(place.path);
             if (id == FileId{}) return true;
             if (!lock.is_locked() || id.inode != place.inode) return false;
-            const DeadScratch dead(place.path);
-            if (dead.state() != DeadScratch::State::Dead) return false;
-            Remains other(place.path, run_);
+            const AbandonedScratch dead(place.path);
+            if (dead.state() != AbandonedScratch::State::Dead) return false;
+            AbandonedSet other(place.path, run_);
             if (other.manifest_ && other.manifest_->set != manifest_->set) return false;
             if (other.manifest_ && !other.put(fate)) return false;
             if (!may_remove) return true;
@@ -202,7 +202,7 @@ Stamp stamp_of(const fs::path& path) {
     return {entry.st_ino, entry.st_mtim.tv_sec * kNanoseconds + entry.st_mtim.tv_nsec};
 }
 
-std::string new_set_number() {
+std::string new_set_id() {
     std::random_device random;
     std::string text;
     for (int n = 0; n < 4; ++n) text += (n > 0 ? "-" : "") + std::to_string(random());
@@ -231,9 +231,9 @@ void write_manifest(const fs::path& scratch, const Manifest& manifest) {
     flush_folder(scratch);
 }
 
-void write_commit(const fs::path& first, const std::string& set, Fate fate) {
+void write_commit(const fs::path& first, const std::string& set, SetOutcome fate) {
     write_text_file((first / kCommit).string(), kCommitMagic + std::string(1, '\0') + set + '\0' +
-                                                    (fate == Fate::Complete ? "complete" : "put back") + '\0');
+                                                    (fate == SetOutcome::Complete ? "complete" : "put back") + '\0');
     flush_folder(first);
 }
 
@@ -247,15 +247,15 @@ bool exchange_back(const fs::path& from, const fs::path& to) {
     return swap_paths(from.string(), to.string());
 }
 
-void clear_after_the_dead(const fs::path& folder, const RunContext& run) {
+void clear_abandoned(const fs::path& folder, const RunContext& run) {
     std::vector<fs::path> found;
     std::error_code status;
     for (fs::directory_iterator at(folder, status), end; !status && at != end; at.increment(status))
         if (is_scratch_name(at->path().filename().string())) found.push_back(at->path());
     for (const fs::path& scratch : found) {
-        const DeadScratch dead(scratch);
-        if (dead.state() == DeadScratch::State::Unstarted ||
-            (dead.state() == DeadScratch::State::Dead && Remains(scratch, run).finish()))
+        const AbandonedScratch dead(scratch);
+        if (dead.state() == AbandonedScratch::State::Unstarted ||
+            (dead.state() == AbandonedScratch::State::Dead && AbandonedSet(scratch, run).finish()))
             dead.remove();
     }
 }

@@ -7,27 +7,28 @@
 #include "covol/run.h"
 #include "files/descriptor.h"
 
-// How files of several folders are put in place together (FileSet::publish()), and how the next run goes on where a
+// How files in several folders are put in place together (FileSet::publish()), and how the next run continues if a
 // process was killed meanwhile.
 //
 // Each scratch folder gets a manifest: the set's number, all scratch folders of the set, and inode and name of each
-// file that it will put in place. Then one file in the first of them, the commit, says that the set is to be completed.
-// Before that file is there the outputs are the old ones, and what was written is thrown away; after that each folder's
-// files are put in place, by whoever comes next to any of the folders. In one folder the manifest is the commit. A
-// manifest only ever speaks of files in its own scratch folder and the folder around it: of the others it says where
-// they are, and these have manifests of their own, in folders of this user with a lock that this process could take.
+// file that it will put in place. Then a file in the first of them, the commit, states that the set is to be completed.
+// Until that file exists, the outputs are the old ones, and the new ones are discarded; afterwards each folder's files
+// are put in place by the next run that uses any of the folders. If there is only one folder, the manifest is also the
+// commit. A manifest refers only to files in its own scratch folder and the parent of that. Of the other scratch
+// folders it states only paths and inodes: these have manifests of their own, and are accepted only if they belong to
+// this user and if this process can lock them.
 namespace covol::detail {
 
 struct ScratchPlace {
     std::filesystem::path path;
     ino_t inode = 0,
-          folder = 0;  ///< its own, and that of the folder around it: devices have other numbers after a start
+          folder = 0;  ///< of the folder itself and of its parent; device numbers may change after a reboot
 };
 
-/// A file as it is now. 0, 0: there is none.
+/// The current state of a file. 0, 0: there is none.
 struct Stamp {
     ino_t inode = 0;
-    std::int64_t changed = 0;  ///< its contents, nanoseconds
+    std::int64_t changed = 0;  ///< time of the last change of its contents, in nanoseconds
     bool operator==(const Stamp&) const = default;
     [[nodiscard]] std::string text() const { return std::to_string(inode) + " " + std::to_string(changed); }
 };
@@ -35,30 +36,30 @@ struct Stamp {
 
 struct Manifest {
     std::string set;                      ///< a random number
-    std::vector<ScratchPlace> scratches;  ///< the first has the commit
+    std::vector<ScratchPlace> scratches;  ///< the first contains the commit
     struct File {
-        Stamp made, replaced;  ///< the new file, and what it is to replace; with its name in the folder around,
-                               ///< `made` is in its place, and another than these two was put there since
+        Stamp made, replaced;  ///< the new file, and the one that it replaces. If the file with its name in the parent
+                               ///< folder is `made`, it is in place; if it is neither, others put it there since
         std::string name;
     };
     std::vector<File> files;
 };
 
-enum class Fate { Complete, PutBack };
+enum class SetOutcome { Complete, PutBack };
 
-[[nodiscard]] std::string new_set_number();
+[[nodiscard]] std::string new_set_id();
 
 /// @throws Error Io.
 void write_manifest(const std::filesystem::path& scratch, const Manifest& manifest);
-/// From here on the set is to be completed, or put back. @throws Error Io.
-void write_commit(const std::filesystem::path& first, const std::string& set, Fate fate);
+/// Records that the set is to be completed, or undone. @throws Error Io.
+void write_commit(const std::filesystem::path& first, const std::string& set, SetOutcome fate);
 
-/// What lies at `from` takes the place of `to`, and the other way round where something was there.
+/// Exchanges the files at `from` and `to`, or moves `from` if there is none at `to`.
 bool exchange(const std::filesystem::path& from, const std::filesystem::path& to);
 /// Undoes exchange().
 bool exchange_back(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Clears what dead processes left in a folder. @pre the folder is locked by the caller
-void clear_after_the_dead(const std::filesystem::path& folder, const RunContext& run);
+/// Completes or removes what terminated processes left in a folder. @pre the folder is locked by the caller
+void clear_abandoned(const std::filesystem::path& folder, const RunContext& run);
 
 }  // namespace covol::detail

@@ -24,7 +24,7 @@ std::string read_all(int file) {
     return text;
 }
 
-/// The entries of a folder but the lock. Symbolic links are not followed.
+/// The entries of a folder except the lock. Symbolic links are not followed.
 std::vector<fs::path> contents(const fs::path& folder) {
     std::vector<fs::path> entries;
     std::error_code status;
@@ -56,26 +56,26 @@ std::string scratch_mark(ino_t folder, bool all) {
     return std::string(kMagic) + std::to_string(folder) + "\n" + (all ? kAll : kListed);
 }
 
-DeadScratch::DeadScratch(const fs::path& folder)
+AbandonedScratch::AbandonedScratch(const fs::path& folder)
     : folder_(folder), lock_(folder / kScratchLock, O_RDWR | O_NOFOLLOW | O_NONBLOCK), state_(read_state()) {}
 
-DeadScratch::State DeadScratch::read_state() {
+AbandonedScratch::State AbandonedScratch::read_state() {
     struct stat own {
     }, lock{};
     if (!is_scratch_name(folder_.filename().string()) || ::lstat(folder_.c_str(), &own) != 0 || !S_ISDIR(own.st_mode) ||
         own.st_uid != ::geteuid())
         return State::Foreign;
     std::error_code status;
-    // Its process ended before it had a lock.
+    // The process ended before it created the lock.
     if (lock_.get() < 0) return fs::is_empty(folder_, status) && !status ? State::Unstarted : State::Foreign;
-    // Only this user can have made a file that is this user's; another name of it would be elsewhere.
+    // A file that belongs to this user was created by this user; a second link would be in another folder.
     if (::fstat(lock_.get(), &lock) != 0 || !S_ISREG(lock.st_mode) || lock.st_uid != ::geteuid() || lock.st_nlink != 1)
         return State::Foreign;
     if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0) return State::Alive;
     const std::string text = read_all(lock_.get());
     if (text.empty()) return contents(folder_).empty() ? State::Unstarted : State::Foreign;
     for (const bool all : {true, false}) {
-        // A copy of such a folder has another inode.
+        // A copy of such a folder has another inode, so the mark does not match.
         const std::string mark = scratch_mark(own.st_ino, all);
         if (!text.starts_with(mark)) continue;
         names_ = std::string(1, '\0') + text.substr(mark.size());
@@ -85,9 +85,9 @@ DeadScratch::State DeadScratch::read_state() {
     return State::Foreign;
 }
 
-void DeadScratch::remove() const {
+void AbandonedScratch::remove() const {
     const auto is_listed = [&](std::string name) {
-        // Writers keep parts of a file beside it, under its name and an ending.
+        // Writers store parts of a file next to it, with its name and an additional extension.
         for (;; name.erase(name.rfind('.'))) {
             if (names_.find('\0' + name + '\0') != std::string::npos) return true;
             if (name.rfind('.') == std::string::npos) return false;

@@ -15,7 +15,7 @@ namespace covol {
 namespace fs = std::filesystem;
 namespace {
 
-/// Those of this process.
+/// The scratch folders of this process.
 struct Living {
     std::mutex mutex;
     std::set<fs::path> folders;
@@ -62,10 +62,10 @@ void ScratchFolder::remove_all() noexcept {
 
 ScratchFolder::ScratchFolder(const fs::path& beside, const RunContext& run, Clears clears) {
     const fs::path folder = fs::absolute(beside.empty() ? fs::path(".") : beside);
-    // One process at a time, so that none takes a folder for a dead one's that is made but not yet locked. Where a file
-    // system has no such locks nothing is cleared.
+    // One process at a time, so that none mistakes a folder that is created but not yet locked for an abandoned one. If
+    // a file system does not support such locks, nothing is cleared.
     const detail::FolderLock one_at_a_time(folder, run);
-    if (one_at_a_time.is_locked()) detail::clear_after_the_dead(folder, run);
+    if (one_at_a_time.is_locked()) detail::clear_abandoned(folder, run);
     std::string name = (folder / (std::string(detail::kHiddenPrefix) + "XXXXXX")).string();
     if (::mkdtemp(name.data()) == nullptr) fail(folder, errno);
     path_ = name;

@@ -2,17 +2,17 @@
 #include <array>
 #include <cstdint>
 
-// The 256 cases of marching cubes as closed loops of edge vertices, derived instead of typed in.
+// The 256 cases of marching cubes as closed loops of edge vertices, derived instead of tabulated.
 //
-// Each face of a cube is cut by segments that depend on the signs of its four corners alone, so the two cubes that
-// share a face agree. On a face with two inside corners on a diagonal both are cut off: inside is 6-connected, outside
+// Each face of a cube is cut by segments that depend only on the signs of its four corners, so that the two cubes that
+// share a face agree. On a face with two inside corners on a diagonal, both are cut off: inside is 6-connected, outside
 // 18-connected. Tracing the segments around a cube gives loops; each is filled by a fan of triangles around one of its
-// vertices. Why the surface is a closed manifold without self-intersection for every input:
+// vertices. The surface is a closed manifold without self-intersection for every input because:
 // - a vertex lies strictly inside its edge, belongs to one loop in each of the four cubes around the edge, and a face
 //   segment to the two cubes around its face: closed, one umbrella for each vertex;
-// - an apex is taken only where none of its diagonals lies in a face. Then the fan meets the faces in its segments
-// alone,
-//   and as the faces of a cube that miss the apex are seen from it without overlap, a fan does not intersect itself;
+// - an apex is used only if none of its diagonals lies in a face. Then the fan meets the faces only in its segments,
+//   and because the faces of a cube that do not contain the apex are seen from it without overlap, a fan does not
+//   intersect itself;
 // - two loops of one cube are separated by a plane: with inside corners cut off, different loops belong to inside
 //   corners that no edge joins, or (one case) to two opposite outside corners.
 
@@ -56,7 +56,7 @@ constexpr bool have_common_face(int e, int f) {
     return false;
 }
 
-/// next[e]: the edge that follows e on its loop, -1 where the surface does not cut e.
+/// next[e]: the edge that follows e on its loop, -1 if the surface does not cut e.
 constexpr std::array<int, 12> trace_faces(int inside) {
     std::array<int, 12> next{};
     next.fill(-1);
@@ -68,7 +68,8 @@ constexpr std::array<int, 12> trace_faces(int inside) {
             const int base = side != 0 ? axis_bit(axis) : 0;
             const std::array<int, 4> ring = side != 0 ? std::array{base, base | u, base | u | v, base | v}
                                                       : std::array{base, base | v, base | u | v, base | u};
-            // Each run of inside corners is cut off, from where the walk enters it to where it leaves it.
+            // Each run of inside corners is cut off, from the edge where the walk enters it to the one where it leaves
+            // it.
             for (int i = 0; i < 4; ++i) {
                 const bool before = inside >> ring[i] & 1;
                 const bool after = inside >> ring[(i + 1) % 4] & 1;
@@ -118,7 +119,7 @@ constexpr std::array<CubeCase, 256> make_cases() {
 
 }  // namespace cube_detail
 
-/// By the bits of the inside corners (value < isovalue).
+/// Indexed by the bits of the inside corners (value < isovalue).
 inline constexpr std::array<CubeCase, 256> kCubeCases = cube_detail::make_cases();
 
 constexpr bool every_loop_has_an_apex() {

@@ -12,7 +12,7 @@ namespace {
 using openvdb::Coord;
 using Tree = FloatGrid::TreeType;
 
-/// One node: from its children outward, over slots that are tiles.
+/// Fills the tiles of one node, from its children outward.
 template <typename Node>
 void fill_tiles(Node& node, const openvdb::CoordBBox& domain, float background) {
     constexpr int kSide = 1 << Node::LOG2DIM, kChild = Node::ChildNodeType::DIM;
@@ -44,7 +44,7 @@ void fill_tiles(Node& node, const openvdb::CoordBBox& domain, float background) 
     for (auto on = children.beginOn(); on; ++on) {
         if (!meets(on.pos())) continue;
         spread(on.pos(), [&](int face) {
-            // In the middle of that face, as far as the domain goes.
+            // The middle of that face, limited to the domain.
             Coord voxel = node.offsetToGlobalCoord(on.pos()).offsetBy(kChild / 2);
             voxel[face / 2] += face % 2 == 0 ? -kChild / 2 : kChild / 2 - 1;
             voxel = Coord::minComponent(Coord::maxComponent(voxel, domain.min()), domain.max());
@@ -71,7 +71,8 @@ void flood_tiles(FloatGrid& level_set, const Domain& domain) {
     using Leaf = Tree::LeafNodeType;
     using Upper = Tree::RootNodeType::ChildNodeType;
     Tree& tree = level_set.tree();
-    // OpenVDB's fills the tiles of the root, and passes over leaves whose voxels are all active: their signs are known.
+    // OpenVDB's flood fill sets the tiles of the root. It skips leaves whose voxels are all active: their signs are
+    // known.
     std::vector<Leaf*> leaves;
     tree.getNodes(leaves);
     std::vector<Leaf::NodeMaskType> masks(leaves.size());

@@ -9,37 +9,37 @@
 
 namespace covol::detail {
 
-/// Values on a band's leaves, and for each leaf the 27 blocks around it. Blocks from band.size() on stand for what lies
-/// beyond the band: copies of a grid's leaves, and constant blocks for its tiles.
+/// Values on a band's leaves, and for each leaf the 27 blocks around it. Blocks from band.size() on represent the
+/// surroundings of the band: copies of a grid's leaves, and constant blocks for its tiles.
 struct HaloField {
     LeafArray<float> values;
     std::vector<std::array<std::int32_t, 27>> blocks;
 };
 
-/// Fills one block from a grid's leaf, or from a tile's value where `leaf` is null.
+/// Fills one block from a grid's leaf, or from a tile's value if `leaf` is null.
 using ConvertBlock = std::function<void(const FloatGrid::TreeType::LeafNodeType* leaf, float tile, float* block)>;
 
-/// Gathers `grid` on the band and in the blocks around it. @param corners  false: only the six faces are asked for
+/// Gathers `grid` on the band and in the blocks around it. @param corners  false: only the six faces are needed
 [[nodiscard]] HaloField gather(const LeafBand& band, const FloatGrid& grid, bool corners, const ConvertBlock& convert);
 
 /// A padded buffer (see scheme.h) with edges and corners.
 void load_padded(const HaloField& field, std::size_t leaf, float* out);
-/// The same without edges and corners, which keep what they hold.
+/// The same without edges and corners, which are not written.
 void load_star(const HaloField& field, std::size_t leaf, float* out);
 /// The same from seven blocks of 512: the leaf's own and those across its faces, by Face.
 void load_star_from(const float* inner, const float* const across[6], float* out);
 /// The blocks that load_star reads, in place.
 [[nodiscard]] LeafStar star_of(HaloField& field, std::size_t leaf);
-/// Asks the memory for what is read of them.
+/// Prefetches the values that are read of them.
 void prefetch(const LeafStar& star);
 /// Writes a padded buffer's inner 8^3 voxels back.
 void store_inner(const float* in, float* leaf);
 
-/// Where the domain's boundary lies seen from a leaf; local voxel indices, inclusive.
+/// The domain's boundary relative to a leaf; local voxel indices, inclusive.
 struct LeafBounds {
     int lo[3], hi[3];
     LeafBounds(const Domain& domain, const Coord& origin);
-    /// The leaf or its halo sticks out of the domain.
+    /// Whether the leaf or its halo extends beyond the domain.
     [[nodiscard]] bool cuts() const;
     [[nodiscard]] bool contains(int i, int j, int k) const {
         return i >= lo[0] && i <= hi[0] && j >= lo[1] && j <= hi[1] && k >= lo[2] && k <= hi[2];

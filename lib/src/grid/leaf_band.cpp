@@ -19,7 +19,7 @@ std::uint64_t pack(const Coord& origin) {
     return field(origin.x()) << 42 | field(origin.y()) << 21 | field(origin.z());
 }
 
-/// Farther apart, two leaves would have one key.
+/// Leaves that are farther apart could have the same key.
 void require_packable(const std::vector<Coord>& origins) {
     constexpr std::int64_t kMax = 1 << 24;
     for (int a = 0; a < 3 && !origins.empty(); ++a) {
@@ -33,7 +33,7 @@ void require_packable(const std::vector<Coord>& origins) {
     }
 }
 
-constexpr std::size_t kNextKeys = 8;  // that are looked at before a search
+constexpr std::size_t kNextKeys = 8;  // that are checked before a binary search
 
 bool is_odd(const Coord& origin) { return ((origin.x() ^ origin.y() ^ origin.z()) >> 3) & 1; }
 
@@ -72,7 +72,7 @@ void LeafBand::index() {
     });
     tbb::parallel_sort(lookup_);
     neighbours_.resize(origins_.size());
-    // In the order of the keys, a leaf's neighbours follow those of the leaf before: nine places move on.
+    // In the order of the keys, a leaf's neighbours follow those of the previous leaf: nine positions advance.
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lookup_.size(), 256), [&](const auto& range) {
         std::array<std::size_t, 9> places{};
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
@@ -83,7 +83,7 @@ void LeafBand::index() {
     });
 }
 
-// @param place  in, out: of the first entry whose key is not below `key`; the search begins there
+// @param place  in, out: position of the first entry whose key is not below `key`; the search begins there
 std::int32_t LeafBand::find_from(std::size_t& place, std::uint64_t key) const {
     const auto is_below = [](const auto& entry, std::uint64_t k) { return entry.first < k; };
     const std::size_t end = lookup_.size(), last = std::min(place + kNextKeys, end);

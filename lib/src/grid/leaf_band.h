@@ -47,7 +47,7 @@ inline Coord neighbour_origin(const Coord& origin, int slot) {
 inline constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
                                       neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};
 
-/// The leaves of a band as flat arrays: where they are, who is next to whom, which voxels are active.
+/// The leaves of a band as flat arrays: their positions, neighbours and active voxels.
 ///
 /// Leaves are ordered by colour, the parity of I+J+K in leaf units, so that no two leaves of a colour share a face;
 /// within a colour they keep OpenVDB's order, which keeps neighbours close in memory. A missing neighbour is
@@ -103,15 +103,15 @@ private:
     std::vector<T, LargeAllocator<T>> values_;
 };
 
-/// Copies grid values (active and inactive) of every leaf; leaves that the grid lacks get the tile's value there.
+/// Copies grid values (active and inactive) of every leaf; leaves that the grid lacks get the value of the tile there.
 void import_values(const FloatGrid& grid, const LeafBand& band, LeafArray<float>& values);
 
 /// A grid with the band's leaves and active voxels and these values; inactive voxels take `values` too.
 [[nodiscard]] FloatGridPtr export_grid(const LeafBand& band, const LeafArray<float>& values, const Domain& domain,
                                        float background, const char* name);
 
-/// Leaves, sorted and unique, within `rings` leaves (26-neighbourhood) of the given ones, kept where they touch the
-/// domain.
+/// Leaves, sorted and unique, within `rings` leaves (26-neighbourhood) of the given ones, without those that do not
+/// touch the domain.
 [[nodiscard]] std::vector<Coord> dilate_leaves(const std::vector<Coord>& origins, int rings, const Domain& domain);
 
 /// The domain's voxels, both ends inclusive.

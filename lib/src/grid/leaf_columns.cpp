@@ -20,7 +20,7 @@ LeafMask face_of(int di, int dj, int dk) {
     return mask;
 }
 
-/// What lies across the face towards (di,dj,dk), in the neighbour's voxels.
+/// The neighbour's voxels that lie across the face towards (di,dj,dk) from voxels of `mask`.
 LeafMask across(const LeafMask& mask, int di, int dj, int dk) {
     LeafMask result{};
     if (di != 0) {
@@ -51,7 +51,7 @@ void spread(LeafMask& mask, const LeafMask& open) {
         std::uint64_t m = mask[i];
         if (i > 0) m |= mask[i - 1];
         if (i < 7) m |= mask[i + 1];
-        m &= open[i];  // before it goes on within the slice: else it would pass along edges
+        m &= open[i];  // before spreading within the slice: otherwise it would spread across edges
         for (std::uint64_t before = 0; before != m;) {
             before = m;
             m |= (m << 1 & ~kFirstInRow) | (m >> 1 & ~kLastInRow) | m << 8 | m >> 8;

@@ -8,8 +8,7 @@ namespace covol::detail {
 
 /// A band's leaves and the gaps between them, column by column along k: the whole space in O(leaves + columns) pieces.
 ///
-/// The columns span the whole domain, or the leaves' box, one leaf wider where it does not end at the domain's
-/// boundary.
+/// The columns span the whole domain, or the leaves' box, one leaf wider unless it ends at the domain's boundary.
 class LeafColumns {
 public:
     /// A leaf, or a run of leaf-sized blocks without a leaf. k in leaf units, half-open.
@@ -25,11 +24,11 @@ public:
 
     [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
     [[nodiscard]] std::int32_t piece_of_leaf(std::size_t leaf) const { return piece_of_leaf_[leaf]; }
-    /// The voxels of a piece, those outside the domain too.
+    /// The voxels of a piece, including those outside the domain.
     [[nodiscard]] CoordBBox voxels(const Piece& piece) const;
-    /// The piece that holds a voxel, -1 where it is outside of all columns.
+    /// The piece that contains a voxel, -1 outside of all columns.
     [[nodiscard]] std::int32_t find(const Coord& voxel) const;
-    /// The piece lies at the columns' outer faces: beyond is free space or the end of the domain.
+    /// Whether the piece lies at the columns' outer faces, beyond which there is free space or the end of the domain.
     [[nodiscard]] bool at_border(const Piece& piece) const;
 
     /// Calls visit(other, di, dj, dk) for each piece that shares a face with `piece`, (di,dj,dk) being the direction.
@@ -56,14 +55,15 @@ private:
     std::vector<std::int32_t> piece_of_leaf_;
 };
 
-/// The runs that are inside, given the inside voxels of the leaves: a run is where a leaf's voxel next to it is.
+/// The runs that are inside, given the inside voxels of the leaves: a run is inside if a leaf's voxel next to it is.
 /// @pre no interface passes between a leaf and a run.
 [[nodiscard]] std::vector<bool> inside_runs(const LeafColumns& columns, const std::vector<LeafMask>& inside);
 
 /// Spreads `mask` through the open voxels of its leaf, through faces.
 void spread(LeafMask& mask, const LeafMask& open);
 
-/// Calls visit(part) for each part of a leaf's mask that hangs together through faces, by their first voxels.
+/// Calls visit(part) for each part of a leaf's mask that is connected through faces, in the order of their first
+/// voxels.
 template <typename Visit>
 void for_each_part(LeafMask mask, Visit&& visit) {
     for (std::size_t word = 0; word < mask.size(); ++word)
@@ -76,13 +76,13 @@ void for_each_part(LeafMask mask, Visit&& visit) {
         }
 }
 
-/// What a flood has reached.
+/// The result of a flood fill.
 struct Flood {
     std::vector<LeafMask> leaves;  ///< by leaf
     std::vector<bool> pieces;      ///< by piece; of runs only
 };
 
-/// Floods the open voxels, through faces, from the columns' border and from the `seeds`.
+/// Flood fill of the open voxels, through faces, from the columns' border and from the `seeds`.
 /// @param open  by leaf; runs are open.
 [[nodiscard]] Flood flood(const LeafColumns& columns, const LeafBand& band, const std::vector<LeafMask>& open,
                           const CoordBBox& domain, const std::vector<Coord>& seeds);

@@ -10,10 +10,10 @@
 
 namespace covol::detail {
 
-/// The voxels of a leaf next to marked voxels in direction `axis` (0..2), `sign` (-1 or 1): bit p is set when the
-/// voxel p + sign * e_axis is marked. `mask` marks voxels of the leaf itself, `halo` those of the leaf next to it in
-/// that direction (pass an empty mask for either to leave it out).
-inline LeafMask looking_at(const LeafMask& mask, const LeafMask& halo, int axis, int sign) {
+/// The voxels of a leaf next to marked voxels in direction `axis` (0..2), `sign` (-1 or 1): bit p is set if the voxel p
+/// + sign * e_axis is marked. `mask` marks voxels of the leaf itself, `halo` those of the leaf next to it in that
+/// direction (an empty mask ignores either).
+inline LeafMask beside_marked(const LeafMask& mask, const LeafMask& halo, int axis, int sign) {
     constexpr std::uint64_t kFirstK = 0x0101010101010101ULL;  // voxels with k = 0
     constexpr std::uint64_t kLastK = kFirstK << 7;
     LeafMask result;
@@ -33,18 +33,18 @@ inline LeafMask looking_at(const LeafMask& mask, const LeafMask& halo, int axis,
     return result;
 }
 
-/// Spreads values over a band from voxel to face neighbour until nothing changes, in parallel.
+/// Propagates values over a band from voxel to face neighbour until nothing changes, in parallel.
 ///
-/// `relax(leaf, p, other, q)` lets voxel p of `leaf` look at its face neighbour q of the leaf `other` and returns
-/// whether p changed; it may write to `leaf` alone. A voxel is shown each neighbour that changed since it last looked.
-/// Leaves of one colour share no face, so that they run in parallel without races and every value depends on the order
-/// within leaves and of the two colours only: the same bits for any number of threads.
-/// @param changed  in: the voxels that start; out: empty masks.
-/// @return passes over the leaves.
+/// `relax(leaf, p, other, q)` updates voxel p of `leaf` from its face neighbour q in the leaf `other`, and returns
+/// whether p changed; it may only write to `leaf`. It is called for each neighbour that changed since the last update.
+/// Leaves of one colour share no face, so that they run in parallel without races, and every value depends only on the
+/// order within leaves and of the two colours: it is bit-identical for any number of threads.
+/// @param changed  in: the voxels to start from; out: empty masks.
+/// @return number of passes over the leaves.
 template <typename Relax>
 int propagate(const LeafBand& band, std::vector<LeafMask>& changed, const RunContext& run, const Relax& relax) {
     constexpr LeafMask kNone{};
-    std::vector<LeafMask> start = changed;  // of each leaf's own voxels, seen by the leaf itself in its first visit
+    std::vector<LeafMask> start = changed;  // of each leaf's own voxels, used by the leaf itself in its first visit
 
     const auto visit = [&](std::size_t leaf, const LeafMask& own) {
         LeafMask front = own, all = own;
@@ -56,7 +56,7 @@ int propagate(const LeafBand& band, std::vector<LeafMask>& changed, const RunCon
                     const std::int32_t across = band.neighbours(
                         leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
                     const LeafMask& halo = first && across != band.none() ? changed[across] : kNone;
-                    const LeafMask look = looking_at(front, halo, axis, sign);
+                    const LeafMask look = beside_marked(front, halo, axis, sign);
                     const int shift = axis == 0 ? 6 : axis == 1 ? 3 : 0;
                     for (int word = 0; word < 8; ++word)
                         for (std::uint64_t bits = look[word]; bits != 0; bits &= bits - 1) {

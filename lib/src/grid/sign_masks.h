@@ -22,19 +22,19 @@ inline std::uint64_t negative_slice(const float* v) {
     return bits;
 }
 
-/// The voxels of a leaf below zero.
+/// The voxels of a leaf with values below zero.
 inline LeafMask negative_mask(const float* values) {
     LeafMask mask;
     for (int word = 0; word < 8; ++word) mask[word] = negative_slice(values + 64 * word);
     return mask;
 }
 
-/// Voxels whose next voxel along an axis, in the same leaf, has the other sign.
+/// Voxels whose next voxel along an axis, within the leaf, has the other sign.
 inline LeafMask sign_changes(const LeafMask& negative, int axis) {
     constexpr LeafMask kRest{};
-    LeafMask changes = looking_at(negative, kRest, axis, 1);
+    LeafMask changes = beside_marked(negative, kRest, axis, 1);
     for (int word = 0; word < 8; ++word) changes[word] ^= negative[word];
-    // The last voxels along the axis have no next one here.
+    // The last voxels along the axis have no next one in the leaf.
     if (axis == 0) changes[7] = 0;
     for (std::uint64_t& word : changes)
         word &= axis == 1 ? ~std::uint64_t(0) >> 8 : axis == 2 ? 0x7f7f7f7f7f7f7f7fULL : ~0ULL;

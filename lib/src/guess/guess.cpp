@@ -21,7 +21,7 @@
 namespace covol {
 namespace {
 
-/// The options, and the faces at which the body is cut off, which need not lie along the world's axes.
+/// The options, and the faces at which the body is cut, which need not be parallel to the world's axes.
 struct InImage : GuessOptions {
     InImage(const GuessOptions& options, Clip clip) : GuessOptions(options), faces(std::move(clip)) {}
     Clip faces;
@@ -33,17 +33,17 @@ double longest(const std::array<Vec3, 3>& axes) {
     return maximum;
 }
 
-/// The standard deviation of a mark's place along a direction.
+/// The standard deviation of a mark's position along a direction.
 double deviation_along(const InImage& options, const Vec3& direction) {
     double sd = 0;
     for (const Vec3& a : options.deviation) sd = std::hypot(sd, dot(a, direction));
     return sd;
 }
 
-/// The face that a mark is so close to that it may lie in the cut, or null.
+/// The face that is so close to a mark that the mark may lie in the cut, or null.
 const HalfSpace* end_beside(const Vec3& mark, const InImage& options) {
     for (const HalfSpace& face : options.faces) {
-        // half a voxel from its centre to its end, and what the hand is off
+        // half a voxel from its centre to its end, and the error of marking
         const double near = 4 * deviation_along(options, face.normal);
         if (detail::along(face, mark) > -near) return &face;
     }
@@ -57,13 +57,13 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& o
     if (const double stated = longest(options.deviation); options.max_deviation > stated && stated > 0)
         result.max_factor = options.max_deviation * options.max_deviation / (stated * stated);
     result.world = options.faces;
-    if (options.normals.size() == marks.size()) result.normals = options.normals;  // none was left out
+    if (options.normals.size() == marks.size()) result.normals = options.normals;  // only if no mark was left out
     return result;
 }
 
-/// Adds those seeds to the constraints that lie on the wrong side, or on none: a little inside, or outside.
+/// Adds constraints at those seeds that do not lie on their side of the surface: slightly inside, or outside.
 /// @return whether there were any
-bool hold_seeds(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
+bool add_seed_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const double beyond = longest(options.deviation) / kUniformDeviation;
     bool any = false;
     const auto hold = [&](const std::vector<Vec3>& seeds, double side) {
@@ -79,17 +79,18 @@ bool hold_seeds(const guess::MarksSurface& surface, const InImage& options, gues
     return any;
 }
 
-/// Around the marks, as far as the world reaches.
+/// Positions around the marks, without those beyond the faces.
 std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const InImage& options) {
     std::vector<Vec3> places = guess::points_around(marks, times);
     std::erase_if(places, [&](const Vec3& place) { return detail::depth_in(options.faces, place) > 0; });
     return places;
 }
 
-/// Where the surface goes on far beyond its marks, places around them become constraints, outside by about their
-/// distance: marks that are few or rough leave surfaces of less energy that run through the world and never close.
+/// If the surface extends far beyond its marks, constraints are added around them, outside by about their distance to
+/// the marks: for few or rough marks there are surfaces of less energy that extend through the whole space and never
+/// close.
 /// @return whether it does
-bool hold_around(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
+bool add_outside_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const std::vector<Vec3> far = places_around(known.marks, kGuess.runs_on, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
     const detail::KdTree tree(known.marks);
@@ -114,10 +115,10 @@ std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& m
     return found;
 }
 
-/// Whether marks that lie around this one within the face's plane leave no way out.
+/// Whether the directions to other marks around this one, within the face's plane, leave no wide gap.
 bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
     const auto [u, v] = detail::directions_in(face);
-    std::vector<std::array<double, 2>> around;  // squared distance, direction
+    std::vector<std::array<double, 2>> around;  // squared distance, angle
     for (const Vec3& other : others) {
         const Vec3 to = minus(other, mark);
         const double x = dot(to, u), y = dot(to, v);
@@ -134,8 +135,8 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
     return gap < kGuess.way_out * std::numbers::pi;
 }
 
-/// Whether marks beside a face lie along a line around an area, not all over it: then they are the outline of the cut,
-/// whatever the others say.
+/// Whether marks beside a face lie on a line around an area and not all over it: then they are the outline of the cut,
+/// regardless of the other marks.
 bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     if (marks.size() < kGuess.min_outline) return false;
     const auto surrounded =
@@ -143,7 +144,7 @@ bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     return double(surrounded) < kGuess.surrounded_fraction * double(marks.size());
 }
 
-/// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.
+/// Depth of a mark in the body's section, measured within the plane of the cut: negative inside, positive outside.
 double within_section(const guess::MarksSurface& body, const Vec3& mark, const HalfSpace& cut, const InImage& options) {
     double slope = 0;
     for (const Vec3& direction : detail::directions_in(cut)) {
@@ -154,7 +155,7 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, const H
     return body.value(mark) / std::max(slope, kGuess.min_slope);
 }
 
-/// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
+/// Removes marks in the cut, inside the section of the body given by the other marks: the surface need not pass them.
 std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImage& options, const RunContext& run) {
     if (options.faces.empty()) return marks;
     std::vector<Vec3> sure, doubtful;
@@ -165,7 +166,7 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
     if (doubtful.empty() || sure.size() < kGuess.min_outline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kGuess.cut_rounds && held != before;
-         ++round) {  // those on its outline tell better where the section ends
+         ++round) {  // with marks on its outline the section's border is known better
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {
@@ -200,9 +201,9 @@ Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks
         report.marks = result.marks.size();
         report.cut_marks = marks.size() - result.marks.size();
         auto surface = std::make_unique<guess::MarksSurface>(known, run);
-        report.held_around = hold_around(*surface, options, known);
+        report.held_around = add_outside_constraints(*surface, options, known);
         if (report.held_around) surface = std::make_unique<guess::MarksSurface>(known, run);
-        for (int round = 0; round < kGuess.seed_rounds && hold_seeds(*surface, options, known); ++round)
+        for (int round = 0; round < kGuess.seed_rounds && add_seed_constraints(*surface, options, known); ++round)
             surface = std::make_unique<guess::MarksSurface>(known, run);
         report.patches = surface->patches();
         report.wrong_seeds = count_wrong(*surface, options);

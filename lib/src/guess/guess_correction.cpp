@@ -25,8 +25,8 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kSolved = 1e-6;        // of the right-hand side
-constexpr double kSteepestBump = 2.11;  // largest slope, of the height by the radius: Wendland's function has it
+constexpr double kSolved = 1e-6;        // relative to the right-hand side
+constexpr double kSteepestBump = 2.11;  // maximum slope of Wendland's function, in heights over radii
 constexpr int kMaxIterations = 1000;
 
 struct Bump {
@@ -34,7 +34,7 @@ struct Bump {
     double radius, height;
 };
 
-/// The signed distance to the guess, however far.
+/// The signed distance to the guess, without a limit.
 class FarDistance {
 public:
     FarDistance(const FloatGridPtr& guess, const std::vector<Vec3>& crossings)
@@ -46,11 +46,11 @@ public:
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
 
-    /// By how much more than the way between them the distances of two places may differ: near the surface they are
-    /// interpolated, elsewhere they are those to crossings.
+    /// By how much the distances of two positions may differ beyond the distance between them: near the surface they
+    /// are interpolated, elsewhere they are distances to crossings.
     [[nodiscard]] double slack() const { return exact_; }
 
-    /// The radius of the largest ball inside, to within the width of a leaf (8 voxels).
+    /// The radius of the largest ball inside, accurate to the width of a leaf (8 voxels).
     [[nodiscard]] double depth() const {
         double lowest = 0;
         const auto visit = [&](const openvdb::Coord& c) {
@@ -83,7 +83,7 @@ private:
     detail::KdTree surface_;
 };
 
-/// Where the edges of the lattice cross the surface, world units.
+/// The crossings of the lattice's edges with the surface, world units.
 std::vector<Vec3> find_crossings(const FloatGrid& guess) {
     std::vector<Vec3> points;
     const auto accessor = guess.getConstAccessor();
@@ -105,7 +105,7 @@ std::vector<Vec3> find_crossings(const FloatGrid& guess) {
     return points;
 }
 
-/// A place and how far out the surface has to move there.
+/// A position, and the distance by which the surface has to move outward there.
 struct Target {
     Vec3 at;
     double shift;
@@ -114,12 +114,12 @@ struct Target {
 /// Facets of a convex hull.
 using Facets = std::vector<HalfSpace>;
 
-/// Of a guess, and of what it is moved through: `marks` marks, and the seeds behind them.
+/// The hull of a guess and of the targets: `marks` marks, followed by the seeds.
 Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, std::size_t marks, double h) {
     for (std::size_t n = 0; n < targets.size(); ++n) {
         surface.push_back(targets[n].at);
         if (n < marks) continue;
-        // A seed has the surface beyond it, on every side.
+        // The surface lies beyond a seed, on all sides.
         for (int a = 0; a < 3; ++a)
             for (const int side : {-1, 1}) {
                 surface.push_back(targets[n].at);
@@ -129,7 +129,7 @@ Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, st
     return detail::convex_hull(surface);
 }
 
-/// Those that some place within `radius` has outside, or less than `depth` inside.
+/// The facets for which some position within `radius` lies outside, or less than `depth` inside.
 Facets find_near(const Facets& hull, const Vec3& center, double radius, double depth) {
     Facets near;
     std::copy_if(hull.begin(), hull.end(), std::back_inserter(near),
@@ -137,15 +137,15 @@ Facets find_near(const Facets& hull, const Vec3& center, double radius, double d
     return near;
 }
 
-/// The level after the bumps have moved the guess out by `move`: halfway between the bumps' own level and that of the
-/// hull of guess and marks where the bumps pass beyond the hull. Bumps by themselves inflate what is right beside a
-/// part that is missing, the hull alone has flat facets between the marks.
+/// The level after the bumps have moved the guess outward by `move`. If it extends beyond the hull of guess and marks,
+/// it is halfway between the level of the bumps and that of the hull: bumps alone inflate the correct surface beside a
+/// missing part, the hull alone has flat facets between the marks.
 double corrected_level(double guess, double move, const Facets& hull, const Vec3& world) {
     const double level = guess - move;
     return move > 0 ? std::max(level, 0.5 * (level + detail::depth_in(hull, world))) : level;
 }
 
-/// Whether that level is negative, found without the hull where the guess or the bumps alone decide.
+/// Whether that level is negative, without evaluating the hull if the guess or the bumps alone decide.
 bool comes_inside(double guess, double move, const Facets& hull, const Vec3& world) {
     const double level = guess - move;
     if (!(level < 0) || guess < 0) return level < 0;
@@ -168,7 +168,7 @@ double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     return sum;
 }
 
-/// Heights of equal bumps at the targets that give the wanted shifts, up to noise: (K + noise I) heights = shifts.
+/// Heights of equal bumps at the targets that give the requested shifts, up to noise: (K + noise I) heights = shifts.
 std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
     struct Entry {
         std::size_t column;
@@ -211,7 +211,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
     return x;
 }
 
-/// Adds bumps until the targets have their shifts, the farthest first.
+/// Adds bumps until the targets have their shifts, starting with the largest shifts.
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
     const auto radius_of = [&](double shift) {
@@ -239,8 +239,8 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
             ++now;
         }
         for (std::size_t n = 0; n + now < group.size(); ++n) group[n].shift -= sum_of(bumps, group[n].at);
-        // How far off the guess is where it is off: many marks that it meets are no reason to take another one for
-        // noise.
+        // The noise is relative to the size of the shifts, estimated by the ratio of moments so that many marks with
+        // small residuals do not make a large shift look like noise.
         const double noise = fourth > 0 ? precision * precision * square / fourth : 1.0;
         const std::vector<double> heights = solve(group, radius, noise);
         for (std::size_t n = 0; n < group.size(); ++n)
@@ -249,7 +249,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
     }
 }
 
-/// Those that reach the row of voxels (0..., j, k).
+/// The bumps that affect the row of voxels (0..., j, k).
 std::vector<Bump> beside(const std::vector<Bump>& bumps, const ImageGeometry& geometry, int j, int k) {
     const Vec3 origin = geometry.index_to_world({0, double(j), double(k)});
     std::vector<Bump> near;
@@ -282,13 +282,13 @@ struct GuessCorrection::Data {
     Data(const FloatGridPtr& start, const std::vector<Vec3>& surface) : grid(start), distance(start, surface) {}
     FloatGridPtr grid;
     FarDistance distance;
-    FloatGridPtr given;  ///< before it was redrawn; null: it was not
-    WorldBox redrawn{};  ///< beyond it `given` and `grid` are the same
-    Facets hull;         ///< of the guess, the marks and the seeds that act; empty where none of them is far
+    FloatGridPtr given;  ///< before it was redrawn; null if it was not
+    WorldBox redrawn{};  ///< outside of it `given` and `grid` are equal
+    Facets hull;         ///< of the guess, the marks and the active seeds; empty if no mark is far from the guess
     std::vector<Bump> bumps;
     CorrectionReport report;
 
-    /// The leaf after the correction; null where that changes nothing.
+    /// The leaf after the correction; null if it does not change.
     /// @param tree  of the guess, a signed distance that is clamped
     [[nodiscard]] std::unique_ptr<Leaf> corrected_leaf(const FloatGrid::TreeType& tree, const openvdb::Coord& origin,
                                                        const Domain& domain, double clamp) const;
@@ -307,7 +307,7 @@ std::unique_ptr<Leaf> GuessCorrection::Data::corrected_leaf(const FloatGrid::Tre
         near.push_back(b);
         slope += kSteepestBump * std::abs(b.height) / b.radius;
     }
-    // What the middle tells of the whole leaf, without the distances of all its voxels.
+    // Bounds for the whole leaf from its middle, without computing the distances of all its voxels.
     const double far = distance.at(middle), move = sum_of(near, middle);
     if (std::abs(far) - std::abs(move) > clamp + (1 + slope) * reach + distance.slack()) return nullptr;
     const Leaf* const before = tree.probeConstLeaf(origin);
@@ -381,7 +381,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
         std::vector<Target> targets = on_surface;
         std::vector<char> used(inside.size() + outside.size(), 0);
-        // Seeds act once they are on the wrong side.
+        // Seeds become active once they are on the wrong side.
         for (int round = 0; round < kCorrection.seed_rounds; ++round) {
             run.check();
             data->bumps.clear();
@@ -422,11 +422,11 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
     std::atomic<bool> broken = false;
     with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
         tbb::parallel_for(0, nk, [&](int k) {
-            std::size_t came = 0, went = 0, near = 0;
+            std::size_t added_here = 0, removed_here = 0, near = 0;
             std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
             for (int j = 0; j < nj; ++j) {
                 const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
-                double at_least = 0;  // from this voxel to the guess, as the voxels before tell
+                double at_least = 0;  // lower bound of the distance to the guess, from that of previous voxels
                 for (int i = 0; i < ni; ++i, ++value, at_least -= geometry.spacing[0]) {
                     const double old = mask.at(i, j, k);
                     if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
@@ -434,11 +434,11 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const Vec3 world = geometry.index_to_world({double(i), double(j), double(k)});
                     const double move = sum_of(bumps, world);
                     const bool is_redrawn = data_->given && holds(data_->redrawn, world);
-                    const bool is_still = move == 0 || std::abs(move) < at_least;  // the bumps change no side here
+                    const bool is_unchanged = move == 0 || std::abs(move) < at_least;  // the bumps change no side here
                     near += move != 0;
-                    if (is_still && !is_redrawn) continue;
+                    if (is_unchanged && !is_redrawn) continue;
                     bool was = false, in = false;
-                    if (is_still) {
+                    if (is_unchanged) {
                         in = detail::level_at(*data_->grid, world) < 0;
                     } else {
                         const double before = data_->distance.at(world);
@@ -451,15 +451,15 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     near += move == 0;
                     if (in && *value == 0) {
                         *value = label;
-                        ++came;
+                        ++added_here;
                     } else if (!in && *value == label) {
                         *value = 0;
-                        ++went;
+                        ++removed_here;
                     }
                 }
             }
-            added += came;
-            removed += went;
+            added += added_here;
+            removed += removed_here;
             reached += near;
         });
     });

@@ -21,7 +21,7 @@ Vec3 unit_or_x(const Vec3& v) {
     return size > 0 ? Vec3{v[0] / size, v[1] / size, v[2] / size} : Vec3{1, 0, 0};
 }
 
-/// The part of the marks with these numbers, with the variance along the normals where these are known.
+/// The selected marks, with the variance along their normals if these are known.
 Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const Normals& normals) {
     Constraints part;
     const double mean_variance = (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) +
@@ -57,7 +57,7 @@ double mean_value(const VariationalSurface& surface, const Constraints& part) {
     return weights > 0 ? sum / weights : 0.0;
 }
 
-/// Those nearest to one of them, itself first, by distance.
+/// Indices of the points nearest to one of them, sorted by distance, beginning with this point.
 std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to, std::size_t count) {
     std::vector<std::pair<double, std::size_t>> by_distance(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
@@ -69,14 +69,15 @@ std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to
     return chosen;
 }
 
-/// The share of their variance that marks have that fit each other better than was said.
+/// The fraction of the stated variance, for marks that fit each other better than stated.
 struct LikeliestVariance {
     double factor = 1;
-    std::unique_ptr<VariationalSurface> surface;  ///< with it
+    std::unique_ptr<VariationalSurface> surface;  ///< with that variance
 };
 
-/// What is enough to believe in another variance: exact marks are likelier by a factor of sqrt(kMarks.variance_step)
-/// each with a variance that is kMarks.variance_step times smaller; a step is taken where they show half of that.
+/// The gain in log likelihood that is required to change the variance. For exact marks, a variance that is
+/// kMarks.variance_step times smaller increases the likelihood of each by a factor of sqrt(kMarks.variance_step); a
+/// step requires half of that gain.
 double step_shows(double marks) { return 0.5 * 0.5 * marks * std::log(kMarks.variance_step); }
 
 LikeliestVariance likeliest_variance(const VariationalSurface& stated, const ImpreciseMarks& marks,
@@ -99,8 +100,8 @@ LikeliestVariance likeliest_variance(const VariationalSurface& stated, const Imp
     return best;
 }
 
-/// The share of their variance, at least 1, that marks likely have that fit each other worse than was said: of
-/// neighbourhoods, which are dense enough to tell what is imprecise from what is rough.
+/// The factor of the stated variance, at least 1, for marks that fit each other worse than stated. Computed on
+/// neighbourhoods, which are dense enough to distinguish imprecise marks from a rough surface.
 double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& normals, const RunContext& run) {
     const std::vector<std::size_t> centers = spread_out(marks.marks, kMarks.tried_parts);
     std::vector<std::vector<std::size_t>> near;
@@ -138,7 +139,7 @@ std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t
         for (std::size_t n = 0; n < points.size(); ++n)
             away[n] = std::min(away[n], detail::squared_distance(points[n], points[next]));
         next = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
-        if (!(away[next] > 0)) break;  // the rest are copies
+        if (!(away[next] > 0)) break;  // the remaining points are duplicates
     }
     return chosen;
 }
@@ -157,7 +158,7 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         return part;
     };
     const std::vector<std::size_t> few = spread_out(marks.marks, kMarks.oriented);
-    // Where about the normals point is known, no other directions are tried.
+    // If approximate normals are given, other directions are not tried.
     const bool is_known = !marks.normals.empty();
     const Search search = is_known ? Search::Near : Search::Wide;
     const VariationalSurface first(with_seeds(part_of(marks, few, marks.normals)),
@@ -265,7 +266,7 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
     std::vector<double> added(count, 0.0), weights(std::size_t(count), kMarks.whole_weight), part(count), w(count);
-    // The patches of all cells that the row passes, in order: the same sum however rows are cut.
+    // The patches of all cells that the row crosses, in order, so that the sum does not depend on how rows are split.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();
     for (int n = 0; n < count; ++n) {

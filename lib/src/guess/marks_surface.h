@@ -8,38 +8,38 @@
 
 namespace covol::guess {
 
-/// Where marks lie, and how well: their standard deviation along three directions, as world vectors.
+/// Positions of marks, and their standard deviation along three directions, as world vectors.
 struct ImpreciseMarks {
     std::vector<Vec3> marks;
     std::array<Vec3, 3> deviation{};
-    /// Of the deviation squared: how much less precise the marks may be than is said, where they fit each other so
-    /// badly.
+    /// Maximum factor of the squared deviation, for marks that fit each other worse than the deviation implies.
     double max_factor = 1;
-    std::vector<Vec3> seeds;  ///< places that are inside (value < 0) or outside
+    std::vector<Vec3> seeds;  ///< positions that are inside (value < 0) or outside
     std::vector<double> seed_value;
 
     Clip world;  ///< beyond its end nothing is known
 
-    std::vector<Vec3> normals;  ///< about, outwards: one for each mark, or none
+    std::vector<Vec3> normals;  ///< approximate, outward: one for each mark, or none
 
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };
 
-/// Numbers of `count` of the points, each as far from those before it as can be; fewer where the rest are copies.
+/// Indices of `count` of the points, each as far as possible from the previous ones; fewer if the others are
+/// duplicates.
 /// @pre there are points
 [[nodiscard]] std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count,
                                                   std::size_t first = 0);
 
-/// The surface of least energy through any number of marks: one VariationalSurface through all of them where they are
-/// few; else one through a spread-out part of them, and around each place another one through its neighbours, blended
-/// by weights that add up to one (partition of unity). What the whole knows, the side, is passed on to the parts; where
-/// there are no marks near the whole goes on alone.
+/// The surface of minimum energy through any number of marks: one VariationalSurface through all of them if they are
+/// few; else one through a spread-out subset, and around each position another one through its neighbours, blended by
+/// weights that sum to one (partition of unity). The whole determines the sides of the parts; far from all marks it is
+/// used alone.
 class MarksSurface {
 public:
     /// @throws Error as VariationalSurface.
     MarksSurface(const ImpreciseMarks& marks, const RunContext& run);
 
-    /// Values at from + n * step, n < count; about a distance beside the marks, negative inside.
+    /// Values at from + n * step, n < count; close to the marks about a distance, negative inside.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
     [[nodiscard]] double value(const Vec3& at) const;
     [[nodiscard]] std::size_t patches() const { return patches_.size(); }
@@ -47,8 +47,8 @@ public:
 private:
     struct Patch {
         Vec3 center;
-        double radius;             ///< the weight's support
-        VariationalSurface added;  ///< to the whole
+        double radius;             ///< support of the weight
+        VariationalSurface added;  ///< relative to the whole
     };
     void make_patches(const ImpreciseMarks& marks, const RunContext& run);
     void sort_patches();
@@ -56,9 +56,10 @@ private:
 
     std::unique_ptr<VariationalSurface> whole_;
     double offset_ = 0;
-    double variance_factor_ = 1;  // of the marks over what was said: less than 1 where they fit each other much better
+    double variance_factor_ =
+        1;  // estimated over stated variance; less than 1 if the marks fit much better than stated
     std::vector<Patch> patches_;
-    // A lattice of cells, each with the patches that reach into it.
+    // A lattice of cells, each with the patches that overlap it.
     Vec3 low_{0, 0, 0};
     double cell_ = 0;
     std::array<int, 3> cells_{0, 0, 0};

@@ -23,15 +23,15 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 using Point = Eigen::Vector3d;
 
-constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
+constexpr int kPolynomial = 4;  // 1, x, y, z: the null space of the energy
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
-constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
+constexpr double kAround[] = {1.15, 1.5};  // relative to the farthest mark
 
-/// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
-/// g^T H g + 2 c^T g + constant.
+/// Minimum-energy interpolation at fixed nodes: the energy of values v and gradients g is that of g^T H g + 2 c^T g +
+/// constant.
 class HermiteSystem {
 public:
-    /// @param nodes   unit ball; the first `marks` of them have a gradient, too
+    /// @param nodes   in the unit ball; the first `marks` of them also have a gradient
     /// @param lambda  of each node
     HermiteSystem(const std::vector<Point>& nodes, Index marks, const Vector& lambda)
         : values_(Index(nodes.size())), gradients_(3 * marks), size_(values_ + gradients_), matrix_(size_, size_) {
@@ -44,7 +44,7 @@ public:
         }
         for (Index i = 0; i < marks; ++i)
             for (int k = 0; k < 3; ++k) polynomials(values_ + 3 * i + k, 1 + k) = 1;
-        // Orthogonal to the polynomials the matrix is positive definite.
+        // On the orthogonal complement of the polynomials the matrix is positive definite.
         qr_.compute(polynomials);
         Matrix projected = qr_.householderQ().adjoint() * matrix_;
         projected = (projected * qr_.householderQ()).eval();
@@ -86,9 +86,10 @@ public:
     [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
 
 private:
-    /// The energy of gradients is |W g|^2, W = L^-1 (Q^T E)', where E has the gradients' unit vectors and ' leaves the
-    /// polynomials' rows out. Q^T E = E - V T^T V^T E in the compact form of its reflections, so that W = [0; S] - X Y:
-    /// S the inverse of the gradients' triangle of L, X = L^-1 V' and Y = T^T V^T E, which have four columns and rows.
+    /// The energy of gradients is |W g|^2, W = L^-1 (Q^T E)', where E contains the gradients' unit vectors and '
+    /// removes the polynomials' rows. Q^T E = E - V T^T V^T E in the compact form of its reflections, so that W = [0;
+    /// S] - X Y, with S the inverse of the gradients' triangle of L, X = L^-1 V' and Y = T^T V^T E, which have four
+    /// columns and rows.
     void whiten() {
         const Index rest = size_ - kPolynomial;
         Matrix reflections = qr_.matrixQR();
@@ -170,20 +171,20 @@ Vector unit_vectors(const Vector& y) {
     return unit;
 }
 
-/// Unit gradients of least energy near a first guess.
+/// Unit gradients of minimum energy near an initial value.
 struct Gradients {
     Vector unit;
     double energy = std::numeric_limits<double>::infinity();
-    bool closed = false;  ///< one sign all around the marks
+    bool closed = false;  ///< whether the sign is the same all around the marks
 };
 
-/// g^T H g + 2 c^T g, g the unit gradients.
+/// g^T H g + 2 c^T g, with g the unit gradients.
 struct EnergyProblem {
     const Matrix& H;
     const Vector& c;
 };
 
-/// The energy of the unit vectors along y, and its derivative by y.
+/// The energy of the unit vectors along y, and its derivative with respect to y.
 double energy_of(void* instance, const double* y_values, double* derivative, int size, double /*step*/) {
     const auto& problem = *static_cast<const EnergyProblem*>(instance);
     const Eigen::Map<const Vector> y(y_values, size);
@@ -212,7 +213,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     parameter.past = 5;
     parameter.delta = 1e-6;
     lbfgs(size, y, nullptr, energy_of, nullptr, &problem,
-          &parameter);  // its best point so far is of use whatever it says
+          &parameter);  // the best point so far is used regardless of the return value
     Gradients found;
     found.unit = unit_vectors(Eigen::Map<const Vector>(y, size));
     lbfgs_free(y);
@@ -220,7 +221,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     return found;
 }
 
-/// Less where the gradients lie along the axes.
+/// Reduces the energy of gradients along the axes.
 Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
     Matrix result = energy;
     const double mean = energy.trace() / double(energy.rows());
@@ -232,7 +233,7 @@ Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
     return result;
 }
 
-/// Approximate eigenvectors of the least eigenvalues: inverse iteration on a subspace.
+/// Approximate eigenvectors of the smallest eigenvalues: inverse iteration on a subspace.
 Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     const Index size = H.rows(), count = std::min<Index>(kVariational.subspace, size);
     Matrix shifted = H;
@@ -241,7 +242,7 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     Matrix space(size, count);
     space.col(0) = outward;
     for (Index j = 1; j < count; ++j)
-        for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // any vectors do
+        for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // arbitrary vectors
     for (int step = 0; step < kVariational.subspace_steps; ++step) {
         space = factor.solve(space).eval();
         space = (Eigen::HouseholderQR<Matrix>(space).householderQ() * Matrix::Identity(size, count)).eval();
@@ -270,9 +271,9 @@ Expansion expansion(const HermiteSystem& system, const Vector& values, const Vec
 
 using Inside = std::function<bool(const Point& in_unit_ball)>;
 
-/// Points on an ellipsoid about 0 around the first `marks` nodes, times its size.
+/// Points on an ellipsoid about 0 around the first `marks` nodes, scaled by `times`.
 std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks, double times) {
-    // Marks with a variance of 1 along each axis lie in a ball.
+    // After scaling to a variance of 1 along each axis the marks lie in a ball.
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (Index n = 0; n < marks; ++n)
         spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
@@ -281,7 +282,7 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     double reach = 0;
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
     std::vector<Point> points;
-    for (int n = 0; n < kVariational.directions; ++n) {  // a Fibonacci lattice
+    for (int n = 0; n < kVariational.directions; ++n) {  // Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kVariational.directions), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
         points.emplace_back(times * reach * (from_ball * direction));
@@ -289,7 +290,7 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     return points;
 }
 
-/// On ellipsoids around all marks, as far as the world reaches.
+/// On ellipsoids around all marks, without positions outside the world.
 bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
     constexpr double kNoStep[3] = {0, 0, 0};
     int positive = 0, count = 0;
@@ -304,7 +305,8 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
     return positive == 0 || positive == count;
 }
 
-/// From the centroid of each mark's nearest neighbours to the mark: across a tube or a sheet that many are wide around.
+/// From the centroid of each mark's nearest neighbours to the mark: the direction of the normal if these neighbours
+/// surround a tube or a sheet.
 Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double fraction) {
     const auto count = std::size_t(fraction * double(marks));
     Vector directions(3 * marks);
@@ -320,21 +322,22 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
     return directions;
 }
 
-/// Of first guesses, `known` ones among them unless there are none, the one that ends at the least energy. A body ends:
-/// where some ends have one sign all around, far from the marks, the others are no bodies.
+/// Starting from several initial values, including `known` ones if there are any, returns the result of minimum energy.
+/// Results with the same sign all around, far from the marks, are preferred, because only these bound a body.
 Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Vector& values, const Vector& c,
                      const std::vector<Point>& nodes, Index marks, const Vector& outward,
                      const std::vector<Vector>& known, const Inside& in_world) {
-    std::vector<Vector> guesses{outward};
-    guesses.insert(guesses.end(), known.begin(), known.end());
+    std::vector<Vector> initial_values{outward};
+    initial_values.insert(initial_values.end(), known.begin(), known.end());
     for (const double fraction : kLocalFractions)
         if (fraction * double(marks) >= kVariational.min_local)
-            guesses.push_back(away_from_neighbours(nodes, marks, fraction));
+            initial_values.push_back(away_from_neighbours(nodes, marks, fraction));
     const Matrix modes = flattest_modes(system.energy(), outward);
-    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k) guesses.push_back(modes.col(k));
-    std::vector<Gradients> ends(guesses.size());
-    tbb::parallel_for(std::size_t(0), guesses.size(), [&](std::size_t n) {
-        Gradients& end = ends[n] = descend(energy, c, guesses[n]);
+    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k)
+        initial_values.push_back(modes.col(k));
+    std::vector<Gradients> ends(initial_values.size());
+    tbb::parallel_for(std::size_t(0), initial_values.size(), [&](std::size_t n) {
+        Gradients& end = ends[n] = descend(energy, c, initial_values[n]);
         end.closed = has_one_sign_around(nodes, marks, expansion(system, values, end.unit, nodes), in_world);
     });
     Gradients best;
@@ -412,7 +415,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     Vector values = Vector::Zero(count), variance = Vector::Zero(count);
     for (Index n = 0; n < marks; ++n) variance[n] = given.variance[std::size_t(n)] / (radius_ * radius_);
     for (Index n = marks; n < count; ++n) values[n] = given.seed_value[std::size_t(n - marks)] / radius_;
-    Vector before = Vector::Zero(3 * marks);  // known gradients
+    Vector before = Vector::Zero(3 * marks);  // the known gradients
     for (Index n = 0; n < Index(given.known_value.size()); ++n) {
         values[n] = -given.known_value[std::size_t(n)] / radius_;
         before.segment<3>(3 * n) = to_point(given.known_gradient[std::size_t(n)]);
@@ -453,7 +456,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
         log_likelihood_ = -0.5 * (system.log_determinant() + system.freedom() * std::log(unit_amplitude));
     }
     amplitude_ = unit_amplitude / radius_;
-    // Without seeds nothing tells the sides apart but that the outside goes on for ever.
+    // Without seeds the outside is identified by being unbounded.
     if (given.seeds.empty() && search == Search::Wide) {
         double far = 0;
         for (int corner = 0; corner < 8; ++corner)

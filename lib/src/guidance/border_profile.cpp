@@ -13,10 +13,10 @@
 namespace covol::guidance {
 namespace {
 
-// beyond the border's own profile, as far as inside and outside are learnt
+// range beyond the border's own profile in which inside and outside are learnt
 constexpr int kFarSteps = 4 * kStepsPerVoxel;
 
-/// Gaussian blur of rows of `count` values that lie `stride` apart; ends keep their mass.
+/// Gaussian blur of `count` values with the given stride; the sum is preserved at the ends.
 void blur(double* values, int count, int stride, double sigma) {
     const int radius = int(std::ceil(2.5 * sigma));
     std::vector<double> out(count, 0.0), kernel(2 * radius + 1);
@@ -40,7 +40,7 @@ void BorderProfile::Counts::add(const Counts& other, double weight) {
 }
 
 BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::move(places)) {
-    // Levels hold equally many of the samples near the marks.
+    // Quantiles: each level holds equally many of the samples near the marks.
     std::vector<float> all;
     for (const MarkedPlace& place : places_) {
         const PatchProfile& p = place.profile;
@@ -100,17 +100,17 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 }
 
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
-    constexpr double kNothing = 1e-8;  // of a place
+    constexpr double kIgnoredWeight = 1e-8;  // weight difference that is ignored
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
-    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // all but a few have it
+    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // the usual weight
     Counts total = maximum > 0 ? all_ : Counts();
     for (std::size_t n = 0; n < counts_.size(); ++n)
-        if (std::abs(weights[n] - maximum) > kNothing) total.add(counts_[n], weights[n] - maximum);
+        if (std::abs(weights[n] - maximum) > kIgnoredWeight) total.add(counts_[n], weights[n] - maximum);
     return total;
 }
 
-/// Counts become probabilities, shrunk towards `base`, else inside and outside towards each other and the border
-/// towards the two.
+/// Converts counts to probabilities, shrunk towards `base`; without it inside and outside are shrunk towards a uniform
+/// distribution, and the border towards these two.
 void BorderProfile::normalise(Counts& c, const Counts* base) {
     const auto mix = [](double* values, const double* prior, double belief) {
         double total = 0;

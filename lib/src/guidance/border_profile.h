@@ -5,42 +5,43 @@
 
 namespace covol::guidance {
 
-/// Steps of a profile in a voxel of the image along the normal.
+/// Steps of a profile for each voxel of the image along the normal.
 inline constexpr int kStepsPerVoxel = 4;
-/// The border's own profile reaches so many steps to either side; beyond, depth does not matter.
+/// The border's own profile extends this many steps to either side; beyond it depth does not matter.
 inline constexpr int kBorderSteps = 10;
 inline constexpr int kDepths = 2 * kBorderSteps + 1;
-inline constexpr int kLevels = 24;  ///< of brightness
+inline constexpr int kLevels = 24;  ///< of intensity
 
-/// Brightness along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
+/// Intensity along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
 struct PatchProfile {
     int lo = 0, hi = -1;
-    bool image_ends_below = false, image_ends_above = false;  ///< why it is no longer: the border may lie beyond
+    bool image_ends_below = false, image_ends_above = false;  ///< limited by the image; the border may lie beyond
     int rows = 0;
     std::vector<float> values;  ///< row by row
-    std::vector<float> seen;    ///< [step][level]: how many rows have that level of brightness there
+    std::vector<float> seen;    ///< [step][level]: number of rows with that level of intensity there
     [[nodiscard]] int steps() const { return hi - lo + 1; }
     [[nodiscard]] bool empty() const { return rows == 0; }
 };
 
-/// A marked place: a profile and where in it the border is.
+/// A marked place: a profile and the position of the border in it.
 struct MarkedPlace {
     PatchProfile profile;
     double offset = 0;  ///< steps, from the patch outward
     Vec3 at{};
 };
 
-/// Logarithms of how often each level occurs at each depth (steps outward of the border), and far inside and outside.
+/// Logarithms of the frequency of each level at each depth (steps outward of the border), and far inside and outside.
 struct BorderTable {
     std::vector<float> border;           ///< [depth + kBorderSteps][level]
     std::vector<float> inside, outside;  ///< [level]
 
-    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), per voxel of the image, up to a constant;
-    /// mean over rows. An offset beyond the profile says that all of the profile lies on one side of the border.
+    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), for each voxel of the image, up to a
+    /// constant; mean over rows. An offset beyond the profile means that all of the profile lies on one side of the
+    /// border.
     void likelihood(const PatchProfile& profile, int first, std::vector<double>& out) const;
 };
 
-/// How often each level occurs at each depth around marked places; tables are drawn from some or all of them.
+/// Frequency of each level at each depth around marked places; tables are computed from some or all of these.
 class BorderProfile {
 public:
     explicit BorderProfile(std::vector<MarkedPlace> places);

@@ -8,9 +8,9 @@
 namespace covol::guidance {
 namespace {
 
-constexpr std::size_t kBlock = 1024;  // rows whose sums are one: what makes the bits independent of the threads
+constexpr std::size_t kBlock = 1024;  // rows of a partial sum: makes the result independent of the threads
 
-/// Calls visit(row) for each row, and sums what it returns.
+/// Calls visit(row) for each row, and sums the return values.
 template <typename Visit>
 double sum_over(std::size_t rows, std::vector<double>& sums, const Visit& visit) {
     sums.resize((rows + kBlock - 1) / kBlock);
@@ -24,7 +24,7 @@ double sum_over(std::size_t rows, std::vector<double>& sums, const Visit& visit)
     return total;
 }
 
-/// Of a symmetric matrix a row is a column.
+/// In a symmetric matrix a row equals its column.
 double row_times(const Eigen::SparseMatrix<double>& matrix, std::size_t row, const double* x) {
     const double* value = matrix.valuePtr();
     const int *other = matrix.innerIndexPtr(), *first = matrix.outerIndexPtr();

@@ -4,7 +4,8 @@
 
 namespace covol::guidance {
 
-/// half * diag(weight) * half, of a symmetric matrix. The product itself is never made: it has three times the entries.
+/// half * diag(weight) * half, of a symmetric matrix. The product itself is never formed: it has three times as many
+/// entries.
 class SquaredMatrix {
 public:
     /// @param half    symmetric
@@ -24,11 +25,11 @@ private:
     std::vector<double> weight_, diagonal_;
 };
 
-/// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, scaled by its diagonal (M. R. Hestenes
-/// and E. Stiefel 1952). The same bits for any number of threads.
+/// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, preconditioned by the diagonal (M. R.
+/// Hestenes and E. Stiefel 1952). The result is bitwise the same for any number of threads.
 /// @param matrix     positive definite with the diagonal
 /// @param diagonal   >= 0
-/// @param x          in: where to begin
+/// @param x          in: the initial value
 /// @param tolerance  of the residual, relative to the right-hand side
 void conjugate_gradients(const SquaredMatrix& matrix, const std::vector<double>& diagonal,
                          const std::vector<double>& right, double tolerance, std::vector<double>& x);

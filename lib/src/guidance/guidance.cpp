@@ -1,4 +1,4 @@
-// Image guidance: where, between the marks, the image shows the border that it shows at the marks.
+// Image guidance: finds between the marks the border with the same intensity profile as at the marks.
 #include "covol/guidance.h"
 
 #include <openvdb/openvdb.h>
@@ -34,7 +34,7 @@ constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
 
 double squared(double x) { return x * x; }
 
-/// A surface on its way from the guess to the target, and what is known of it.
+/// A surface on its way from the guess to the target, and the data about it.
 class Guide {
 public:
     /// @param guess  a start: a signed distance, clamped
@@ -49,7 +49,7 @@ public:
           h_(domain_.voxel_size),
           surface_(std::move(guess)) {}
 
-    /// False, with the reason in the report, where the image is of no use.
+    /// False, with the reason in the report, if the image is not usable.
     bool step(bool first) {
         run_.check();
         cut_surface();
@@ -78,12 +78,12 @@ private:
     void weigh(bool first);
     void move();
 
-    struct Word {
+    struct ValidationResult {
         double prior2, error2, response, slope2;
         std::vector<double> off2;  // by mark
     };
-    [[nodiscard]] Word cross_validate(const OffsetField& field, double prior) const;
-    [[nodiscard]] std::vector<double> local_error2(const Word& word) const;
+    [[nodiscard]] ValidationResult cross_validate(const OffsetField& field, double prior) const;
+    [[nodiscard]] std::vector<double> local_error2(const ValidationResult& validation) const;
     [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
         double sum = 0;
         for (std::size_t i = 0; i < by_patch.size(); ++i) sum += patches_.area[i] * by_patch[i];
@@ -101,25 +101,25 @@ private:
     FloatGridPtr start_;                    // the distance to the guess
     std::optional<WideDistance> distance_;  // to the surface
 
-    // of the guess
+    // about the guess:
     double guess2_ = 0;  // variance at the marks
-    double misfit_ = 0;  // 0: the marks' own errors explain their distances from the guess; 1: they do not
+    double misfit_ = 0;  // 0: the errors of the marks explain their distances from the guess; 1: they do not
     double prior_ = 0;   // chosen in the first iteration
     double sigma_ = 0;
 
-    // of this iteration, by patch
+    // about this iteration, by patch:
     Patches patches_;
     double area_ = 0, size_ = 0, spacing_ = 0, width_ = 0;
     std::vector<double> to_mark_, home_, offset_;
     std::vector<int> ranges_;
-    double broad_ = 0;  // deviation of a guess of which nothing is known but its marks
+    double broad_ = 0;  // deviation of a guess of which only the marks are known
     std::vector<OffsetEvidence> evidence_, held_out_;
     std::vector<std::size_t> nearest_;
 
     std::vector<PatchMark> on_;  // the marks on the surface
     double mark2_ = 0;           // their variance
     std::optional<SmoothImage> smooth_;
-    std::optional<Lesson> lesson_;
+    std::optional<LearntProfile> learnt_;
 };
 
 void Guide::cut_surface() {
@@ -131,7 +131,7 @@ void Guide::cut_surface() {
     for (const auto& t : mesh.triangles)
         volume += meshing::six_volumes({place(t[0]), place(t[1]), place(t[2])}, origin) / 6;
     area_ = std::accumulate(vertices.area.begin(), vertices.area.end(), 0.0);
-    size_ = 3 * std::abs(volume) / area_;  // a ball's radius
+    size_ = 3 * std::abs(volume) / area_;  // for a ball its radius
     const detail::KdTree tree(marks_);
     const auto cut = [&](double width) {
         width_ = width;
@@ -139,7 +139,7 @@ void Guide::cut_surface() {
         to_mark_.resize(patches_.size());
         tbb::parallel_for(std::size_t(0), patches_.size(),
                           [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
-        // Points spread at random with one in each s^2 are s / 2 away in the mean.
+        // If points are randomly spread with one in each s^2, the mean distance to them is s / 2.
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
     cut(kGuide.patch_width * h_);
@@ -161,7 +161,7 @@ bool Guide::place_marks(bool first) {
         }
         residual[m] = GridSampler(*distance_->grid(), domain_)(marks_[m]);
     });
-    // Marks of one patch are one mark; those far away mean another surface.
+    // The marks of one patch are combined; marks far away belong to another surface.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
     for (std::size_t m = 0; m < marks_.size(); ++m)
         if (std::abs(residual[m]) < (kGuide.width - 2) * h_) by_patch[patch[m]].push_back(m);
@@ -178,7 +178,7 @@ bool Guide::place_marks(bool first) {
             for (int a = 0; a < 3; ++a) mark.at[a] += fraction * marks_[m][a];
         }
         const double width = options_.mark_precision ? *options_.mark_precision / kUniformDeviation : patches_.voxel[i];
-        mark.deviation = width * std::sqrt(fraction / 12);  // of a uniform error
+        mark.deviation = width * std::sqrt(fraction / 12);  // standard deviation of a uniform error
         on_.push_back(mark);
     }
     if (on_.size() < kGuide.fewest_marks) {
@@ -194,7 +194,7 @@ bool Guide::place_marks(bool first) {
     }
     mark2_ = std::max(mark2_, squared(0.05 * h_));
     if (first) {
-        // A guess that takes up a share of the marks' errors leaves the rest as residuals.
+        // A guess that reproduces a part of the marks' errors leaves only the other part as residuals.
         guess2_ = std::max(std::abs(residual2 - mark2_), 0.1 * mark2_);
         misfit_ = std::clamp((residual2 - mark2_) / mark2_, 0.0, 1.0);
     }
@@ -216,7 +216,7 @@ void Guide::set_ranges() {
     if (options_.range) broad_ = std::min(broad_, 0.5 * *options_.range);
     ranges_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
-        // Marks are asked as any other place is, as if the guess were no better there.
+        // At marks the range is that of any other position, as if the guess were no better there.
         double range = std::max(reach[i], 2 * broad_);
         if (options_.range) range = std::min(range, *options_.range);
         range = std::min(range + std::abs(home_[i]), (kGuide.width - 2) * h_);
@@ -235,8 +235,8 @@ bool Guide::learn(const Scene& scene, bool first) {
         box.min[a] -= kGuide.width * h_;
         box.max[a] += kGuide.width * h_;
     }
-    lesson_.reset();
-    WorldBox later = box;  // the surface moves
+    learnt_.reset();
+    WorldBox later = box;  // with a margin for the movement of the surface
     for (int a = 0; a < 3; ++a) {
         later.min[a] -= kGuide.moves * h_;
         later.max[a] += kGuide.moves * h_;
@@ -246,17 +246,17 @@ bool Guide::learn(const Scene& scene, bool first) {
                                 ? std::move(*smooth_)
                                 : SmoothImage(image_, first ? later : box, sigma, run_);
         if (image.empty()) return;
-        Lesson lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
-        if (lesson_ && lesson.sure_gain() <= lesson_->sure_gain()) return;
+        LearntProfile lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
+        if (learnt_ && lesson.sure_gain() <= learnt_->sure_gain()) return;
         sigma_ = sigma;
-        lesson_.emplace(std::move(lesson));
+        learnt_.emplace(std::move(lesson));
         smooth_.emplace(std::move(image));
     };
     if (first)
         for (const double sigma : kSigmas) try_sigma(sigma * h_);
     else
         try_sigma(sigma_);
-    if (!lesson_) {
+    if (!learnt_) {
         report_.reason = "the guess lies outside of the image";
         return false;
     }
@@ -266,16 +266,16 @@ bool Guide::learn(const Scene& scene, bool first) {
         normals.push_back(patches_.directions[mark.patch]);
     }
     report_.feature = detect_feature(image_, places, normals, kGuide.sides * h_);
-    report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
-    report_.border = lesson_->brightness(0);
-    report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
-    if (!(lesson_->sure_gain() > 0)) {
+    report_.inside = learnt_->brightness(-2 * kStepsPerVoxel);
+    report_.border = learnt_->brightness(0);
+    report_.outside = learnt_->brightness(2 * kStepsPerVoxel);
+    if (!(learnt_->sure_gain() > 0)) {
         report_.reason = "what the image shows at some marks does not foretell the others";
         return false;
     }
     report_.sigma = sigma_;
-    report_.local = lesson_->local();
-    report_.gain = lesson_->gain();
+    report_.local = learnt_->local();
+    report_.gain = learnt_->gain();
     return true;
 }
 
@@ -285,17 +285,18 @@ void Guide::query(const Scene& scene) {
     held_out_.assign(count, {});
     nearest_.resize(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        Lesson::Answer answer = lesson_->query(scene, i, *smooth_);
+        LearntProfile::ProfileEvidence answer = learnt_->query(scene, i, *smooth_);
         evidence_[i] = std::move(answer.all);
         held_out_[i] = std::move(answer.held_out);
         nearest_[i] = answer.nearest;
     });
 }
 
-/// The field of an image learnt without the nearest mark, for a guess that may be off by `prior` anywhere: how far it
-/// errs at the marks, how much of a wave of the guess, two spacings long, it would undo, and how fast it leaves the
-/// guess with the distance from the marks. Errors are taken a standard error larger, and the last one smaller.
-Guide::Word Guide::cross_validate(const OffsetField& field, double prior) const {
+/// Cross-validates the image: the offsets at each mark are learnt without it, for a guess with a deviation of `prior`
+/// everywhere. Returns the error at the marks, the fraction of a wave of the guess, two spacings long, that the image
+/// would undo, and how fast the offsets grow with the distance from the marks. Errors are increased by a
+/// standard error, and the last value is reduced by a standard error.
+Guide::ValidationResult Guide::cross_validate(const OffsetField& field, double prior) const {
     const std::size_t count = patches_.size();
     const std::vector<double> none(count, 0.0), deviation(count, prior);
     std::vector<double> wave(count);
@@ -332,16 +333,17 @@ Guide::Word Guide::cross_validate(const OffsetField& field, double prior) const 
     return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2, std::move(each)};
 }
 
-/// The image's error by patch: of the marks around it, and as much as a few marks' worth, of all.
-std::vector<double> Guide::local_error2(const Word& word) const {
-    const double all = word.error2 + mark2_;
+/// The image's error by patch: that at the marks around it, averaged with that at all marks, which counts as a few
+/// marks.
+std::vector<double> Guide::local_error2(const ValidationResult& validation) const {
+    const double all = validation.error2 + mark2_;
     std::vector<double> result(patches_.size());
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
-        double sum = kGuide.belief_in_all * all, total = kGuide.belief_in_all;
+        double sum = kGuide.weight_of_all * all, total = kGuide.weight_of_all;
         for (std::size_t n = 0; n < on_.size(); ++n) {
             const double weight =
                 std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
-            sum += weight * word.off2[n];
+            sum += weight * validation.off2[n];
             total += weight;
         }
         result[i] = std::max(sum / total - mark2_, mark2_ * std::sqrt(2 / total));
@@ -349,31 +351,31 @@ std::vector<double> Guide::local_error2(const Word& word) const {
     return result;
 }
 
-/// Offsets between guess and image, by what each knows.
+/// Combines guess and image into offsets, weighted by their errors.
 void Guide::weigh(bool first) {
     const std::size_t count = patches_.size();
     const OffsetField field(patches_, std::max(spacing_, 4 * h_));
-    std::vector<double> distance2(count), least2(count), most2(count, std::numeric_limits<double>::infinity());
+    std::vector<double> distance2(count), min2(count), max2(count, std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < count; ++i) {
         distance2[i] = squared(to_mark_[i]);
         const double sagitta = distance2[i] / (2 * size_);
-        least2[i] = squared(kGuide.fraction_of_sagitta * sagitta);
-        if (options_.range) most2[i] = squared(std::min(sagitta, 0.5 * *options_.range));
+        min2[i] = squared(kGuide.fraction_of_sagitta * sagitta);
+        if (options_.range) max2[i] = squared(std::min(sagitta, 0.5 * *options_.range));
     }
-    std::vector<Word> words;
+    std::vector<ValidationResult> validations;
     if (first) {
-        do words.push_back(cross_validate(field, broad_ * std::pow(0.5, words.size())));
-        while (int(words.size()) < kGuide.priors && words.back().response >= kGuide.min_response);
+        do validations.push_back(cross_validate(field, broad_ * std::pow(0.5, validations.size())));
+        while (int(validations.size()) < kGuide.priors && validations.back().response >= kGuide.min_response);
     } else {
-        words.push_back(cross_validate(field, prior_));
+        validations.push_back(cross_validate(field, prior_));
     }
     double slope2 = 0;
-    for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
+    for (const ValidationResult& w : validations) slope2 = std::max(slope2, w.slope2);
     if (options_.error_slope) slope2 = std::min(slope2, squared(*options_.error_slope));
-    double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
-    if (options_.range) needed2 = std::min(needed2, guess2_ + mean(most2));
-    Word chosen = words.front();
-    for (const Word& w : words)
+    double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(min2));
+    if (options_.range) needed2 = std::min(needed2, guess2_ + mean(max2));
+    ValidationResult chosen = validations.front();
+    for (const ValidationResult& w : validations)
         if (w.response >= kGuide.min_response && w.prior2 >= needed2 &&
             w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
             chosen = w;
@@ -381,7 +383,7 @@ void Guide::weigh(bool first) {
 
     std::vector<double> guess2(count), deviation(count), zero(count, 0.0);
     for (std::size_t i = 0; i < count; ++i)
-        guess2[i] = guess2_ + std::min(std::max(slope2 * distance2[i], least2[i]), most2[i]);
+        guess2[i] = guess2_ + std::min(std::max(slope2 * distance2[i], min2[i]), max2[i]);
     const double mean2 = mean(guess2);
     const std::vector<double> error2 = local_error2(chosen);
     for (std::size_t i = 0; i < count; ++i)
@@ -398,7 +400,7 @@ void Guide::weigh(bool first) {
         if (fit.precision[i] * squared(deviation[i]) > 1 && fraction > 0.5) sure[i] = 1;
     }
     if (misfit_ > 0) {
-        // A guess that passes by its marks, such as another tool's, is drawn to them.
+        // A guess that does not pass its marks, such as that of another tool, is attracted to them.
         std::vector<double> rest(count, 0.0), precision(count, 0.0);
         for (const PatchMark& mark : on_) {
             rest[mark.patch] = mark.residual - offset_[mark.patch];
@@ -420,7 +422,7 @@ void Guide::weigh(bool first) {
     report_.mean_offset = mean(whole);
 }
 
-/// The distance to the surface less the offset of its nearest vertex.
+/// The distance to the surface minus the offset of its nearest vertex.
 void Guide::move() {
     const FloatGridPtr moved = distance_->less(on_vertices(patches_, width_, offset_));
     detail::drop_unmarked_pieces(*moved, marks_);

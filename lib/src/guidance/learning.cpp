@@ -16,8 +16,8 @@ namespace covol::guidance {
 namespace {
 
 constexpr int kBeyondRange = 3 * kStepsPerVoxel, kBeyondMark = 8 * kStepsPerVoxel;
-// An interpolated distance changes by at most sqrt(3) of the way, and where it is put together of two by a part of a
-// voxel.
+// Along a path an interpolated distance changes by at most sqrt(3) times its length, plus a fraction of a voxel at the
+// seam between its two parts.
 constexpr double kSteepest = 1.7320508, kSeam = 0.5;
 constexpr std::array<double, 6> kSharpness{0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr std::array<double, 4> kStray{0.02, 0.1, 0.25, 0.5};
@@ -44,7 +44,7 @@ OffsetEvidence density(const std::vector<double>& log_likelihood, double first, 
     return e;
 }
 
-/// Log-likelihoods of the offsets, and the first of them in steps; empty where the profile is too short.
+/// Log-likelihoods of the offsets, and the first offset in steps; empty if the profile is too short.
 struct Likelihood {
     int first = 0;
     std::vector<double> values;
@@ -61,7 +61,7 @@ Likelihood likelihood(const PatchProfile& profile, const BorderTable& table, int
     return l;
 }
 
-/// Weights of the places around `at`.
+/// Weights of the marked places around `at`.
 std::vector<double> around(const BorderProfile& profile, const Vec3& at, double radius) {
     std::vector<double> weights;
     for (const MarkedPlace& place : profile.places())
@@ -69,7 +69,7 @@ std::vector<double> around(const BorderProfile& profile, const Vec3& at, double 
     return weights;
 }
 
-/// The radius that holds `count` other places, in the median.
+/// The median radius that contains `count` other places.
 double neighbourhood(const BorderProfile& profile, int count) {
     std::vector<double> radii;
     for (const MarkedPlace& a : profile.places()) {
@@ -87,7 +87,7 @@ std::vector<MarkedPlace> places_of(const Scene& scene, const std::vector<PatchMa
     tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
         const PatchMark& mark = marks[n];
         places[n].profile = read_profile(scene, mark.patch, scene.ranges[mark.patch] + kBeyondMark, image);
-        // The border lies between the surface and the mark, by their errors.
+        // The border lies between the surface and the mark, according to their errors.
         const double surface2 = guess_deviation * guess_deviation;
         places[n].offset = mark.residual * surface2 / (surface2 + mark.deviation * mark.deviation) /
                            (scene.patches.voxel[mark.patch] / kStepsPerVoxel);
@@ -104,7 +104,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     const double step = p.voxel[patch] / kStepsPerVoxel, h = scene.domain.voxel_size;
     struct Row {
         int lo = 0, hi = 0;
-        float* values;  // of the middle
+        float* values;  // at step 0
     };
     const std::size_t longest = 2 * std::size_t(reach) + 1;
     std::vector<float> values(longest * (p.first[patch + 1] - p.first[patch]));
@@ -119,16 +119,17 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
         const SmoothImage::Line line = image.along(first, {step * normal[0], step * normal[1], step * normal[2]});
         if (!line.sample(0, row.values[0])) continue;
         for (const int side : {-1, 1}) {
-            int checked = 0;  // the last step before the next look at the distance
+            int checked = 0;  // last step that needs no further evaluation of the distance
             for (int s = 1; s <= reach; ++s) {
                 if (s > checked) {
                     const double away = s * step;
                     const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
                                   x[2] + side * away * normal[2]};
-                    // Beyond the middle of a gap or of the body another part of the surface is nearer.
-                    const double room = side * distance(at) - (kLearning.own_fraction * away - h);
-                    if (room < 0) break;
-                    checked = s + int(std::max(room - kSeam * h, 0.0) / ((kSteepest + kLearning.own_fraction) * step));
+                    // Beyond the middle of a gap or of the body another part of the surface is closer.
+                    const double margin = side * distance(at) - (kLearning.own_fraction * away - h);
+                    if (margin < 0) break;
+                    checked =
+                        s + int(std::max(margin - kSeam * h, 0.0) / ((kSteepest + kLearning.own_fraction) * step));
                 }
                 if (!line.sample(side * s, row.values[side * s])) {
                     ++(side < 0 ? ends_below : ends_above);
@@ -143,7 +144,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     }
     PatchProfile profile;
     if (rows.empty()) return profile;
-    // One stretch for all rows, or offsets could not be compared; those that are shorter are left out.
+    // The same range for all rows, so that offsets are comparable; shorter rows are omitted.
     profile.lo = int(median(lows));
     profile.hi = int(median(highs));
     profile.image_ends_below = 2 * ends_below > int(rows.size());
@@ -156,8 +157,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     return profile;
 }
 
-Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
-               double guess_deviation, double prior_deviation, double apart)
+LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
+                             double guess_deviation, double prior_deviation, double apart)
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
@@ -173,9 +174,9 @@ Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const Sm
     });
 }
 
-/// Foretells each mark by the profile of the others; keeps what does it better than what is there.
-void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
-                  bool local) {
+/// Predicts each mark from the profile of the others; replaces the current settings if these predict better.
+void LearntProfile::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
+                         bool local) {
     std::vector<BorderTable> tables(marks.size());
     std::vector<Likelihood> likelihoods(marks.size());
     tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
@@ -201,8 +202,8 @@ void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, doubl
             if (likelihoods[n].values.empty()) continue;
             const double step = scene.patches.voxel[marks[n].patch] / kStepsPerVoxel;
             const OffsetEvidence e = density(likelihoods[n].values, likelihoods[n].first * step, step, trust);
-            // The density of the mark: the border's, under prior and image, blurred by the mark's error; against the
-            // same without the image.
+            // The density of the mark: that of the border under prior and image, blurred by the mark's error, relative
+            // to the same density without the image.
             const double prior2 = prior_deviation * prior_deviation,
                          mark2 = std::pow(std::max(marks[n].deviation, 0.5 * step), 2);
             double mean, variance;
@@ -230,8 +231,9 @@ void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, doubl
     local_ = local;
 }
 
-Lesson::Answer Lesson::query(const Scene& scene, std::size_t patch, const SmoothImage& image) const {
-    Answer answer;
+LearntProfile::ProfileEvidence LearntProfile::query(const Scene& scene, std::size_t patch,
+                                                    const SmoothImage& image) const {
+    ProfileEvidence answer;
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t n = 0; n < profile_.places().size(); ++n) {
         const double squared = detail::squared_distance(profile_.places()[n].at, scene.patches.centers[patch]);
@@ -252,7 +254,7 @@ Lesson::Answer Lesson::query(const Scene& scene, std::size_t patch, const Smooth
     return answer;
 }
 
-double Lesson::brightness(int steps) const {
+double LearntProfile::brightness(int steps) const {
     std::vector<double> values;
     for (const MarkedPlace& place : profile_.places()) {
         const int at = int(std::lround(place.offset)) + steps;

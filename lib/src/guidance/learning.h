@@ -15,8 +15,8 @@ struct Scene {
     const Patches& patches;
     const FloatGrid& distance;  ///< to the surface, signed, in a wide band
     const Domain& domain;
-    const std::vector<int>& ranges;  ///< by patch: how far the border is looked for, steps
-    Vec3 shift{0, 0, 0};             ///< of the image's places against the surface's
+    const std::vector<int>& ranges;  ///< by patch: range in which the border is searched, steps
+    Vec3 shift{0, 0, 0};             ///< of positions in the image against the surface's
 };
 
 /// The marks in one patch.
@@ -27,34 +27,34 @@ struct PatchMark {
     double deviation = 0;  ///< of their own error along the normal
 };
 
-/// How far the image is believed.
+/// Reliability of the image.
 struct Trust {
-    double sharpness = 0;  ///< exponent of the likelihood: neighbouring samples are no independent ones
-    double stray = 1;      ///< share of places where the image does not follow the profile
+    double sharpness = 0;  ///< exponent of the likelihood, because neighbouring samples are not independent
+    double stray = 1;      ///< fraction of places at which the image does not follow the profile
 };
 
-/// What the image has at the marks, and how well it foretells them.
-class Lesson {
+/// The image's profiles at the marks, and how well they predict the marks.
+class LearntProfile {
 public:
     /// @param guess_deviation  of the surface at the marks
-    /// @param prior_deviation  of the surface anywhere: marks are foretold as if they lay at any other place
-    /// @param apart            marks nearer than this share what they have learnt
-    Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image, double guess_deviation,
-           double prior_deviation, double apart);
+    /// @param prior_deviation  of the surface anywhere: marks are predicted as if they lay at any other position
+    /// @param apart            marks closer together than this are left out together
+    LearntProfile(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
+                  double guess_deviation, double prior_deviation, double apart);
 
     [[nodiscard]] double gain() const { return gain_; }
-    /// Less its own standard error.
+    /// Minus its own standard error.
     [[nodiscard]] double sure_gain() const { return gain_ - gain_error_; }
     [[nodiscard]] bool local() const { return local_; }
 
-    struct Answer {
+    struct ProfileEvidence {
         OffsetEvidence all;       ///< learnt at all marks
         OffsetEvidence held_out;  ///< learnt without the nearest mark and those beside it
         std::size_t nearest = 0;  ///< mark
     };
-    [[nodiscard]] Answer query(const Scene& scene, std::size_t patch, const SmoothImage& image) const;
+    [[nodiscard]] ProfileEvidence query(const Scene& scene, std::size_t patch, const SmoothImage& image) const;
 
-    /// Median brightness at the marks so many steps outward.
+    /// Median intensity at the marks this many steps outward.
     [[nodiscard]] double brightness(int steps) const;
 
 private:
@@ -63,13 +63,13 @@ private:
 
     BorderProfile profile_;
     std::vector<BorderTable> tables_, held_out_;  // by place, or one for all; by place
-    double radius_ = 0;                           // in which a local profile is learnt
+    double radius_ = 0;                           // radius in which a local profile is learnt
     bool local_ = false;
     Trust trust_;
     double gain_ = 0, gain_error_ = 0;
 };
 
-/// Reads the profile of a patch as far as its surface is the nearest one and the image reaches.
+/// Reads the profile of a patch as far as its own surface is the nearest one, and within the image.
 [[nodiscard]] PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, const SmoothImage& image);
 
 }  // namespace covol::guidance

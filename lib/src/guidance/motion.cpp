@@ -1,4 +1,4 @@
-// A surface from one image of a time-lapse to the next one.
+// Transfers a surface from one image of a time-lapse to the next.
 #include "covol/motion.h"
 
 #include <openvdb/openvdb.h>
@@ -28,7 +28,7 @@ using namespace guidance;
 
 constexpr int kStepsOfSample = kStepsPerVoxel / 2;
 
-/// Mean brightness of a patch by steps outward of it.
+/// Mean intensity of a patch by steps outward of it.
 class Template {
 public:
     Template() = default;
@@ -86,20 +86,20 @@ private:
 
 }  // namespace
 
-/// What is known of a surface.
+/// Precomputed data of a surface.
 struct SurfaceTemplate::Data {
     FloatGridPtr given;
     double h = 1;
-    Domain domain;         ///< with room to move
-    FloatGridPtr surface;  ///< a start on it
+    Domain domain;         ///< with a margin for the movement
+    FloatGridPtr surface;  ///< the surface as a start on it
     Patches patches;
     std::optional<WideDistance> distance;
-    std::vector<int> window, range;   ///< by patch, steps: what is compared, and how far it may have moved
-    std::vector<Template> templates;  ///< by patch, of both
+    std::vector<int> window, range;   ///< by patch, steps: range that is compared, and range of the movement
+    std::vector<Template> templates;  ///< by patch, over both ranges
 
     Data(FloatGridPtr level_set, const Image& image, const RunContext& run);
     [[nodiscard]] WorldBox box(double around) const { return bounding_box(patches.places, around); }
-    /// @param shift  of the image's places against the surface's
+    /// @param shift  of positions in the image against the surface's
     [[nodiscard]] Template read(std::size_t i, const SmoothImage& image, const Vec3& shift) const {
         return Template(
             read_profile({patches, *distance->grid(), domain, range, shift}, i, window[i] + range[i], image));
@@ -126,7 +126,7 @@ SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const Ru
 
 namespace {
 
-/// A level in a wide band, moved by a part of a voxel along each axis.
+/// A level in a wide band, moved by a fraction of a voxel along each axis.
 FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
     FloatGridPtr result = level.deepCopy();
     if (part == Vec3{0, 0, 0}) return result;
@@ -140,7 +140,7 @@ FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
     return result;
 }
 
-/// A surface on its way into another image.
+/// The movement of a surface into another image.
 class Motion {
 public:
     Motion(const SurfaceTemplate::Data& known, const Image& image, const RunContext& run)
@@ -157,12 +157,12 @@ public:
     }
 
 private:
-    /// Mean squared differences of a patch from what it may have become, by offset.
+    /// Mean squared differences of a patch from the new image, by offset.
     struct Mismatch {
         int first = 0;  ///< offset, steps
         std::vector<double> squares;
         double minimum = std::numeric_limits<double>::infinity();  ///< of for_each_offset()
-        /// Calls visit(offset, square) at parts of a step: between steps goes a parabola.
+        /// Calls visit(offset, square) at fractions of a step, with parabolic interpolation between steps.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
             constexpr int kParts = 8;
@@ -179,9 +179,9 @@ private:
         }
     };
 
-    /// Of a patch's offset, by itself.
+    /// The offset of one patch, estimated without the others.
     struct Estimate {
-        double offset = 0, variance = 0;  ///< 0: nothing is known
+        double offset = 0, variance = 0;  ///< variance 0: unknown
     };
 
     void translate();
@@ -203,10 +203,10 @@ private:
     SmoothImage image_;
     Vec3 translation_{0, 0, 0};
     std::vector<double> offset_;  // by patch
-    Moments both_;                // brightness before and now, all along the surface
+    Moments both_;                // intensity before and now, all along the surface
 };
 
-/// 1 - correlation of the templates with the new image, shifted.
+/// 1 - correlation of the templates with the shifted new image.
 double Motion::mismatch(const Vec3& shift) const {
     const std::size_t every = patches_.size() / kMotion.max_patches + 1;
     std::vector<Moments> of_patch(patches_.size() / every + 1);
@@ -232,12 +232,12 @@ double Motion::mismatch(const Vec3& shift) const {
         all.add(of_patch[n]);
         expected += samples[n];
     }
-    // A shift out of the image is none.
+    // A shift that leaves the image is rejected.
     return all.count() < kMotion.min_seen * expected ? 2.0 : 1 - all.correlation();
 }
 
-/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), from steps as wide as a surface may move down to a fraction of
-/// a voxel.
+/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), with steps from half of the maximum movement down to a
+/// fraction of a voxel.
 void Motion::translate() {
     double best = mismatch(translation_);
     const double standing = best;
@@ -261,12 +261,12 @@ void Motion::translate() {
             translation_ = to;
             run_.check();
         }
-    // What noise gives is no motion.
+    // A small gain may result from noise alone.
     if (!(best < kMotion.min_gain * standing)) translation_ = {0, 0, 0};
 }
 
-/// Twice: an offset that is found is a few percent too short, for the places between the old surface and the new one
-/// look like neither.
+/// Matches in two passes: an estimated offset is a few percent too short, because the positions between the old surface
+/// and the new one resemble neither.
 void Motion::match() {
     offset_.assign(patches_.size(), 0.0);
     const OffsetField field(patches_, std::max(kMotion.alike * radius(), 4 * h_));
@@ -280,8 +280,8 @@ void Motion::match() {
         if (minimum.empty() || !(spread > 0)) return;
         const double noise = std::max(cloud::median(minimum), kMotion.min_noise * spread * spread);
         const std::vector<Estimate> seen = estimates(now, noise);
-        // Where brightness changes on one side of a place only, the mean of where it may have gone lies on the other,
-        // even if it is still there: that is the offset of nothing.
+        // If intensity changes on one side of a patch only, its estimated offset is biased towards the other side, even
+        // if it has not moved. The estimate for the unmoved template is this bias.
         const std::vector<Estimate> unmoved = estimates(of_itself, noise);
         std::vector<double> measured(offset_), precision(offset_.size(), 0.0);
         for (std::size_t i = 0; i < measured.size(); ++i) {
@@ -292,7 +292,7 @@ void Motion::match() {
     }
 }
 
-/// The offsets as a smooth field, and by expectation maximisation its deviation.
+/// Fits the offsets as a smooth field, and estimates its deviation by expectation maximisation.
 void Motion::fit(const OffsetField& field, const std::vector<double>& measured, const std::vector<double>& precision) {
     const std::size_t count = patches_.size();
     const std::vector<OffsetEvidence> none(count);
@@ -307,15 +307,16 @@ void Motion::fit(const OffsetField& field, const std::vector<double>& measured, 
             const double unknown = 1 / (1 / (deviation * deviation) + believed[i]), off = measured[i] - offset_[i];
             squares += patches_.area[i] * (offset_[i] * offset_[i] + unknown);
             area += patches_.area[i];
-            // Student's t with three degrees of freedom: some places have changed, and tell nothing.
+            // Student's t with three degrees of freedom: some places have changed, and are no valid measurements.
             believed[i] = precision[i] * 4 / (3 + off * off * precision[i]);
         }
         deviation = std::max(std::sqrt(squares / area), kMotion.finest_step * h_);
     }
 }
 
-/// Calls pair(brightness before, brightness later) for all that a patch has of both, moved by `offset` steps.
-/// @return false where that is less than half of what it had before
+/// Calls pair(intensity before, intensity later) for all samples that a patch has in both images, moved by `offset`
+/// steps.
+/// @return false if these are less than half of the samples before
 template <typename Pair>
 bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, const Pair& pair) const {
     const Template& was = known_.templates[i];
@@ -330,7 +331,7 @@ bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, con
     return both > 0 && 2 * both >= all;
 }
 
-/// The image along the surface, moved, in the brightness of before.
+/// The new image along the moved surface, scaled to the intensities of the previous one.
 std::vector<Template> Motion::read_now() {
     std::vector<Template> now(patches_.size());
     std::vector<Moments> best(now.size());
@@ -344,7 +345,7 @@ std::vector<Template> Motion::read_now() {
             if (both.correlation() > best[i].correlation()) best[i] = both;
         }
     });
-    // A lamp fades, a stain bleaches: one gain and one offset of brightness, where each patch fits best.
+    // Illumination varies and stains bleach: one gain and one offset of intensity, from the best match of each patch.
     both_ = {};
     for (const Moments& of_patch : best) both_.add(of_patch);
     const double gain = both_.deviation_y() > 0 ? both_.deviation_x() / both_.deviation_y() : 1.0;
@@ -379,7 +380,7 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
         if (m.squares.empty()) return;
         int seen = 0;
         for (int s = -known_.window[i]; s <= known_.window[i]; ++s) seen += known_.templates[i].has(s);
-        const double samples = double(seen) / kStepsPerVoxel;  // closer than a voxel they are one
+        const double samples = double(seen) / kStepsPerVoxel;  // samples closer than a voxel count as one
         double mass = 0, first = 0, second = 0;
         m.for_each_offset([&](double offset, double square) {
             const double weight = std::exp(-0.5 * samples * (square - m.minimum) / noise);
@@ -394,7 +395,7 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
     return result;
 }
 
-/// Of a ball of the surface's area and volume.
+/// Radius of a ball with the surface's ratio of volume to area.
 double Motion::radius() const {
     double area = 0, volume = 0;
     const Vec3& origin = patches_.centers.front();
@@ -422,8 +423,8 @@ Followed Motion::moved() const {
     const bool is_still = translation_ == Vec3{0, 0, 0} && !(report.max_offset > kMotion.still * h_);
     if (is_still) return result;
     const FloatGridPtr level = known_.distance->less(on_vertices(patches_, kGuide.patch_width * h_, offset_));
-    // Whole voxels are another place of the lattice, parts of one another value: linear interpolation would shrink what
-    // is convex, from frame to frame.
+    // Whole voxels shift the lattice and only the fraction is interpolated: linear interpolation would shrink convex
+    // shapes from frame to frame.
     Vec3 whole, part;
     for (int a = 0; a < 3; ++a) {
         whole[a] = std::round(translation_[a] / h_);

@@ -15,16 +15,16 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// Of the right-hand side, for conjugate gradients: the field's range is a few patches, so some ten iterations do for
-// any number of patches, where the work of a factorization grows with its 1.5th power (86,000 patches: 8 s to 0.07 s).
-// Incomplete factors take longer to make than they save. It is the choice between priors that wants so small a rest:
-// with 1e-5 another may win, and the surface of a spleen is 0.05 voxels elsewhere.
+// Relative residual for conjugate gradients. The field's range is a few patches, so that about ten iterations suffice
+// for any number of patches, whereas the work of a factorization grows with the power 1.5 (86,000 patches: 8 s to 0.07
+// s). Incomplete factors take longer to compute than they save. The choice between priors requires such a small
+// residual: with 1e-5 another may be chosen, and the surface of a spleen moves by 0.05 voxels.
 constexpr double kSolved = 1e-8;
 
 }  // namespace
 
-// A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise, on the
-// patches as finite volumes. Its variance is 1 / (4 pi kappa^2 tau^2).
+// A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise,
+// discretised by finite volumes on the patches. Its variance is 1 / (4 pi kappa^2 tau^2).
 OffsetField::OffsetField(const Patches& patches, double range) : patches_(patches) {
     const std::size_t count = patches.size();
     const double kappa = std::sqrt(8.0) / range;
@@ -78,7 +78,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     Fit result{mean, std::vector<double>(count, 0.0), {}};
     const bool requested =
         std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
-    // In units of the deviation: the field of unit variance.
+    // Offsets are divided by the deviation, so that the field has unit variance.
     const auto to_units = [&](std::vector<double> values) {
         for (std::size_t i = 0; i < count; ++i) values[i] /= deviation[i];
         return values;
@@ -89,21 +89,21 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     };
     std::vector<double> field = to_units(mean);
     const std::vector<double> pull = *precision_ * field;
-    std::vector<double> site(count, 0.0), believed(count), known(count, 0.0), right(count);
+    std::vector<double> site(count, 0.0), prior_precision(count), known(count, 0.0), right(count);
     for (int round = 0; round < (requested ? kOffsets.rounds : 1); ++round) {
-        // What the others say about a patch: the field's value there, the surer the more they know.
+        // The value of the field at a patch is the prediction from its neighbours; its precision grows with theirs.
         for (std::size_t i = 0; i < count; ++i) {
-            believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
+            prior_precision[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
             for (const std::uint32_t j : patches_.neighbours[i])
-                believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
+                prior_precision[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
         }
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
             if (evidence[i].density.empty()) return;
             double m, v;
             const double centre = result.offset[i];
-            moments(evidence[i], centre, 1 / believed[i], m, v);
-            const double gained = std::max(1 / v - believed[i], 0.0);
-            site[i] = gained > 0 ? (m / v - centre * believed[i]) / gained : 0;
+            moments(evidence[i], centre, 1 / prior_precision[i], m, v);
+            const double gained = std::max(1 / v - prior_precision[i], 0.0);
+            site[i] = gained > 0 ? (m / v - centre * prior_precision[i]) / gained : 0;
             result.precision[i] = gained;
         });
         for (std::size_t i = 0; i < count; ++i) {

@@ -8,28 +8,29 @@ namespace covol::guidance {
 
 class SquaredMatrix;
 
-/// Where a patch's border may be by the image: a density over offsets, relative to that of an image that says nothing.
+/// The position of a patch's border according to the image: a density over offsets, relative to that of an image
+/// without information.
 struct OffsetEvidence {
     double first = 0, step = 1;  ///< offsets first + n * step, world units
-    std::vector<float> density;  ///< mean 1; empty: nothing known
+    std::vector<float> density;  ///< mean 1; empty: unknown
 };
 
 /// A smooth random field of offsets on the patches, with the guess as its mean.
 class OffsetField {
 public:
-    /// @param range      over which offsets are alike
+    /// @param range      correlation length of the offsets
     /// @param deviation  by patch, prior standard deviation
     OffsetField(const Patches& patches, double range);
     ~OffsetField();
 
     struct Fit {
         std::vector<double> offset;
-        std::vector<double> precision;  ///< that the image gave, 1 / variance
-        std::vector<double> carried;    ///< how the offsets would follow a shift of the prior's mean
+        std::vector<double> precision;  ///< of the image's offset, 1 / variance
+        std::vector<double> carried;    ///< response of the offsets to a shift of the prior's mean
     };
     /// @param mean, deviation  the prior, by patch
     /// @param evidence         by patch
-    /// @param fixed, fixed_precision  what else is known (marks), by patch
+    /// @param fixed, fixed_precision  further known offsets (marks), by patch
     /// @param shift  of the prior's mean, for Fit::carried; may be null
     [[nodiscard]] Fit fit(const std::vector<double>& mean, const std::vector<double>& deviation,
                           const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,
@@ -40,7 +41,7 @@ private:
     std::unique_ptr<SquaredMatrix> precision_;  // of the field of unit variance
 };
 
-/// Mean and variance of a density times a normal one. @return its mass relative to the normal one's.
+/// Mean and variance of a density times a normal distribution. @return its mass relative to that of the normal one.
 double moments(const OffsetEvidence& evidence, double mean, double variance, double& new_mean, double& new_variance);
 
 }  // namespace covol::guidance

@@ -36,7 +36,8 @@ void smooth_normals(SurfaceVertices& surface, int rounds) {
     }
 }
 
-/// A cell of the image's lattice, and which way the surface faces: the two sides of a sheet are two patches.
+/// A cell of the image's lattice and the direction that the surface faces: the two sides of a sheet are separate
+/// patches.
 struct VertexKey {
     std::uint64_t ij, k_face;
     std::uint32_t vertex;
@@ -96,7 +97,7 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
         const double area =
             length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
         for (int c = 0; c < 3; ++c) {
-            // In a closed surface every edge leaves each of its ends in exactly one triangle.
+            // In a closed surface every directed edge belongs to exactly one triangle.
             surface.neighbours[fill[t[c]]++] = t[(c + 1) % 3];
             surface.area[t[c]] += area / 6;
         }
@@ -113,7 +114,7 @@ Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, doub
     for (int a = 0; a < 3; ++a) cell[a] = std::max(width / g.spacing[a], 1.0);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
         const Vec3 at = g.world_to_index(surface.places[v]);
-        std::array<std::uint64_t, 3> number;  // in order, negative ones first
+        std::array<std::uint64_t, 3> number;  // offset so that unsigned order is signed order
         for (int a = 0; a < 3; ++a)
             number[a] = std::uint32_t(std::int32_t(std::floor(at[a] / cell[a]))) ^ (std::uint32_t(1) << 31);
         int axis = 0;
@@ -156,7 +157,7 @@ Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, doub
 void find_borders(SurfaceVertices&& surface, Patches& p) {
     p.places = std::move(surface.places);
     p.normals = std::move(surface.normals);
-    // The border between two patches crosses the edges that join them, each about an edge's length of it.
+    // The border between two patches crosses the edges that join them; each contributes in proportion to its length.
     std::vector<std::tuple<std::uint32_t, std::uint32_t, float>> crossing;
     for (std::size_t v = 0; v < p.places.size(); ++v)
         for (std::uint32_t n = surface.first[v]; n < surface.first[v + 1]; ++n) {
@@ -169,7 +170,8 @@ void find_borders(SurfaceVertices&& surface, Patches& p) {
     for (const auto& [a, b, length] : crossing) {
         if (p.borders.empty() || p.borders.back().a != a || p.borders.back().b != b)
             p.borders.push_back({a, b, 0, std::sqrt(detail::squared_distance(p.centers[a], p.centers[b]))});
-        // Each edge was met from both ends; on a triangle lattice 1/sqrt(3) of its length is the border's.
+        // Each edge was counted from both ends; on a triangular lattice its part of the border is 1/sqrt(3) of its
+        // length.
         p.borders.back().length += 0.5 * length / std::sqrt(3.0);
     }
     p.neighbours.resize(p.size());

@@ -7,10 +7,10 @@
 
 namespace covol::guidance {
 
-/// A surface's vertices: what does not depend on how it is cut.
+/// A surface's vertices: the data that do not depend on how it is cut.
 struct SurfaceVertices {
     std::vector<Vec3> places, normals;
-    std::vector<double> area;                      ///< a third of the triangles around it
+    std::vector<double> area;                      ///< a third of the area of the triangles around it
     std::vector<std::uint32_t> first, neighbours;  ///< of vertex v neighbours[first[v] .. first[v+1]), each once
 };
 
@@ -18,14 +18,14 @@ struct SurfaceVertices {
 /// @param smooth  rounds of averaging of normals
 [[nodiscard]] SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth);
 
-/// A surface cut into patches about two voxels wide: what has one offset of its own.
+/// A surface cut into patches about two voxels wide, each with a single offset.
 struct Patches {
-    // by vertex
+    // by vertex:
     std::vector<Vec3> places, normals;
     std::vector<std::uint32_t> patch;
-    // by patch
+    // by patch:
     std::vector<std::uint32_t> first, members;  ///< patch p has the vertices members[first[p] .. first[p+1])
-    std::vector<Vec3> centers, directions;      ///< mean place, mean normal
+    std::vector<Vec3> centers, directions;      ///< mean position, mean normal
     std::vector<double> area;
     std::vector<double> voxel;  ///< the image's voxel along the normal, world units
     struct Border {
@@ -38,14 +38,14 @@ struct Patches {
     [[nodiscard]] std::size_t size() const { return centers.size(); }
 };
 
-/// By patch alone, without borders: a surface may be cut more than once before find_borders().
+/// Cuts into patches without computing borders, so that a surface may be cut more than once before find_borders().
 /// @param width   of the patches; at least one voxel of the image along each of its axes
 [[nodiscard]] Patches cut_patches(const SurfaceVertices& vertices, const ImageGeometry& geometry, double width);
 
-/// Fills borders and neighbours, and what is by vertex, from the vertices that were cut.
+/// Fills borders and neighbours, and the data by vertex, from the vertices that were cut.
 void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
-/// Values of patches as a smooth function on the vertices.
+/// Interpolates values of patches to a smooth function on the vertices.
 /// @param width  of the patches
 [[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
                                               const std::vector<double>& by_patch);

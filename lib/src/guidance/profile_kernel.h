@@ -1,5 +1,5 @@
 #pragma once
-// Arithmetic of profiles and of the image around them, eight values at a time.
+// Vectorised arithmetic for profiles and the image around them, eight values at a time.
 #include <cstddef>
 
 namespace covol::guidance {
@@ -10,7 +10,7 @@ namespace covol::guidance {
 /// sums += weight * values
 void add_weighted(double* sums, const double* values, double weight, std::size_t count);
 
-/// out[n] = Σ_k kernel[k] line[n + k], k < taps; what is written must not be read.
+/// out[n] = Σ_k kernel[k] line[n + k], k < taps; out must not overlap the inputs.
 void convolve(const float* line, const float* kernel, std::size_t taps, float* out, std::size_t count);
 
 }  // namespace covol::guidance

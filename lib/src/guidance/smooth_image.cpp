@@ -77,8 +77,8 @@ void SmoothImage::smooth(int axis, double sigma) {
         for (int n1 = 0; n1 < size_[a1]; ++n1) {
             float* base = values_.data() + n1 * stride1 + n2 * stride2;
             const auto at = [&](int n) { return base[std::size_t(std::clamp(n, 0, count - 1)) * stride]; };
-            // Beyond the end it goes on as it came: were its last value repeated, a body that grows inward from there
-            // would seem to be as wide at the end as it is a little before it.
+            // Beyond its end the image is continued by reflection about the last value: if that were repeated, a body
+            // that tapers towards the end would appear as wide at the end as a little before it.
             for (int n = -radius; n < count + radius; ++n)
                 line[n + radius] = n < 0        ? 2 * at(0) - at(-n)
                                    : n >= count ? 2 * at(count - 1) - at(2 * (count - 1) - n)

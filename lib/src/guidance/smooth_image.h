@@ -7,15 +7,15 @@
 
 namespace covol::guidance {
 
-/// A part of an image, smoothed, for fast interpolation anywhere in it.
+/// A smoothed part of an image, for fast interpolation anywhere in it.
 class SmoothImage {
 public:
-    /// @param box    world; what is sampled
-    /// @param sigma  Gaussian, world units: along axes whose voxels are longer it hardly smooths
-    /// @throws Error InvalidOptions when it takes more than run.memory_budget
+    /// @param box    world; the part that is sampled
+    /// @param sigma  Gaussian, world units: along axes with longer voxels it hardly smooths
+    /// @throws Error InvalidOptions if it takes more than run.memory_budget
     SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run = {});
 
-    /// Places at equal steps.
+    /// Positions at equal steps.
     class Line {
     public:
         /// False outside the image (half a voxel beyond its last centres).
@@ -27,12 +27,12 @@ public:
     private:
         friend SmoothImage;
         const SmoothImage* image_ = nullptr;
-        Vec3 first_{}, step_{};  // in indices of the part
+        Vec3 first_{}, step_{};  // as indices of the part
     };
     /// @param step  world
     [[nodiscard]] Line along(const Vec3& first, const Vec3& step) const;
     [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
-    /// Whether it is what the same image, this box and `sigma` would give, of this box or a wider one.
+    /// Whether it equals what the same image, this box and `sigma` would give, for this box or a wider one.
     [[nodiscard]] bool covers(const WorldBox& box, double sigma) const;
 
 private:
@@ -45,7 +45,7 @@ private:
     Matrix3 to_index_{};
     Vec3 offset_{};
     Index3 size_{0, 0, 0};       // of the part
-    Vec3 low_{}, high_{};        // of the image, in indices of the part
+    Vec3 low_{}, high_{};        // of the image, as indices of the part
     std::vector<float> values_;  // i fastest
 };
 

@@ -7,19 +7,19 @@
 
 namespace covol::guidance {
 
-/// The signed distance to a surface in a wide band: its own in the surface's band, beyond it that to the nearest
+/// The signed distance to a surface in a wide band: that of the start within its band, beyond it that to the nearest
 /// vertex.
 class WideDistance {
 public:
     /// @param start     a signed distance in a band of kHalfWidthVoxels, negative inside
-    /// @param vertices  world; of its mesh, about a voxel apart
+    /// @param vertices  of its mesh, world units, about a voxel apart
     /// @param width     of the band to either side, voxels
     WideDistance(const FloatGrid& start, const std::vector<Vec3>& vertices, const Domain& domain, double width,
                  const RunContext& run);
 
     [[nodiscard]] const FloatGridPtr& grid() const { return grid_; }
-    /// Less what is given for the nearest vertex: negative where the surface is once each part has moved that far
-    /// outward.
+    /// The distance minus the given value of the nearest vertex: its zero level set is the surface after each part has
+    /// moved outward by that value.
     [[nodiscard]] FloatGridPtr less(const std::vector<double>& by_vertex) const;
 
 private:

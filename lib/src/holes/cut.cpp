@@ -28,7 +28,7 @@ double squared_length(const Point& a, const Point& b) {
 
 bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCut.min_cosine * std::sqrt(dot(a, a) * dot(b, b)); }
 
-/// Moves vertices close to the line onto it; their value becomes 0 in any case.
+/// Moves vertices close to the line onto it; their value becomes 0 even if the move is undone.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
     std::vector<float> closest(values.size(), kCut.close);
     std::vector<Point> moved = vertices;
@@ -65,7 +65,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
     vertices = std::move(tried);
 }
 
-/// The triangles of the pieces.
+/// Divides triangles along the line.
 class Splitter {
 public:
     Splitter(const TriangleMesh& mesh, std::vector<float> values) : values_(std::move(values)) {
@@ -84,7 +84,7 @@ private:
         cut_.kept.push_back(kept);
     }
 
-    /// Of an edge that the line crosses.
+    /// The crossing of the line with an edge.
     std::uint32_t crossing(std::uint32_t a, std::uint32_t b) {
         if (a > b) std::swap(a, b);
         const auto [at, is_new] = crossings_.try_emplace({a, b}, std::uint32_t(cut_.mesh.vertices.size()));
@@ -98,7 +98,7 @@ private:
         const int signs = sign(t[0]) * sign(t[0]) + sign(t[1]) * sign(t[1]) + sign(t[2]) * sign(t[2]);
         const int sum = sign(t[0]) + sign(t[1]) + sign(t[2]);
         if (std::abs(sum) == signs) return add(t[0], t[1], t[2], sum > 0);
-        // The corner that is alone on its side, or on the line, comes first.
+        // Rotate such that the corner alone on its side, or on the line, comes first.
         const auto is_first = [&](const Triangle& c) {
             return signs == 2 ? sign(c[0]) == 0 : sign(c[0]) == -sign(c[1]) && sign(c[1]) == sign(c[2]);
         };
@@ -126,9 +126,9 @@ private:
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> crossings_;
 };
 
-/// Gives each fan of triangles around a vertex a vertex of its own.
-void part_fans(TriangleMesh& mesh) {
-    std::vector<std::vector<std::uint32_t>> around(mesh.vertices.size());  // corners 3 t + k
+/// Gives each fan of triangles around a vertex its own copy of the vertex.
+void separate_fans(TriangleMesh& mesh) {
+    std::vector<std::vector<std::uint32_t>> around(mesh.vertices.size());  // corners, 3 t + k
     for (std::uint32_t c = 0; c < 3 * mesh.triangles.size(); ++c) around[mesh.triangles[c / 3][c % 3]].push_back(c);
     const auto next = [&](std::uint32_t c, std::uint32_t by) { return mesh.triangles[c / 3][(c % 3 + by) % 3]; };
     const std::size_t count = around.size();
@@ -160,8 +160,8 @@ TriangleMesh kept_part(const CutMesh& cut) {
     TriangleMesh part{cut.mesh.vertices, {}, cut.mesh.origin};
     for (std::size_t t = 0; t < cut.kept.size(); ++t)
         if (cut.kept[t]) part.triangles.push_back(cut.mesh.triangles[t]);
-    part_fans(part);
-    remove_small_components(part, 0);  // vertices that nothing refers to
+    separate_fans(part);
+    remove_small_components(part, 0);  // removes unused vertices
     return part;
 }
 

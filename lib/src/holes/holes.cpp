@@ -18,7 +18,7 @@
 namespace covol {
 namespace {
 
-// nearest neighbour of points spread evenly at random, their spacing being 1 / sqrt(density)
+// 95th percentile of the distance to the nearest neighbour for evenly random points, in spacings of 1 / sqrt(density)
 constexpr double kP95OfSpacing = 0.976;
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -27,7 +27,7 @@ double area_of(const TriangleMesh& mesh, const Triangle& t) {
     return meshing::area(mesh.place(t[0]), mesh.place(t[1]), mesh.place(t[2]));
 }
 
-/// Diffusion over the mesh: a Gaussian of standard deviation `width`, nearly, where triangles are even.
+/// Diffusion over the mesh: approximately a Gaussian of standard deviation `width` if the triangles are even.
 void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) {
     std::vector<std::uint32_t> count(values.size(), 0);
     double squares = 0;
@@ -36,7 +36,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
             count[t[k]] += 2;
             squares += detail::squared_distance(mesh.place(t[k]), mesh.place(t[(k + 1) % 3]));
         }
-    // A step adds half of a mean squared edge, times kHoles.step, to the variance along each axis.
+    // Each step adds half the mean squared edge, times kHoles.step, to the variance along each axis.
     const double variance = 0.5 * kHoles.step * squares / double(3 * mesh.triangles.size());
     const auto steps = int(std::ceil(width * width / variance));
     std::vector<float> sums(values.size());
@@ -49,7 +49,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
     }
 }
 
-/// Vertices that triangles of one kind join.
+/// Vertices connected by triangles of one kind.
 detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     detail::DisjointSets parts(cut.mesh.vertices.size());
     for (std::size_t t = 0; t < cut.kept.size(); ++t) {
@@ -60,8 +60,8 @@ detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     return parts;
 }
 
-/// The triangles that go, and those that stay: what a ball of the distance's radius does not reach whose middle is
-/// where points are missing.
+/// Finds the triangles to be removed and those to be kept: kept are those that no ball of radius `distance` around a
+/// bare position reaches.
 class HoleFinder {
 public:
     HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)
@@ -85,7 +85,8 @@ public:
     }
 
 private:
-    /// Where the mesh is farther from the points, and the line around that.
+    /// The positions farther than the distance from all points: vertices, and the points at which edges cross that
+    /// distance.
     [[nodiscard]] std::vector<Vec3> bare_places() const {
         const auto far = float(distance_);
         std::vector<Vec3> places;
@@ -103,7 +104,7 @@ private:
         return places;
     }
 
-    /// Distance from the places, less the reach, between plus and minus that; smoothed.
+    /// Distance from the bare positions minus the reach, limited to plus or minus the reach; smoothed.
     [[nodiscard]] std::vector<float> from(const std::vector<Vec3>& bare) const {
         std::vector<float> values(to_points_.size(), float(reach_));
         if (bare.empty()) return values;
@@ -117,7 +118,7 @@ private:
         return values;
     }
 
-    /// Of those that end at a hole. @return how many
+    /// Removes small kept pieces that border a hole. @return how many
     std::size_t drop_small(holes::CutMesh& cut) const {
         detail::DisjointSets parts = parts_of(cut, true);
         std::vector<char> ends(cut.mesh.vertices.size(), 0);
@@ -199,7 +200,7 @@ double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float
 }
 
 std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
-    // Sides without a partner, by their first vertex.
+    // Sides of only one triangle, by their first vertex.
     std::vector<std::pair<std::uint32_t, std::uint32_t>> sides;
     for (const Triangle& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) sides.emplace_back(t[k], t[(k + 1) % 3]);
@@ -244,7 +245,7 @@ TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
         for (std::size_t t = 0; t < cut.kept.size(); ++t)
             if (cut.kept[t])
                 for (const std::uint32_t v : cut.mesh.triangles[t]) fixed[v] = 1;
-        // A piece without any points hangs at nothing: it goes.
+        // A patch without a border to kept triangles cannot be spanned: it is removed.
         detail::DisjointSets patches = parts_of(cut, false);
         for (std::uint32_t v = 0; v < fixed.size(); ++v)
             if (fixed[v]) spans[patches.root(v)] = 1;
@@ -253,7 +254,7 @@ TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
         for (std::uint32_t v = 0; v < fixed.size(); ++v) fixed[v] = fixed[v] || !spans[patches.root(v)];
         holes::span_membrane(cut.mesh, fixed, run);
         result = std::move(cut.mesh);
-        remove_small_components(result, 0);  // vertices that nothing refers to
+        remove_small_components(result, 0);  // removes unused vertices
     });
     report.policy = Holes::Flat;
     return treated;

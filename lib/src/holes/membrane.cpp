@@ -14,7 +14,7 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Between the sides of a corner.
+/// Cotangent of the angle between two sides; 0 if they are parallel.
 double cotangent(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
     const double across = u.cross(v).norm();
     return across > 1e-12 * u.norm() * v.norm() ? u.dot(v) / across : 0;
@@ -43,7 +43,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                 if (fixed[a] && fixed[b]) continue;
                 const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
                                       v = at.row(b).transpose() - tip;
-                // At first all edges are springs: that spreads the vertices of a bulge over what it is to become.
+                // At first, all edges have the same weight: that distributes the vertices of a bulge over the future
+                // surface.
                 const double w =
                     round == 0 ? 1 : std::clamp(cotangent(u, v), kMembrane.min_weight, kMembrane.max_weight);
                 edges += (u - v).norm();

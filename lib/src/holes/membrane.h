@@ -1,5 +1,5 @@
 #pragma once
-// The surface of least area between given vertices.
+// The surface of minimum area between given vertices.
 #include <vector>
 
 #include "covol/mesh.h"
@@ -7,9 +7,9 @@
 
 namespace covol::holes {
 
-/// Moves the vertices that are not fixed so that the area gets least: each becomes the mean of its neighbours, weighted
-/// by the cotangents of the angles opposite to the edges, solved for all at once, again and again (Pinkall and Polthier
-/// 1993).
+/// Moves the free vertices such that the area becomes minimal: repeatedly solves for all positions at once such that
+/// each is the mean of its neighbours, weighted by the cotangents of the angles opposite to the edges (Pinkall and
+/// Polthier 1993).
 /// @pre each connected part of free vertices has a fixed neighbour
 void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const RunContext& run);
 

@@ -7,8 +7,8 @@
 
 namespace covol::detail {
 
-/// The plain surface of a level set, measured, and which share of its area lies farther than `distance` from every
-/// point: measure_fraction_beyond() of a mesh that is never held.
+/// The measures of a level set's plain surface, and the fraction of its area that is farther than `distance` from all
+/// points: like measure_fraction_beyond(), but without holding the mesh in memory.
 struct BeyondPoints {
     StreamedMesh mesh;
     double fraction = 0;

@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-/// Sheared axes are well, but not ones that lie in a plane. @throws Error Unsupported.
+/// Sheared axes are accepted, but not axes that lie in a plane. @throws Error Unsupported.
 void check_direction(const std::string& where, const ImageGeometry& g) {
     constexpr double kTolerance = 1e-3, kMinVolume = 0.05;
     const Matrix3& d = g.direction;

@@ -5,7 +5,8 @@
 
 namespace covol::detail {
 
-/// @throws Error InvalidInput, Unsupported unless numbers hold the lattice well, and its axes are perpendicular.
+/// @throws Error InvalidInput, Unsupported unless floating-point numbers represent the lattice accurately, and its axes
+/// are linearly independent.
 void check_geometry(const std::string& where, const ImageGeometry& g);
 
 }  // namespace covol::detail

@@ -13,23 +13,23 @@
 namespace covol {
 namespace {
 
-/// Voxels of the finest level along an axis for one of a coarser level; 0: no whole number.
+/// Number of voxels of the finest level for one of a coarser level along an axis; 0 if it is not an integer.
 std::int32_t factor_along(const ImageGeometry& finest, const ImageGeometry& coarse, std::size_t a) {
     constexpr double kSame = 1e-3;
     const double by_spacing = coarse.spacing[a] / finest.spacing[a];
     const double by_size = double(finest.size[a]) / coarse.size[a];
     const auto fits = [&](double factor) {
-        // The last voxel may lack some fine ones, or leave some over.
+        // The last coarse voxel may cover fewer fine ones, or some fine ones may not be covered.
         return factor >= 1 && std::abs(finest.size[a] - factor * coarse.size[a]) <= factor;
     };
     const double factor = std::round(by_spacing);
     if (std::abs(by_spacing - factor) < kSame * factor && fits(factor)) return std::int32_t(factor);
-    // Files that state no spacing.
-    const double guess = std::exp2(std::round(std::log2(by_size)));
-    return coarse.spacing[a] == finest.spacing[a] && fits(guess) ? std::int32_t(guess) : 0;
+    // For files that do not state the spacing.
+    const double factor_by_size = std::exp2(std::round(std::log2(by_size)));
+    return coarse.spacing[a] == finest.spacing[a] && fits(factor_by_size) ? std::int32_t(factor_by_size) : 0;
 }
 
-/// Copies `part` of a chunk into `box`, dense.
+/// Copies `part` of a chunk into the contiguous `box`.
 void copy_values(const detail::ChunkSource& source, const VoxelBox& part, const char* chunk, const VoxelBox& box,
                  float* out) {
     detail::with_pixel_type(source.type(), [&](auto pixel) {
@@ -98,10 +98,10 @@ void ImageLevels::copy(std::size_t level, const VoxelBox& box, float* out, const
     run.check();
 }
 
-/// What the image looks like at large: all of its coarsest level, or blocks of it.
+/// A sample of the image's values: all of its coarsest level, or blocks of it.
 std::vector<float> ImageLevels::overview(const RunContext& run) const {
     constexpr std::uint64_t kMaxVoxels = std::uint64_t(16) << 20;
-    constexpr int kPlaces = 3, kBlock = 64;  // blocks along each axis, and voxels of one
+    constexpr int kPlaces = 3, kBlock = 64;  // number of blocks along each axis, and their size in voxels
     const std::size_t level = levels_.size() - 1;
     const Index3& size = levels_[level].size;
     std::vector<float> values;
@@ -119,7 +119,7 @@ std::vector<float> ImageLevels::overview(const RunContext& run) const {
         VoxelBox box;
         for (std::size_t a = 0; a < 3; ++a) {
             const auto middle = std::int32_t((2 * at[a] + 1) * std::int64_t(size[a]) / (2 * kPlaces));
-            // Within one chunk, so that no more of them are decoded than there are places.
+            // Each block is within one chunk, so no more chunks are decoded than there are blocks.
             const std::int32_t chunk = sources_[level]->chunk_size()[a], first = middle / chunk * chunk;
             box.min[a] = std::max(first, middle - kBlock / 2);
             box.max[a] = std::min({first + chunk, box.min[a] + kBlock, size[a]}) - 1;

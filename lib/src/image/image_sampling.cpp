@@ -1,4 +1,4 @@
-// Images on other lattices.
+// Resampling of images on other lattices.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 struct LatticeMap {
     Matrix3 matrix{};
     Vec3 offset{};
-    std::array<int, 3> image_axis{-1, -1, -1};  ///< the one image axis that moves with a frame axis, where separable
+    std::array<int, 3> image_axis{-1, -1, -1};  ///< if separable, the only image axis that changes along a frame axis
     bool separable = true;
 };
 
@@ -41,11 +41,11 @@ LatticeMap map_lattice(const ImageGeometry& geometry, const Domain& frame) {
 /// Linear interpolation along one axis: (1-weight) * data[offset] + weight * data[offset + step].
 struct Tap {
     std::int64_t offset = 0;
-    std::int64_t step = 0;  ///< 0 where the position is a voxel's centre, or outside
+    std::int64_t step = 0;  ///< 0 if the position is a voxel's centre, or outside
     double weight = 0;
 };
 
-/// The image's axes: how many voxels, the first that is held, and how far apart they lie in memory.
+/// An axis of the image: number of voxels, index of the first one in memory, and their distance in memory.
 struct Axis {
     std::int32_t size = 0;
     std::int32_t first = 0;
@@ -53,7 +53,7 @@ struct Axis {
 };
 using Lattice = std::array<Axis, 3>;
 
-// Lattices that should coincide differ by the rounding of a file's spacing.
+// Lattices that should coincide may differ by the rounding of a file's spacing.
 constexpr double kSame = 1e-4;
 
 Tap make_tap(double position, const Axis& axis) {
@@ -66,7 +66,7 @@ Tap make_tap(double position, const Axis& axis) {
     return {offset, axis.stride, weight};
 }
 
-/// What interpolation is computed in: single precision where it holds every value of T.
+/// Type for interpolation: single precision if it represents every value of T.
 template <typename T>
 using Work = std::conditional_t<sizeof(T) <= 2 || std::is_same_v<T, float>, float, double>;
 
@@ -83,7 +83,7 @@ Work<T> interpolate(const T* data, const Tap& x, const Tap& y, const Tap& z) {
     return z.step == 0 ? first : first + W(z.weight) * (along_xy(p + z.step) - first);
 }
 
-/// Every frame axis moves along one image axis: taps are made once per axis.
+/// If every frame axis changes only one image axis, taps are computed once per axis.
 template <typename T>
 void sample_separable(const T* data, const Lattice& image, const LatticeMap& map, const Index3& min, const Index3& max,
                       float* out) {
@@ -124,8 +124,8 @@ void sample_affine(const T* data, const Lattice& image, const LatticeMap& map, c
         }
 }
 
-/// The voxels that samples at min..max take: an affine map's extremes are at corners.
-VoxelBox touched(const LatticeMap& map, const Index3& size, const Index3& min, const Index3& max) {
+/// The voxels that samples at min..max need; the extremes of an affine map are at corners.
+VoxelBox needed_voxels(const LatticeMap& map, const Index3& size, const Index3& min, const Index3& max) {
     VoxelBox box;
     for (int a = 0; a < 3; ++a) {
         double lo = map.offset[a], hi = map.offset[a];
@@ -147,8 +147,8 @@ void Image::load(const Domain& frame, const std::vector<VoxelBox>& boxes, const 
     const LatticeMap map = map_lattice(geometry_, frame);
     std::vector<VoxelBox> needed;
     for (const VoxelBox& box : boxes) {
-        const VoxelBox part = touched(map, geometry_.size, box.min, box.max);
-        // what is not held sample() refuses
+        const VoxelBox part = needed_voxels(map, geometry_.size, box.min, box.max);
+        // sample() rejects voxels that are not held
         if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
     }
     with_threads(run, [&] { chunks_->load(needed, run); });
@@ -160,7 +160,7 @@ void Image::load(const std::vector<Vec3>& places, const RunContext& run) const {
     for (const Vec3& place : places) {
         Domain frame;
         frame.origin = place;
-        const VoxelBox part = touched(map_lattice(geometry_, frame), geometry_.size, {0, 0, 0}, {0, 0, 0});
+        const VoxelBox part = needed_voxels(map_lattice(geometry_, frame), geometry_.size, {0, 0, 0}, {0, 0, 0});
         if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
     }
     with_threads(run, [&] { chunks_->load(needed, run); });
@@ -174,7 +174,7 @@ void Image::sample(const Domain& frame, const Index3& min, const Index3& max, fl
     const LatticeMap map = map_lattice(geometry_, frame);
     VoxelBox box = held_;
     if (chunks_ || held_ != detail::whole_box(geometry_.size)) {
-        const VoxelBox needed = touched(map, geometry_.size, min, max);
+        const VoxelBox needed = needed_voxels(map, geometry_.size, min, max);
         if (!held_.contains(needed.min) || !held_.contains(needed.max))
             throw Error(
                 Errc::InvalidInput,

@@ -40,7 +40,7 @@ MinMax scan_row(const T* row, std::int32_t count, std::int64_t stride) {
     return {double(lo), double(hi), finite};
 }
 
-/// `count` slices, spread evenly, in parallel; visit(k) gives each slice's.
+/// Combines the results of visit(k) for `count` evenly spaced slices, in parallel.
 template <typename Visit>
 MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     std::vector<MinMax> slices(std::size_t(std::max(count, 0)));
@@ -54,7 +54,7 @@ MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
 }
 
 constexpr double kSamples = 4e6;         ///< for percentiles
-constexpr double kQuickBytes = 1 << 28;  ///< that are read in a second or two
+constexpr double kQuickBytes = 1 << 28;  ///< can be read in a second or two
 
 }  // namespace
 
@@ -89,7 +89,7 @@ std::vector<T> Image::values_of_chunks(double maximum) const {
     for (const VoxelBox& box : boxes) voxels += double(detail::voxel_count(box.size()));
     const auto step = static_cast<std::size_t>(std::max(1.0, std::ceil(voxels / maximum)));
     std::vector<T> values, part;
-    std::size_t next = 0;  // counted through all boxes
+    std::size_t next = 0;  // running index through all boxes
     for (const VoxelBox& box : boxes) {
         part.resize(detail::voxel_count(box.size()));
         chunks_->copy(box, part.data());
@@ -115,7 +115,7 @@ std::uint64_t Image::slice_bytes() const {
 void Image::expect_slice(int k) const {
     if (!mapped_) return;
     detail::with_pixel_type(
-        type_, [&](auto pixel) { detail::expect_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
+        type_, [&](auto pixel) { detail::prefetch_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
 }
 
 void Image::forget_slice(int k) const {
@@ -180,7 +180,7 @@ std::array<double, 2> Image::range() const {
 }
 
 void Image::require_finite() const {
-    if (chunks_) return;  // each chunk when it is read
+    if (chunks_) return;  // each chunk is checked when it is read
     detail::with_pixel_type(type_, [&](auto pixel) {
         using T = decltype(pixel);
         if constexpr (std::is_floating_point_v<T>) {

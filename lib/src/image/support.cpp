@@ -13,7 +13,7 @@ namespace {
 constexpr int kWindow = 4, kBeside = 10;  // half steps
 constexpr int kReach = 10, kPlaces = 2 * kReach + 1;
 
-/// Where the samples of a place lie, as voxels of the image, and their values.
+/// The sampling positions along the normal of a place, as voxels of the image, and their values.
 class Profile {
 public:
     Profile(const Image& image, const Vec3& place, const Vec3& normal, double step)
@@ -38,7 +38,7 @@ public:
         if (!image_.held().contains(index)) return {};
         return index;
     }
-    /// Largest less smallest value; none where the window leaves the image.
+    /// Maximum minus minimum value; none if the window leaves the image.
     [[nodiscard]] std::optional<double> range(int around) const {
         double minimum = std::numeric_limits<double>::infinity(), maximum = -minimum;
         for (int at = around - kWindow; at <= around + kWindow; ++at) {
@@ -50,7 +50,7 @@ public:
         return maximum - minimum;
     }
 
-    /// Between the two voxels before and the two behind; none where they leave the image.
+    /// Difference of the two voxels behind and the two before; none if they leave the image.
     [[nodiscard]] std::optional<double> slope(int around) const {
         double difference = 0;
         for (const int at : {1, 2})
@@ -61,8 +61,8 @@ public:
             }
         return difference;
     }
-    /// Of the three voxels around a place, less the means of the three around two voxels before and behind, times 3;
-    /// none where they leave the image.
+    /// Sum of the three voxels around a place, minus the mean of the sums of the three voxels two steps before and
+    /// behind; none if they leave the image.
     [[nodiscard]] std::optional<double> ridge(int around) const {
         double sum = 0;
         for (const int beside : {-4, 0, 4})
@@ -79,7 +79,7 @@ private:
     Vec3 middle_, half_;
 };
 
-/// With the voxels that lie up to `reach` half steps before and behind, loaded.
+/// The profiles of the places. Loads the voxels up to `reach` half steps before and behind.
 std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                                  double step, int reach, const RunContext& run) {
     std::vector<Profile> profiles;
@@ -98,7 +98,7 @@ std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& pl
 
 using Strengths = std::array<std::optional<double>, kPlaces>;
 
-/// Over the lines that have one there; 0 where these are fewer than half.
+/// Mean over the lines that have a value at this position; 0 if these are fewer than half.
 double mean_strength(const std::vector<Strengths>& lines, int at) {
     double sum = 0;
     std::size_t count = 0;
@@ -107,7 +107,7 @@ double mean_strength(const std::vector<Strengths>& lines, int at) {
     return 2 * count < lines.size() ? 0 : sum / double(count);
 }
 
-/// Probability that one of `first` exceeds one of `second`.
+/// Probability that a value of `first` exceeds one of `second`.
 double probability_above(const std::vector<double>& first, std::vector<double> second) {
     std::sort(second.begin(), second.end());
     double sum = 0;

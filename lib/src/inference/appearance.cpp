@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFeatureSigmas[kScales] = {0.6, 1.2, 2.4};  // finest cells
 constexpr int kRounds = 20;
-constexpr double kEnough = 1e-2;  // of a standardised term's weight
+constexpr double kConverged = 1e-2;  // fraction of a standardised term's weight
 
 }  // namespace
 
@@ -104,7 +104,7 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
     using Matrix = Eigen::MatrixXd;
     using Vector = Eigen::VectorXd;
     const auto count = Eigen::Index(used.size());
-    Matrix Z(count, kTerms);
+    Matrix Z(count, kTerms);  // the gradient and so the optimum in double; the Hessian only directs the steps
     Vector y(count), weight(count);
     for (Eigen::Index n = 0; n < count; ++n) {
         std::array<float, kTerms> terms;
@@ -112,23 +112,26 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
         for (int t = 0; t < kTerms; ++t) Z(n, t) = double(terms[std::size_t(t)]);
         const bool inside = used[std::size_t(n)]->inside;
         y[n] = inside ? 1 : 0;
-        // Both sides weigh the same: the odds say what the place shows, not how many samples were taken.
+        // Both sides get the same total weight, so that the odds depend on the position and not on the number of
+        // samples.
         weight[n] = double(used[std::size_t(n)]->weight) * 0.5 * sum / std::max(total[inside ? 1 : 0], 1e-9);
     }
+    const Eigen::MatrixXf single = Z.cast<float>();
     Vector w = Vector::Zero(kTerms), penalty = Vector::Constant(kTerms, ridge);
     penalty[0] = 1e-6;
     for (int round = 0; round < kRounds; ++round) {
         const Vector odds = (Z * w).cwiseMax(-30).cwiseMin(30);
         const Vector p = (1 / (1 + (-odds.array()).exp())).matrix();
         const Vector curvature = (weight.array() * p.array() * (1 - p.array())).matrix();
-        Matrix H = Matrix::Zero(kTerms, kTerms);
-        const Matrix scaled = curvature.cwiseSqrt().asDiagonal() * Z;
-        H.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
+        const Eigen::MatrixXf scaled = curvature.cwiseSqrt().cast<float>().asDiagonal() * single;
+        Eigen::MatrixXf products = Eigen::MatrixXf::Zero(kTerms, kTerms);
+        products.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
+        Matrix H = products.cast<double>();
         H.diagonal() += penalty;
         const Vector gradient = Z.transpose() * (weight.array() * (y - p).array()).matrix() - penalty.cwiseProduct(w);
         const Vector step = H.selfadjointView<Eigen::Lower>().llt().solve(gradient);
         w += step;
-        if (step.cwiseAbs().maxCoeff() < kEnough) break;
+        if (step.cwiseAbs().maxCoeff() < kConverged) break;
     }
     for (int t = 0; t < kTerms; ++t) weights_[std::size_t(t)] = float(w[t]);
 }

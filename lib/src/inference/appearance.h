@@ -7,7 +7,7 @@
 
 namespace covol::inference {
 
-/// What is known of a place: smoothed brightness, slope and Laplacian at several scales, and the guess.
+/// Features of a position: smoothed intensity, slope and Laplacian at several scales, and the guess.
 inline constexpr int kScales = 3, kOfImage = 3 * kScales, kFeatures = kOfImage + 2;
 using Features = std::array<float, kFeatures>;
 
@@ -16,16 +16,16 @@ class ImageFeatures {
 public:
     ImageFeatures(const Lattice& lattice, Field image);
     [[nodiscard]] const Field& operator[](int n) const { return fields_[std::size_t(n)]; }
-    /// At a node; without those of a guess.
+    /// At a node; the features of the guess stay 0.
     [[nodiscard]] Features at(std::size_t node) const {
         Features all{};
         for (int f = 0; f < kOfImage; ++f) all[std::size_t(f)] = (*this)[f][node];
         return all;
     }
-    /// What surface costs at each node by the slope there, in (0,1]: half where it is as steep as at the median of the
-    /// places, which lie on the surface.
+    /// The cost of surface at each node by the slope there, in (0,1]: one half if the slope is the median of that at
+    /// the given positions, which lie on the surface.
     [[nodiscard]] Field edge(const Lattice& lattice, const std::vector<Vec3>& places) const;
-    /// The slope at the scale that edges are weighed by.
+    /// The slope at the scale that determines the weight of edges.
     [[nodiscard]] const Field& slope() const { return fields_[4]; }
     [[nodiscard]] const Field& image() const { return image_; }
 
@@ -34,7 +34,7 @@ private:
     std::array<Field, kOfImage> fields_;
 };
 
-/// `most` of the nodes at most, evenly.
+/// At most `maximum` of the nodes, evenly selected.
 [[nodiscard]] std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t maximum);
 
 struct Sample {
@@ -44,7 +44,7 @@ struct Sample {
     int fold = 0;
 };
 
-/// Quadratic logistic regression with a ridge: log odds of inside against outside.
+/// Quadratic logistic regression with a ridge penalty: log odds of inside against outside.
 class Appearance {
 public:
     Appearance(const std::vector<Sample>& samples, double ridge, int without_fold = -1);
@@ -57,7 +57,8 @@ private:
     std::array<float, kTerms> weights_{};
 };
 
-/// What a regression tells of the folds that it was not trained at, bits of each sample: 1 is everything, 0 nothing.
+/// Information of a regression about the folds on which it was not trained, bits for each sample: 1 is perfect
+/// prediction, 0 none.
 [[nodiscard]] double held_out_bits(const std::vector<Sample>& samples, double ridge, int folds);
 
 }  // namespace covol::inference

@@ -22,10 +22,11 @@ using guess::Normals;
 using guess::Search;
 using guess::VariationalSurface;
 
-constexpr double kOffsets[] = {0.75, 1.5, 2.5, 3.5};  // cells beside a mark
-constexpr int kAllFolds = -1;                         // of a sample that is never left out
-constexpr std::size_t kElsewhere = 300;               // samples that no mark gives
-// Marks beside the spread ones that teach: 55 terms are learnt as well from these, in a fraction of the time.
+constexpr double kOffsets[] = {0.75, 1.5, 2.5, 3.5};  // distance from a mark, cells
+constexpr int kAllFolds = -1;                         // fold of a sample that is never left out
+constexpr std::size_t kElsewhere = 300;               // samples not taken at marks
+// Number of training marks beside the spread ones: the 55 terms are fitted as well with these, in a fraction of the
+// time.
 constexpr std::size_t kMarksBesideSpread = 300;
 constexpr std::size_t kFewestSamples = 40;
 
@@ -51,7 +52,7 @@ Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& c
     return c;
 }
 
-/// The surface through marks, and which side of it is outside: the one that goes on for ever.
+/// The surface through marks, oriented so that the unbounded side is outside.
 class GuessedSurface {
 public:
     GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal)
@@ -68,7 +69,7 @@ public:
                                    middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
         side_ = far < 0 ? -1 : 1;
     }
-    /// Of some of the marks of another one, near its normals.
+    /// Through some of the marks of another surface, near its normals.
     GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal,
                    const GuessedSurface& whole, const std::vector<Vec3>& normals)
         : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
@@ -87,7 +88,8 @@ private:
     double side_ = 1;
 };
 
-/// The guess as two witnesses: as it is, and less so the farther from the marks that it was made of.
+/// The guess as two features: its value, and its value reduced with increasing distance from the marks that it was made
+/// of.
 void add_guess(double value, double to_mark, double cell, Features& features) {
     constexpr double kFarCells = 8, kFading = 0.3;
     const double cells = value / cell;
@@ -95,13 +97,13 @@ void add_guess(double value, double to_mark, double cell, Features& features) {
     features[kOfImage + 1] = float(std::clamp(cells / (1 + kFading * to_mark / cell), -kFarCells, kFarCells));
 }
 
-/// What teaches inside and outside.
+/// The training samples for inside and outside.
 class Samples {
 public:
     Samples(const Scene& scene, const GuessedSurface& whole)
         : scene_(scene), whole_(whole), cell_(scene.lattice.finest()) {}
 
-    /// Along the normals of the marks, each with a guess that was made without it.
+    /// Along the normals of the marks, each with a guess that was made without this mark.
     void add_marks(const Proposal& proposal) {
         const Marks& marks = scene_.marks;
         std::vector<Vec3> normals(marks.places.size());
@@ -115,7 +117,7 @@ public:
             try {
                 held[std::size_t(fold)].emplace(GuessedSurface(marks, rest, proposal, whole_, normals),
                                                 detail::KdTree(at(marks.places, rest)));
-            } catch (const Error&) {  // the rest has no surface: its fold teaches nothing
+            } catch (const Error&) {  // no surface without this fold: it gives no samples
             }
         });
         const detail::KdTree tree(at(marks.places, marks.spread));
@@ -131,7 +133,7 @@ public:
                 for (const double direction : {-1.0, 1.0}) {
                     const Vec3 place = plus(marks.places[n], direction * offset * step, normals[n]);
                     const double guess = whole_.value(place);
-                    if (guess * direction < 0) continue;  // beyond the other wall of a thin body
+                    if (guess * direction < 0) continue;  // beyond the opposite wall of a thin body
                     Sample s = sample(place);
                     if (one != nullptr)
                         add_guess((*one)->guess.value(place), std::sqrt((*one)->tree.nearest(place)), cell_, s.at);
@@ -145,7 +147,7 @@ public:
         of_marks_ = all_.size();
     }
 
-    /// Nodes of which the side is known; together they count half as much as the marks.
+    /// Nodes whose side is known; together they count half as much as the marks.
     void add_nodes(const std::vector<std::size_t>& nodes, bool inside) {
         const std::vector<std::size_t> some = some_of(nodes, kElsewhere);
         for (const std::size_t n : some) {
@@ -228,13 +230,13 @@ Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
         weight[n] = scene.edge[n] * float(kInference.surface_at_marks + double(scene.to_mark[n]) / reach);
         u[n] = cost[n] < 0 ? 1.0F : 0.0F;
     }
-    // What is known costs no surface: a small place is not smoothed away.
+    // At known positions surface costs nothing, so that a small region is not smoothed away.
     for (const std::vector<std::size_t>* nodes : {&scene.known_inside, &scene.known_outside})
         for (const std::size_t n : *nodes) weight[n] = 0;
     return solve_body(lattice, weight, cost, std::move(u), run);
 }
 
-/// Drops parts that hardly any mark belongs to; empty where nothing is left, or all is inside.
+/// Drops parts with few marks; empty if nothing remains, or everything is inside.
 void keep_marked_parts(const Scene& scene, Solid& solid) {
     const Parts parts = label_parts(solid.lattice, solid.inside);
     std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
@@ -252,9 +254,9 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
 }
 
-/// Of the faces between inside and outside, over the smooth surface.
+/// Area of the smooth surface, estimated from the faces between inside and outside.
 double area_of(const Solid& solid) {
-    constexpr double kStairs = 1.5;  // faces of cells over a smooth surface, in the mean
+    constexpr double kStairs = 1.5;  // mean ratio of the area of cell faces to that of a smooth surface
     const Lattice& lattice = solid.lattice;
     const std::size_t steps[3] = {1, std::size_t(lattice.size[0]),
                                   std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
@@ -274,8 +276,9 @@ double area_of(const Solid& solid) {
     return area / kStairs;
 }
 
-/// Marks lie on the surface, anywhere on it with the same probability, so that they are the less likely the larger it
-/// is, and the farther they lie off it. What the image tells of the sides of marks that were left out counts, too.
+/// Log likelihood of a mark. Marks are uniformly distributed on the surface, so that they are the less likely the
+/// larger it is, and the farther they lie off it. The bits that the image gives about both sides of held-out marks are
+/// added.
 double score_of(const Scene& scene, const Solid& solid, double bits) {
     const double cell = solid.lattice.finest();
     const Field distance = signed_distance(solid.lattice, solid.inside);
@@ -325,7 +328,7 @@ Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost,
 }
 
 Field Solid::level() const {
-    constexpr double kCells = 0.7;  // enough to even out the stairs
+    constexpr double kCells = 0.7;  // enough to smooth the stairs
     return smooth(lattice, signed_distance(lattice, inside), kCells * lattice.finest());
 }
 
@@ -346,7 +349,7 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
         guess.emplace(scene.marks, scene.marks.spread, proposal);
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return candidate;  // these normals have no surface
+        return candidate;  // no surface with these normals
     }
     candidate.amplitude = guess->amplitude();
     Samples samples(scene, *guess);

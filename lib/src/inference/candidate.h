@@ -1,11 +1,12 @@
 #pragma once
-// A body by the image and by a guess of its normals:
-// 1. The surface through the marks that bends least, its normals drawn to given axes (guess/variational.h).
-// 2. What lies on both sides of the marks along these normals, and what the guess says there where it was made without
-//    them, teaches log odds of inside against outside (appearance.h).
-// 3. The body of least surface with these odds (minimal_surface.h). Surface costs little on the image's edges and at
-//    marks, and much far from any mark; above the marks' convex hull a body is improbable: people mark all around what
-//    they mean.
+// The body that follows from the image and a proposal for the normals:
+// 1. The surface of minimum bending energy through the marks, its normals attracted to given axes
+//    (guess/variational.h).
+// 2. Samples on both sides of the marks along these normals, with a guess that was made without them, train the log
+//    odds of inside against outside (appearance.h).
+// 3. The body of minimum surface with these odds (minimal_surface.h). Surface costs little on the image's edges and at
+//    marks, and much far from any mark. Above the marks' convex hull a body is improbable, because people mark a
+//    structure on all sides.
 #include <memory>
 #include <vector>
 
@@ -16,18 +17,18 @@
 
 namespace covol::inference {
 
-/// [cells] From a mark to a surface, at most: a miss is a miss.
+/// [cells] Maximum distance from a mark to a surface; beyond it all misses count the same.
 constexpr double kFarthestMiss = 4;
 
-/// What is known of a lattice's nodes before there is a candidate.
+/// What is known at a lattice's nodes before any candidate is computed.
 struct Scene {
     const Marks& marks;
     Lattice lattice;
     std::shared_ptr<const ImageFeatures> image;
     Field to_mark;                                         ///< distance to the nearest mark
-    Field edge;                                            ///< in (0,1]: what surface costs by the image's slope alone
+    Field edge;                                            ///< in (0,1]: cost of surface by the image's slope alone
     Field above_hull;                                      ///< height above the marks' convex hull
-    std::vector<std::size_t> known_inside, known_outside;  ///< nodes beside places that are known to be so
+    std::vector<std::size_t> known_inside, known_outside;  ///< nodes beside positions whose side is known
 
     Scene(const Image& image, const Lattice& lattice, const Marks& marks, const RunContext& run);
     /// The same image with other marks.
@@ -40,41 +41,41 @@ private:
 /// A body on a lattice.
 struct Solid {
     Lattice lattice;
-    std::vector<char> inside;  ///< by node; empty: there is none
+    std::vector<char> inside;  ///< by node; empty if there is none
 
     [[nodiscard]] bool empty() const { return inside.empty(); }
-    /// About the signed distance to its surface, smoothed by less than a cell.
+    /// Approximate signed distance to its surface, smoothed by less than a cell.
     [[nodiscard]] Field level() const;
 };
 
-/// The body whose surface and cost are least: minimize_surface(). @param u  the first guess
+/// The body of minimum surface and cost: minimize_surface(). @param u  the initial value
 [[nodiscard]] Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u,
                                const RunContext& run);
 
-/// Log odds of what is known, in the most that the image may say.
+/// Log odds at known positions, in units of the maximum that the image may give.
 inline constexpr double kKnown = 4;
 
-/// Where a candidate's normals come from.
+/// The source of a candidate's normals.
 struct Proposal {
-    std::vector<Vec3> axes;  ///< of each mark; empty: the marks alone
-    double strength = 0;     ///< of them, in mean eigenvalues of the bending energy
+    std::vector<Vec3> axes;  ///< of each mark; empty: from the marks alone
+    double strength = 0;     ///< of the axes, in mean eigenvalues of the bending energy
     guess::Search search = guess::Search::Wide;
-    double amplitude = 0;           ///< of VariationalSurface; 0: from the marks, which takes thrice as long
-    const Solid* refine = nullptr;  ///< only beside the surface of this one
-    bool is_compared = true;        ///< false: bits and score are not needed
+    double amplitude = 0;           ///< of VariationalSurface; 0: estimated, which takes three times as long
+    const Solid* refine = nullptr;  ///< restricts the body to a band around the surface of this one
+    bool is_compared = true;        ///< false: bits and score are not computed
 };
 
 struct Candidate {
     Solid solid;
     double bits = 0;   ///< of appearance.h's held_out_bits()
-    double score = 0;  ///< log likelihood of a mark, but for a constant: higher is better
+    double score = 0;  ///< log likelihood of a mark up to a constant: higher is better
     double amplitude = 0;
     bool was_continued = false;
 };
 
 [[nodiscard]] Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run);
 
-/// A place that is known to be inside or outside tells as far as halfway to the nearest mark, and a cell at least.
+/// A position that is known to be inside or outside applies up to halfway to the nearest mark, and to a cell at least.
 struct KnownBall {
     Vec3 middle;
     double radius;
@@ -82,13 +83,14 @@ struct KnownBall {
 };
 [[nodiscard]] std::vector<KnownBall> known_balls(const Marks& marks, double cell);
 
-/// Unit gradients of the image at all marks. @param fading  shorter where they are no larger than usual
+/// Unit gradients of the image at all marks. @param fading  whether gradients that are not clearly larger than the
+/// median are shortened
 [[nodiscard]] std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading);
 
-/// Outward unit normals of a solid at places.
+/// Outward unit normals of a solid at given positions.
 [[nodiscard]] std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places);
 
-/// The surface of least energy through the spread marks, near these normals (of all marks).
+/// The surface of minimum bending energy through the spread marks, near these normals (of all marks).
 [[nodiscard]] guess::VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals,
                                                      double amplitude);
 

@@ -27,15 +27,15 @@ namespace {
 using namespace inference;
 using guess::Search;
 
-constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axes
+constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients used as axes
 
-/// Of marks that were left out: how far off they lie, negative inside.
+/// Signed distances of held-out marks from surfaces, negative inside.
 struct HeldOut {
     std::vector<Vec3> marks;
     std::vector<double> of_body, of_guess;
-    std::vector<double> to_rest2;  // square distance to the nearest mark that they were made from
+    std::vector<double> to_rest2;  // squared distance to the nearest mark of the training set
 
-    /// Of the weighted mean of both. @param shrink  of the body's errors on a finer lattice
+    /// Distance from the weighted mean of both. @param shrink  factor of the body's errors on a finer lattice
     [[nodiscard]] double of_both(std::size_t n, double guess_weight, double shrink = 1) const {
         return guess_weight * of_guess[n] + (1 - guess_weight) * shrink * of_body[n];
     }
@@ -48,22 +48,22 @@ public:
         choose_box();
     }
 
-    /// That candidates are compared on.
+    /// On which candidates are compared.
     [[nodiscard]] Lattice coarse_lattice() const {
         return cover(image_.geometry(), box_.min, box_.max, kInference.coarse_nodes);
     }
 
-    /// False where no candidate has a body.
+    /// False if no candidate has a body.
     [[nodiscard]] bool find(InferenceReport& report);
     /// The body that was found, on a finer lattice.
     [[nodiscard]] Solid refined() const;
-    /// Whether marks are likely wrong, which are left out from here on: the body is to be found again.
+    /// Whether further marks are likely wrong; these are left out from here on, and the body has to be computed again.
     [[nodiscard]] bool leave_out_wrong(const HeldOut& held);
     [[nodiscard]] bool leaves_out(const Vec3& mark) const {
         return std::find(wrong_.begin(), wrong_.end(), mark) != wrong_.end();
     }
     [[nodiscard]] HeldOut hold_out() const;
-    /// The body, with the surface through the marks in its place as far as that is worth.
+    /// The body, averaged with the surface through the marks by the weight of the latter.
     [[nodiscard]] Field pooled(const Solid& body, double guess_weight) const;
     [[nodiscard]] double coarse_cell() const { return coarse_->lattice.finest(); }
 
@@ -77,15 +77,15 @@ private:
     const Image& image_;
     Marks marks_;
     const RunContext& run_;
-    WorldBox box_;  // around the marks, of the frame
+    WorldBox box_;  // around the marks, in the frame
     std::optional<Scene> coarse_;
     Solid coarse_body_;
-    std::vector<Vec3> wrong_;  // marks that are left out; places of the frame
+    std::vector<Vec3> wrong_;  // marks that are left out; positions in the frame
     double amplitude_ = 0;     // of its guess
 };
 
 Candidate Inference::best_candidate() const {
-    std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // by the marks alone
+    std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // from the marks alone
     const double amplitude = found.front().amplitude;
     const auto propose_all = [&](const std::vector<Proposal>& proposals) {
         const std::size_t before = found.size();
@@ -96,7 +96,7 @@ Candidate Inference::best_candidate() const {
     std::vector<Proposal> proposals;
     for (const double sigma : kSigmas) {
         proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide, amplitude});
-        // Where the body is darker all around, or brighter, the gradients themselves are the normals.
+        // If the body is darker, or brighter, than all its surroundings, the gradients themselves are the normals.
         proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near, amplitude});
     }
     propose_all(proposals);
@@ -152,23 +152,24 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
     std::vector<double> off;
-    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes marks that it was made from, wrong ones too
+    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes the marks that it was made from, including
+                                                         // wrong ones
         off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
     const std::vector<double> wrong = probability_wrong(off, anywhere, kInference.usual_off * coarse_cell());
     std::vector<Vec3> suspects;
     for (std::size_t i = 0; i < held.marks.size(); ++i)
         if (wrong[i] > 0.5) suspects.push_back(held.marks[i]);
-    // Several beside each other lie on a part that the body lacks.
+    // Several suspects close to each other lie on a part that the body lacks.
     const double beside = kInference.beside_spacings * marks_.spacing;
     std::vector<Vec3> all = wrong_;
     for (const Vec3& suspect : suspects) {
-        const auto company = std::count_if(suspects.begin(), suspects.end(), [&](const Vec3& other) {
+        const auto neighbours = std::count_if(suspects.begin(), suspects.end(), [&](const Vec3& other) {
             return other != suspect && length(minus(other, suspect)) < beside;
         });
-        if (company < 2) all.push_back(suspect);
+        if (neighbours < 2) all.push_back(suspect);
     }
     const double given = double(marks_.places.size() + wrong_.size());
-    // Of a single one nobody knows whether it is wrong, or the body lacks a part.
+    // For a single suspect it cannot be decided whether it is wrong, or the body lacks a part.
     if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.max_wrong * given)
         return false;
     wrong_ = std::move(all);
@@ -219,7 +220,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     const detail::KdTree tree(marks_.places);
     const double cell = lattice.finest(), band = kBandCells * cell;
     const std::vector<KnownBall> balls = known_balls(marks_, cell);
-    const auto is_known = [&](const Vec3& place) {  // there the guess, which knows nothing of it, has no say
+    const auto is_known = [&](const Vec3& place) {  // the guess does not use known positions, and is ignored there
         return std::any_of(balls.begin(), balls.end(), [&](const KnownBall& ball) {
             return length(minus(place, ball.middle)) <= ball.radius + cell;
         });
@@ -231,7 +232,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
                 if (std::abs(double(value)) > band) continue;
                 const Vec3 place = lattice.place(i, j, k);
                 if (is_known(place)) continue;
-                // At a mark the surface through it is right, as far as a cell.
+                // Within about a cell of a mark the surface through it is accurate.
                 const double away2 = tree.nearest(place),
                              weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
                 const double off = std::clamp(surface.value(place), -band, band) - double(value);
@@ -241,10 +242,10 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     return level;
 }
 
-/// How body and guess predict marks that they were not made from.
+/// The errors with which body and guess predict marks that they were not made from.
 class Predictions {
 public:
-    /// @param shrink  of the body's errors on a finer lattice
+    /// @param shrink  factor of the body's errors on a finer lattice
     Predictions(const HeldOut& held, double cell, double shrink) : small_(kInference.usual_off * cell) {
         const double maximum = kFarthestMiss * cell;
         for (std::size_t n = 0; n < held.of_body.size(); ++n)
@@ -252,8 +253,9 @@ public:
                             std::clamp(held.of_guess[n], -maximum, maximum)});
     }
 
-    /// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
-    /// Networks 5(2), 1992), by the mean size of the error, smooth about 0: reweighted least squares.
+    /// The weight of the guess, in [0,1], for which the weighted mean of both predicts the marks best (stacking:
+    /// Wolpert, Neural Networks 5(2), 1992), by the mean absolute error, smoothed about 0, which is minimized by
+    /// iteratively reweighted least squares.
     [[nodiscard]] double weight_of_guess() const {
         constexpr int kRounds = 30;
         double weight = 0.5;
@@ -270,7 +272,7 @@ public:
         }
         return weight;
     }
-    /// How much worse the guess is than the body by the mean square, in standard errors.
+    /// By how much the guess is worse than the body in the mean squared error, in standard errors.
     [[nodiscard]] double guess_worse() const {
         double sum = 0, squares = 0;
         for (const auto& [body, guess] : off_) {
@@ -295,13 +297,13 @@ double median_size(const std::vector<double>& values) {
     return sizes.empty() ? 0.0 : cloud::median(sizes);
 }
 
-/// A solid as a level anywhere in the world.
+/// A solid as a level function of world positions.
 class Level {
 public:
     Level(const ImageGeometry& geometry, const Lattice& lattice, const Field& field)
         : geometry_(geometry), lattice_(lattice), field_(field) {}
 
-    /// Beyond the lattice there is nothing of the body, but where the image ends it goes on as it came.
+    /// Beyond the lattice the body does not exist, except beyond the image's end, where its last values are continued.
     [[nodiscard]] double operator()(const Vec3& world) const {
         const Vec3 place = to_frame(geometry_, world);
         double beyond = 0;
@@ -341,15 +343,15 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
     return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
 }
 
-/// In the image's frame; of very many some, spread out.
+/// In the image's frame; a spread-out subset if there are very many.
 void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, std::vector<Vec3>& places) {
     if (world.empty()) return;
     for (const std::size_t n : guess::spread_out(world, kInference.max_places))
         places.push_back(to_frame(geometry, world[n]));
 }
 
-/// Fraction of the marks that lie off a level's surface. A mark is as precise as the image is along its normal: across
-/// thick slices it may lie half a slice off.
+/// Fraction of the marks that lie off a level's surface. The precision of a mark is that of the image along its normal:
+/// across thick slices it may lie half a slice off.
 double fraction_off(const ImageGeometry& geometry, const std::vector<Vec3>& world, const Solid& body,
                     const Field& level) {
     std::vector<Vec3> places;
@@ -371,7 +373,7 @@ std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
     return wrong(sides.inside, -1) + wrong(sides.outside, 1);
 }
 
-/// How an error grows with the distance from the marks: the slope of the line through 0 that fits its squares best.
+/// Increase of the error with the distance from the marks: the slope of the line through 0 that fits the squares best.
 double error_slope(const HeldOut& held, double guess_weight, double shrink) {
     double errors = 0, distances = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
@@ -382,9 +384,9 @@ double error_slope(const HeldOut& held, double guess_weight, double shrink) {
     return distances > 0 ? std::sqrt(errors / distances) : 0;
 }
 
-/// What lies between a surface and the truth is, relative to the body, the surface's area times its mean error over the
-/// volume; marks that were left out lie on the truth, and tell the error of a result from fewer marks. How that error
-/// and the Dice coefficient go together was measured: kInference.expected_scale.
+/// The volume between a surface and the truth, relative to the body, is the surface's area times its mean error divided
+/// by the volume. Held-out marks lie on the true surface, and measure the error of a result from fewer marks. The
+/// relation of that error to the Dice coefficient was fitted: kInference.expected_scale.
 std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell, const Overlap& body) {
     if (held.of_body.size() < kInference.fewest_marks || !(body.volume > 0)) return {};
     constexpr double kMaxCells = 8, kMinCells = 0.1;
@@ -448,7 +450,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });
-        const auto reject_body = [&](const char* reason) {  // nor what it says of the marks
+        const auto reject_body = [&](const char* reason) {  // also discards its classification of the marks
             report.wrong_marks.clear();
             result.marks = world;
             keep_guess(reason);
@@ -456,9 +458,10 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
-        // Of two that agree the simpler one, if they are not told apart (the one-standard-error rule: Breiman et al.,
-        // Classification and Regression Trees, 1984); of two that do not, the one that is better for sure.
-        // The errors that were measured decide, not those that a finer lattice is expected to have.
+        // If both agree, the simpler one is taken unless it is significantly worse (the one-standard-error rule:
+        // Breiman et al., Classification and Regression Trees, 1984); otherwise the body, unless it is significantly
+        // worse.
+        // The measured errors decide, not those extrapolated to a finer lattice.
         const double worse = Predictions(held, cell, 1).guess_worse();
         if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
             keep_guess(overlap.dice > kInference.agreement

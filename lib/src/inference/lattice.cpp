@@ -12,7 +12,7 @@
 namespace covol::inference {
 namespace {
 
-/// The lines of a field along an axis: where they begin, and the step along them.
+/// The lines of a field along an axis: their first nodes, and the step along them.
 struct Lines {
     Lines(const Lattice& lattice, int axis) : lattice_(lattice), axis_(axis), length(lattice.size[axis]) {
         const std::size_t steps[3] = {1, std::size_t(lattice.size[0]),
@@ -129,7 +129,7 @@ std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geome
 bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run) {
     double voxels = 1;
     for (int a = 0; a < 3; ++a) voxels *= (lattice.size[a] - 1) * lattice.spacing[a] / geometry.spacing[a] + 1;
-    // A copy of the box is not held, but chunks of it are.
+    // The box is not copied as a whole, but the chunks that cover it are held in memory.
     return voxels > kInference.max_voxels ||
            (run.memory_budget > 0 &&
             sizeof(float) * voxels > kInference.max_memory_fraction * double(run.memory_budget));
@@ -138,7 +138,7 @@ bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const R
 Field sample(const Image& image, const Lattice& lattice, const RunContext& run) {
     const ImageGeometry& g = image.geometry();
     Index3 first, last;
-    for (int a = 0; a < 3; ++a) {  // all voxels nearer to some node than the next node
+    for (int a = 0; a < 3; ++a) {  // all voxels within one spacing of some node
         const double begin = lattice.origin[a] - lattice.spacing[a],
                      end = lattice.origin[a] + lattice.spacing[a] * lattice.size[a];
         first[a] = std::clamp(int(std::ceil(begin / g.spacing[a] + 1e-6)), image.held().min[a], image.held().max[a]);
@@ -147,7 +147,7 @@ Field sample(const Image& image, const Lattice& lattice, const RunContext& run) 
     image.load({first, last}, run);
     const std::size_t plane = std::size_t(lattice.size[0]) * std::size_t(lattice.size[1]);
     Field result(lattice.count());
-    // Where a node lies between voxels: the weight of each voxel for the node, along one axis.
+    // Voxels are averaged to nodes: the weight of a voxel for a node, along one axis.
     const auto weight = [&](int a, int node, int voxel) {
         const double away = std::abs(lattice.origin[a] + node * lattice.spacing[a] - voxel * g.spacing[a]);
         return std::max(0.0, 1 - away / lattice.spacing[a]);
@@ -257,8 +257,8 @@ Field derivative(const Lattice& lattice, const Field& field, int axis) {
 
 namespace {
 
-/// Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, Theory of Computing 8, 2012: the squared
-/// distance to the nodes where `squares` is 0.
+/// Squared distance to the nodes at which `squares` is 0: Felzenszwalb and Huttenlocher, Distance transforms of sampled
+/// functions, Theory of Computing 8, 2012.
 void squared_distance_to(const Lattice& lattice, std::vector<float>& squares) {
     constexpr float kFar = 1e20F;
     for (int axis = 0; axis < 3; ++axis) {

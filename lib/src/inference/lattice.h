@@ -7,18 +7,18 @@
 
 namespace covol::inference {
 
-/// Places of the image's own frame: index times spacing, an isometry of the world in which the image's axes are those
-/// of the coordinates.
+/// Positions in the image's frame: index times spacing. The frame is isometric to the world, with the image's axes as
+/// coordinate axes.
 [[nodiscard]] Vec3 to_frame(const ImageGeometry& geometry, const Vec3& world);
 [[nodiscard]] Vec3 to_world(const ImageGeometry& geometry, const Vec3& place);
 
 using Field = std::vector<float>;  ///< a value for each node of a lattice, x fastest
 
-/// A box of nodes along the image's axes; lengths and places are of the image's frame.
+/// A box of nodes along the image's axes; lengths and positions are in the image's frame.
 struct Lattice {
     Index3 size{0, 0, 0};
     Vec3 origin{0, 0, 0};   ///< of node (0, 0, 0)
-    Vec3 spacing{1, 1, 1};  ///< at least the image's
+    Vec3 spacing{1, 1, 1};  ///< at least that of the image
 
     [[nodiscard]] std::size_t count() const {
         return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]);
@@ -36,14 +36,14 @@ struct Lattice {
     [[nodiscard]] double finest() const;
     /// The length of a cell along a direction.
     [[nodiscard]] double cell_along(const Vec3& unit) const;
-    /// The root mean square of a cell's edges, weighted by a direction: how precise a place is along it.
+    /// The root mean square of a cell's edges, weighted by a direction: the precision of a position along it.
     [[nodiscard]] double extent_along(const Vec3& unit) const;
-    /// Trilinear; beyond the lattice the value at its end.
+    /// Trilinear; beyond the lattice the value at its boundary.
     [[nodiscard]] double value(const Field& field, const Vec3& place) const;
 };
 
-/// Covers a box of the frame, within the image, with at most `most` nodes. Nodes are voxels where that is enough, and
-/// lie symmetrically about the middle of the box otherwise, so that a mirror image has the same.
+/// Covers a box of the frame, within the image, with at most `maximum` nodes. The nodes are the voxels if these are few
+/// enough; otherwise they lie symmetrically about the middle of the box, so that a mirror image has the same nodes.
 [[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double maximum);
 
 /// A level set at all nodes.
@@ -52,19 +52,19 @@ struct Lattice {
 /// Whether the image's box under a lattice is too large to be read as a whole.
 [[nodiscard]] bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run);
 
-/// The image at the nodes: its voxels, or their mean with weights that fall to 0 at the next nodes.
+/// The image at the nodes: its voxels, or their mean with weights that decrease to 0 at the neighbouring nodes.
 [[nodiscard]] Field sample(const Image& image, const Lattice& lattice, const RunContext& run);
 
-/// Convolved with a Gaussian; @param sigma  a length of the frame. Beyond the end the last value goes on.
+/// Convolved with a Gaussian; @param sigma  a length of the frame. Beyond the boundary the last value is repeated.
 [[nodiscard]] Field smooth(const Lattice& lattice, const Field& field, double sigma);
 
-/// Central differences, one-sided at the end, along an axis.
+/// Central differences along an axis, one-sided at the boundary.
 [[nodiscard]] Field derivative(const Lattice& lattice, const Field& field, int axis);
 
-/// Signed distance to the border of a body of nodes, negative inside, up to half a cell; far where there is none.
+/// Signed distance to the border of a body of nodes, negative inside, accurate to half a cell; large without a border.
 [[nodiscard]] Field signed_distance(const Lattice& lattice, const std::vector<char>& inside);
 
-/// Numbers of the connected parts (by faces) of a body from 1, 0 outside, and how many there are.
+/// Labels of the connected parts (by faces) of a body from 1, 0 outside, and their number.
 struct Parts {
     std::vector<int> number;
     int count = 0;

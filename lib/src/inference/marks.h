@@ -7,25 +7,25 @@
 
 namespace covol::inference {
 
-/// How many parts the marks are divided into, each of which is left out once.
+/// Number of folds of the marks; each is held out once.
 inline constexpr int kFolds = 5;
 
-/// Marks in the image's frame. Their order, and so their folds, is by the distance from their middle: it does not
-/// depend on the order in which they were given, nor on a mirror image.
+/// Marks in the image's frame. Their order, and thus their folds, is by the distance from their middle: it depends
+/// neither on the order in which they were given nor on a reflection of the image.
 struct Marks {
     std::vector<Vec3> places;
-    std::vector<std::size_t> spread;  ///< of them, as far apart as can be, ascending: guesses are made of these
+    std::vector<std::size_t> spread;  ///< a subset, as far apart as possible, ascending: guesses are made of these
     double spacing = 0;               ///< median distance to the nearest other mark
-    double variance = 0;              ///< of a place along an axis
-    /// Half-spaces around all marks, n.x <= offset. Where marks come near the image's end the body may go on to it.
+    double variance = 0;              ///< of a position along an axis
+    /// Half-spaces around all marks, n.x <= offset. Where marks lie close to the image's end they extend up to it.
     std::vector<std::pair<Vec3, double>> hull;
-    std::vector<Vec3> inside, outside;  ///< places known to be so
+    std::vector<Vec3> inside, outside;  ///< positions whose side is known
 
     Marks(const ImageGeometry& geometry, const std::vector<Vec3>& world);
-    /// Without every kFolds-th mark. @param left_out  their places
+    /// Without every kFolds-th mark. @param left_out  indices of these
     [[nodiscard]] Marks without(int fold, const ImageGeometry& geometry, std::vector<std::size_t>& rest,
                                 std::vector<std::size_t>& left_out) const;
-    /// Without some.
+    /// Without the given ones.
     [[nodiscard]] Marks without(const std::vector<Vec3>& left_out, const ImageGeometry& geometry) const;
     /// Height above the hull, negative inside of it.
     [[nodiscard]] double above_hull(const Vec3& place) const;
@@ -34,7 +34,7 @@ private:
     Marks() = default;
     Marks(std::vector<Vec3> marks, std::vector<Vec3> known_inside, std::vector<Vec3> known_outside,
           const ImageGeometry& geometry);
-    /// Sorts the marks, and measures them.
+    /// Sorts the marks, and computes their spacing, subset and hull.
     void arrange(const ImageGeometry& geometry);
     void choose_spread();
     void make_hull(const ImageGeometry& geometry);

@@ -1,4 +1,4 @@
-// A guess of another tool, redrawn by the image where marks say that it is wrong.
+// A guess of another tool, redrawn from the image near the marks that it misses.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -23,8 +23,8 @@ using namespace inference;
 
 /// A mark that the guess misses.
 struct Miss {
-    Vec3 place;      ///< of the frame
-    double off = 0;  ///< how far from the guess
+    Vec3 place;      ///< in the frame
+    double off = 0;  ///< distance from the guess
     bool outside = false;
 };
 
@@ -65,13 +65,13 @@ public:
         });
     }
 
-    /// Bits that the image tells of the guess's sides where no mark speaks against it.
+    /// Bits of information that the image gives about the sides of the guess where no mark contradicts it.
     double learn();
     void draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside);
-    /// In a guess's lattice, what was redrawn.
+    /// The redrawn surface on the lattice of a guess.
     [[nodiscard]] FloatGridPtr on(const FloatGrid& guess) const;
     [[nodiscard]] WorldBox box() const;
-    /// Mean distance of what was drawn to the marks that the guess misses.
+    /// Mean distance of the redrawn surface to the marks that the guess misses.
     [[nodiscard]] double distance_to_marks() const {
         double sum = 0;
         for (const Miss& miss : misses_) sum += std::abs(lattice_.value(level_, miss.place)) / double(misses_.size());
@@ -79,7 +79,7 @@ public:
     }
 
 private:
-    /// To the nearest mark that is missed, in what it is missed by.
+    /// Distance to the nearest missed mark, relative to the distance by which it is missed.
     [[nodiscard]] std::pair<double, const Miss*> nearest_miss(const Vec3& place) const {
         std::pair<double, const Miss*> nearest{std::numeric_limits<double>::infinity(), nullptr};
         for (const Miss& miss : misses_) {
@@ -88,22 +88,22 @@ private:
         }
         return nearest;
     }
-    /// How sure the guess's side of a node is, in [0,1]: marks outside of it say that it is too small there, by so
-    /// much, and those inside that it is too large.
+    /// Confidence in the guess's side of a node, in [0,1]. A mark outside of the guess implies that the guess is too
+    /// small there, up to the distance by which it is missed; one inside implies that it is too large.
     [[nodiscard]] double known(std::size_t n) const {
         const Miss& miss = *nearest_[n];
         if (miss.outside == is_inside(n)) return 1;
         const double deep = std::abs(double(distance_[n])) / miss.off;
         return std::clamp(std::max((double(freedom_[n]) - 1) / (kInference.redrawn - 1), 2 * (deep - 1)), 0.0, 1.0);
     }
-    /// Within a cell.
+    /// Nodes within a cell.
     [[nodiscard]] std::vector<std::size_t> nodes_beside(const Vec3& place) const {
         std::vector<std::size_t> nodes;
         Index3 low, high;
         for (int a = 0; a < 3; ++a) {
             const double at = (place[a] - lattice_.origin[a]) / lattice_.spacing[a],
                          reach = lattice_.finest() / lattice_.spacing[a];
-            const double last = lattice_.size[a] - 1;  // the place may lie anywhere
+            const double last = lattice_.size[a] - 1;  // the position may lie outside the lattice
             low[a] = int(std::clamp(std::ceil(at - reach), 0.0, last + 1));
             high[a] = int(std::clamp(std::floor(at + reach), -1.0, last));
         }
@@ -125,10 +125,10 @@ private:
     Solid guess_;
     Field distance_;  // to it
     ImageFeatures image_;
-    Field freedom_;                     // distance to the nearest miss, in what it is missed by
-    std::vector<const Miss*> nearest_;  // that one
+    Field freedom_;                     // distance to the nearest missed mark, relative to its miss
+    std::vector<const Miss*> nearest_;  // that mark
     std::vector<Sample> samples_;
-    Field level_;  // of what was drawn
+    Field level_;  // of the redrawn surface
 };
 
 double Redrawing::learn() {
@@ -153,16 +153,16 @@ double Redrawing::learn() {
     return held_out_bits(samples_, kInference.ridge, kFolds);
 }
 
-/// Parts that hang on nothing that is known: pieces without the guess's own inside, voids without its outside.
+/// Drops parts without connection to known nodes: pieces without the guess's own inside, voids without its outside.
 void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const {
     std::vector<char> side(body.size());
     for (std::size_t n = 0; n < body.size(); ++n) side[n] = (body[n] != 0) == of_inside ? 1 : 0;
     const Parts parts = label_parts(lattice_, side);
-    std::vector<char> hangs(std::size_t(parts.count) + 1, 0);
+    std::vector<char> is_connected(std::size_t(parts.count) + 1, 0);
     for (std::size_t n = 0; n < body.size(); ++n)
-        if (!is_free(n)) hangs[std::size_t(parts.number[n])] = 1;
+        if (!is_free(n)) is_connected[std::size_t(parts.number[n])] = 1;
     for (std::size_t n = 0; n < body.size(); ++n)
-        if (side[n] != 0 && hangs[std::size_t(parts.number[n])] == 0) body[n] = of_inside ? 0 : 1;
+        if (side[n] != 0 && is_connected[std::size_t(parts.number[n])] == 0) body[n] = of_inside ? 0 : 1;
 }
 
 void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside) {
@@ -183,7 +183,7 @@ void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& o
             weight[n] = 0;
         }
     };
-    // Between a mark and the guess that misses it is what the guess lacks, or has too much.
+    // The nodes between a mark and the guess that misses it are missing in the guess, or wrongly part of it.
     std::array<Field, 3> slope;
     for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice_, distance_, a);
     for (const Miss& miss : misses_) {
@@ -246,7 +246,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
             misses.push_back({to_frame(geometry, marks[n]), std::abs(levels[n]), levels[n] > 0});
     if (misses.empty()) return result;
     with_threads(run, [&] {
-        // A start is clamped: how far off a mark is, is measured anew.
+        // The start is clamped: the distance by which a mark is missed has to be measured again.
         const Solid wide = solid_of(*guess, geometry, around(geometry, misses, kInference.farthest_miss * voxel));
         const Field distance = signed_distance(wide.lattice, wide.inside);
         for (Miss& miss : misses) miss.off = std::max(std::abs(wide.lattice.value(distance, miss.place)), miss.off);

@@ -27,13 +27,14 @@
 namespace covol::detail {
 namespace {
 
-/// Where the program finds what it shares with this process, and what hangs up when it ends.
+/// Descriptors in the started program: the two memories that it shares with this process, and a pipe that is closed
+/// when it ends.
 constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
-constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // the terminal's: not a crash
+constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // from the terminal; they do not mean a crash
 
 enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kNoMemory, kCrashed };
 
-/// What both know of a piece; zeros are one that waits.
+/// State of a piece, shared by both processes. All zeros mean that the piece is waiting.
 struct Slot {
     std::uint32_t state;
     std::int32_t code;
@@ -48,22 +49,23 @@ struct Slot {
         std::strncpy(text, what, sizeof text - 1);
         set(kRefused);
     }
-    /// The program may have been taken over: any number may stand here.
+    /// A malicious file may have taken over the program, so `code` may hold any number.
     [[nodiscard]] Error refusal() const {
         const bool known = code >= 0 && code <= static_cast<std::int32_t>(Errc::Cancelled);
         return {known ? static_cast<Errc>(code) : Errc::InvalidInput, std::string(text, strnlen(text, sizeof text))};
     }
 };
 
-/// What the program is asked: this, a Place for each piece, a Slot for each, and the pieces' texts.
+/// Layout of the orders in shared memory: this header, a Place for each piece, a Slot for each piece, and the texts of
+/// the pieces.
 struct Head {
     std::uint64_t count;
     std::uint32_t task;
     std::int32_t parent;
 };
 struct Place {
-    std::uint64_t path, path_end, detail_end;  ///< in the texts
-    std::uint64_t begin, bytes;                ///< in the results
+    std::uint64_t path, path_end, detail_end;  ///< positions in the texts
+    std::uint64_t begin, bytes;                ///< position and size in the results
 };
 
 class Orders {
@@ -110,21 +112,21 @@ struct Batch {
     }
 };
 
-/// The same descriptor with a number that the program is not given.
-int moved_up(int descriptor) {
+/// The same descriptor, moved to a number that the started program does not inherit.
+int above_inherited(int descriptor) {
     const int other = descriptor < 0 ? -1 : fcntl(descriptor, F_DUPFD_CLOEXEC, kFirstOther);
     if (descriptor >= 0) close(descriptor);
     return other;
 }
 
-/// One that hangs up when all that hold its end for writing have ended.
+/// A pipe whose reading end sees a hang-up when all processes that hold its writing end have ended.
 struct Pipe {
     Pipe() {
         int ends[2];
         if (pipe2(ends, O_CLOEXEC) != 0)
             throw Error(Errc::Io, std::string("expected a pipe, got: ") + std::strerror(errno));
         from = ends[0];
-        to = moved_up(ends[1]);
+        to = above_inherited(ends[1]);
     }
     Pipe(const Pipe&) = delete;
     Pipe& operator=(const Pipe&) = delete;
@@ -139,7 +141,7 @@ struct Pipe {
     int from, to;
 };
 
-/// What posix_spawn() is told of descriptors and signals.
+/// Descriptors and signals that posix_spawn() sets up for the program.
 class SpawnPlan {
 public:
     SpawnPlan(int orders, int results, int alive) {
@@ -165,7 +167,7 @@ public:
         posix_spawnattr_destroy(&attributes_);
     }
 
-    /// @returns its process; throws Error Io.
+    /// @returns the process ID; throws Error Io.
     [[nodiscard]] pid_t start(const std::string& program, const Batch& batch) const {
         std::string name = program, begin = std::to_string(batch.begin), end = std::to_string(batch.end);
         std::string locale = "LC_ALL=C", libraries = "LD_LIBRARY_PATH=";
@@ -189,27 +191,27 @@ private:
     posix_spawnattr_t attributes_{};
 };
 
-/// Seconds that the process has computed; 0 where the system does not say.
-double computed_by(pid_t process) {
+/// CPU time of the process in seconds; 0 if the system does not report it.
+double cpu_seconds(pid_t process) {
     clockid_t clock = 0;
     timespec time{};
     if (clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-/// Until the program ends; one that takes too long for a piece, or whose run is cancelled, is killed.
-/// @param pipe  hung up when it ends
+/// Waits until the program ends. Kills it if it takes too long for a piece, or if the run is cancelled.
+/// @param pipe  sees a hang-up when the program ends
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
     constexpr int kLongestPause = 20;  // milliseconds
-    constexpr double kMaxPauses = 10;  // of a program that computes nothing: a slow disk
+    constexpr double kMaxPauses = 10;  // for a program that uses no CPU time, because of a slow disk for example
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
     double computed_before = 0;
     while (!run.cancelled()) {
         const pid_t ended = waitpid(child, nullptr, WNOHANG);
         if (ended == child || (ended < 0 && errno != EINTR)) return;
-        const double computed = computed_by(child);
+        const double computed = cpu_seconds(child);
         if (const std::size_t now_at = batch.first_not_ended(); now_at != piece) {
             piece = now_at;
             since = Clock::now();
@@ -218,13 +220,13 @@ void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const R
         if (computed - computed_before > seconds) break;
         if (std::chrono::duration<double>(Clock::now() - since).count() > kMaxPauses * seconds) break;
         pollfd hung_up{pipe, 0, 0};
-        if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // it is about to end
+        if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // the program is about to end
     }
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
 }
 
-/// Does the batch in the program. @returns the first piece whose end is not known when that has ended
+/// Runs the program on the batch. @returns the first piece whose outcome is still unknown after the program has ended
 std::size_t run_program(const std::string& program, const Orders& orders, const SharedMemory& results,
                         const Batch& batch, double seconds, const RunContext& run) {
     Pipe alive;
@@ -234,7 +236,7 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     wait_for(child, alive.from, batch, seconds, run);
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
-    if (batch.slots[n].now() != kBegun)  // that says nothing of the file: libraries make threads where they are loaded
+    if (batch.slots[n].now() != kBegun)  // not the file's fault: libraries start threads when they are loaded
         throw Error(Errc::Io, program +
                                   ": expected it to read files apart from this program, but it ended before it began; "
                                   "allow more processes and threads, or memory");
@@ -264,11 +266,11 @@ void do_piece(const std::function<void(const PieceAtWork&)>& work, const Orders&
 }  // namespace
 
 SharedMemory::SharedMemory(std::uint64_t bytes)
-    : SharedMemory(moved_up(memfd_create("covol", MFD_CLOEXEC | MFD_ALLOW_SEALING)),
+    : SharedMemory(above_inherited(memfd_create("covol", MFD_CLOEXEC | MFD_ALLOW_SEALING)),
                    std::max<std::uint64_t>(bytes, 1)) {}
 
 SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(descriptor), bytes_(bytes) {
-    // nobody may take away what the other has mapped
+    // Seals: neither process may shrink the memory that the other has mapped.
     const bool made = ftruncate(descriptor, off_t(bytes)) == 0 &&
                       fcntl(descriptor, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) == 0;
     const int why = made ? 0 : errno;
@@ -302,22 +304,22 @@ SharedMemory::~SharedMemory() {
     if (descriptor_ >= 0) close(descriptor_);
 }
 
-std::vector<Trial> try_pieces(const std::string& program, std::uint32_t task, const std::vector<Piece>& pieces,
-                              const SharedMemory& results, double seconds, const RunContext& run) {
+std::vector<PieceOutcome> run_pieces(const std::string& program, std::uint32_t task, const std::vector<Piece>& pieces,
+                                     const SharedMemory& results, double seconds, const RunContext& run) {
     const Orders orders(task, pieces);
     const std::size_t count = pieces.size();
     const auto do_batch = [&](std::size_t begin, std::size_t end) {
         for (Batch batch{orders.slots(), begin, end}; batch.begin < batch.end && !run.cancelled();)
             batch.begin = run_program(program, orders, results, batch, seconds, run);
     };
-    // To start it and load its libraries takes tens of milliseconds.
+    // Batches amortize the tens of milliseconds that starting the program and loading its libraries takes.
     constexpr std::size_t kMinOfBatch = 8, kMaxOfBatch = 64, kBatchesOfThread = 2;
     const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
     const std::size_t size = std::clamp(count / (kBatchesOfThread * threads), kMinOfBatch, kMaxOfBatch);
     tbb::parallel_for(std::size_t(0), (count + size - 1) / size,
                       [&](std::size_t b) { do_batch(b * size, std::min((b + 1) * size, count)); });
     run.check();
-    std::vector<Trial> trials(count);
+    std::vector<PieceOutcome> trials(count);
     for (std::size_t n = 0; n < count; ++n) {
         Slot& slot = orders.slots()[n];
         const State state = slot.now();
@@ -341,10 +343,10 @@ int serve_pieces(int count, char** arguments, const std::function<void(const Pie
     setrlimit(RLIMIT_CORE, &none);
     const Orders orders(SharedMemory(SharedMemory::Given{kOrders}));
     const SharedMemory results(SharedMemory::Given{kResults});
-    if (getppid() != orders.head().parent) return 2;  // it ended before the line above could see to it
+    if (getppid() != orders.head().parent) return 2;  // the parent ended before prctl()
     const std::size_t end = std::strtoull(arguments[2], nullptr, 10);
     for (std::size_t n = std::strtoull(arguments[1], nullptr, 10); n < end; ++n) do_piece(work, orders, results, n);
-    _exit(0);  // no destructors: those of libraries may crash, too
+    _exit(0);  // skips destructors, because those of libraries may crash, too
 }
 
 double max_seconds_for_pixels(std::uint64_t bytes) {
@@ -352,7 +354,7 @@ double max_seconds_for_pixels(std::uint64_t bytes) {
     return kMaxSecondsForHeader + kSecondsOfByte * double(bytes);
 }
 
-std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {
+std::optional<Error> reading_error(const PieceOutcome& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
     return Error(Errc::InvalidInput, path + ": damaged: the " + library + " library cannot read it");
 }

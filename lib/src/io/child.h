@@ -10,17 +10,18 @@
 #include "covol/error.h"
 #include "covol/run.h"
 
-// Files that may crash the library that reads them are read by another program, which is started for it (posix_spawn)
-// and answers in shared memory. It is no copy of this process: one of a process with threads may wait for ever for a
-// lock that another thread held.
+// Files that may crash the library that reads them are read in a separate program. It is started with posix_spawn() and
+// returns its results in shared memory. It is not a fork of this process: in the fork of a process with threads, a lock
+// that another thread held at that time is never released.
 namespace covol::detail {
 
-/// Zeros that this process and a program that it starts share. Their number is sealed: neither can take them away.
+/// Memory, initially zero, that this process shares with a program that it starts. Its size is sealed, so neither can
+/// shrink it.
 class SharedMemory {
 public:
     /// @throws std::bad_alloc
     explicit SharedMemory(std::uint64_t bytes);
-    /// What another process made, by its descriptor, which is taken over. @throws std::bad_alloc
+    /// Memory that another process has made. Takes over its descriptor. @throws std::bad_alloc
     struct Given {
         int descriptor;
     };
@@ -42,52 +43,53 @@ private:
     char* data_;
 };
 
-/// A file that the reading program is given.
+/// A file to be read by the program.
 struct Piece {
     std::string path;
-    std::string detail = {};  ///< what else the task needs
-    std::uint64_t begin = 0;  ///< where its result goes in the memory for results
+    std::string detail = {};  ///< further input of the task
+    std::uint64_t begin = 0;  ///< position of the result in the memory for results
     std::uint64_t bytes = 0;  ///< of the result
 };
 
-/// Bytes of an answer that comes beside the result.
+/// Bytes of the answer that a piece returns besides its result.
 inline constexpr std::size_t kAnswerBytes = 4096;
 
-/// How a piece ended.
-struct Trial {
+/// The outcome for one piece.
+struct PieceOutcome {
     bool crashed = false;          ///< the program ended by a signal, or took too long
-    std::optional<Error> refused;  ///< what it threw; the message cut after some 4,000 characters
-    std::vector<char> answer;      ///< kAnswerBytes where it did neither
+    std::optional<Error> refused;  ///< the error that was thrown; its message is cut after about 4,000 characters
+    std::vector<char> answer;      ///< kAnswerBytes, unless the piece crashed or was refused
 };
 
-/// Starts `program` for the pieces, and again behind one that crashes it. One call of it does some of them, and as many
-/// are at work at once as the caller's arena has threads. It gets no environment but LD_LIBRARY_PATH, no descriptor but
-/// its own, and no stop signal of the terminal's; it ends when the calling thread does.
-/// @param task     what to do with each; means nothing here
-/// @param results  where the pieces' results go
-/// @param seconds  that one piece may compute; waiting, it may take ten times as long
-/// @returns how each ended
-/// @throws Error Cancelled, Io (the program cannot be started); std::bad_alloc here or there.
-std::vector<Trial> try_pieces(const std::string& program, std::uint32_t task, const std::vector<Piece>& pieces,
-                              const SharedMemory& results, double seconds, const RunContext& run);
+/// Runs `program` for the pieces, and starts it again for the remaining ones after a piece has crashed it. Each process
+/// works on a batch of pieces; as many processes run at once as the caller's arena has threads. A process inherits no
+/// environment but LD_LIBRARY_PATH, no other descriptors, and ignores the terminal's stop signals; it ends when the
+/// calling thread does.
+/// @param task     what to do with each piece; passed on to the program without being interpreted
+/// @param results  memory for the pieces' results
+/// @param seconds  maximum CPU time for one piece; the elapsed time may be ten times as long
+/// @returns the outcome for each piece
+/// @throws Error Cancelled, Io (the program cannot be started); std::bad_alloc in this process or the program.
+std::vector<PieceOutcome> run_pieces(const std::string& program, std::uint32_t task, const std::vector<Piece>& pieces,
+                                     const SharedMemory& results, double seconds, const RunContext& run);
 
-/// A piece, in the program.
+/// A piece, as the program sees it.
 struct PieceAtWork {
     std::uint32_t task;
     const std::string &path, &detail;
     std::span<char> result, answer;
 };
 
-/// The main function of such a program: does the pieces that its arguments name. @returns 2 where try_pieces() did not
-/// start it; else it does not return.
+/// The main function of such a program: processes the pieces that its arguments name. @returns 2 if run_pieces() did
+/// not start it; otherwise it does not return.
 int serve_pieces(int count, char** arguments, const std::function<void(const PieceAtWork&)>& work);
 
-/// Seconds that a library may compute for a header, or a voxel: far beyond what sound files need.
+/// Maximum seconds that a library may compute for a header, or a voxel: far more than valid files need.
 constexpr double kMaxSecondsForHeader = 10;
-/// The same for pixels of so many bytes: text and JPEG 2000 take a twentieth of it.
+/// The same for so many bytes of pixels. Even slow formats (text, JPEG 2000) need only a twentieth of it.
 [[nodiscard]] double max_seconds_for_pixels(std::uint64_t bytes);
 
-/// Why `library` cannot read the image `path`; nothing where it can.
-std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library);
+/// The reason why `library` cannot read the image `path`; empty if it can.
+std::optional<Error> reading_error(const PieceOutcome& trial, const std::string& path, const char* library);
 
 }  // namespace covol::detail

@@ -34,7 +34,7 @@ std::string one_line(std::string text) {
     return text;
 }
 
-/// Runs one call into OpenVDB and turns its exceptions into ours.
+/// Runs one call into OpenVDB and converts its exceptions.
 template <typename Call>
 auto with_openvdb(Errc code, const std::string& what, Call&& call) {
     try {
@@ -53,9 +53,9 @@ std::map<std::string, std::string> to_text(const vdb::MetaMap& metadata) {
     return result;
 }
 
-/// Reads single grids out of a .vdb file. openvdb::io::File would do, were it not that it goes on reading behind the
-/// end of a damaged file, and makes a string of any length that such a file asks for. Here the stream throws at the
-/// file's end, and lengths are walked over before OpenVDB sees them.
+/// Reads single grids from a .vdb file. Unlike openvdb::io::File, it does not read beyond the end of a damaged file, or
+/// allocate strings of any length that such a file states: the stream throws at the file's end, and lengths are checked
+/// before OpenVDB reads them.
 class Reader : public vdb::io::Archive {
 public:
     explicit Reader(const std::string& path) : stream_(path, std::ios::binary) {
@@ -86,7 +86,7 @@ public:
     }
     ~Reader() override {
         stream_.exceptions(std::ios::goodbit);
-        // The tags die before the stream does.
+        // The metadata is destroyed before the stream.
         vdb::io::clearStreamMetadataPtr(stream_);
     }
     Reader(const Reader&) = delete;
@@ -94,20 +94,20 @@ public:
 
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
-    /// A name of its own: "surface[1]" is the second grid named "surface", as OpenVDB's programs print it.
-    [[nodiscard]] std::string own_name(std::size_t n) const {
+    /// A unique name: "surface[1]" is the second grid named "surface", as printed by OpenVDB's programs.
+    [[nodiscard]] std::string unique_name(std::size_t n) const {
         std::size_t before = 0;
         for (std::size_t other = 0; other < n; ++other) before += name(other) == name(n) ? 1 : 0;
         return before == 0 ? name(n) : name(n) + "[" + std::to_string(before) + "]";
     }
-    /// Its own name, or the name with [0] for the first of several.
+    /// Whether the name is the grid's unique name; [0] may be added for the first of several.
     [[nodiscard]] bool is_named(std::size_t n, const std::string& wanted) const {
-        return own_name(n) == wanted || own_name(n) + "[0]" == wanted;
+        return unique_name(n) == wanted || unique_name(n) + "[0]" == wanted;
     }
     [[nodiscard]] std::string type(std::size_t n) const { return entries_[n].descriptor.gridType(); }
     [[nodiscard]] bool is_half(std::size_t n) const { return entries_[n].descriptor.saveFloatAsHalf(); }
 
-    /// Metadata and transform; the tree stays empty.
+    /// Reads metadata and transform; the tree is left empty.
     vdb::GridBase::Ptr read_metadata(std::size_t n) {
         const Entry& entry = entries_[n];
         seek_to_grid(entry);
@@ -117,7 +117,7 @@ public:
         return entry.empty_grid;
     }
 
-    /// Of the grid that was read last. @return OpenVDB's flags
+    /// Compression of the grid that was read last. @return OpenVDB's flags
     [[nodiscard]] std::uint32_t grid_compression() { return vdb::io::getDataCompression(stream_); }
 
     vdb::GridBase::Ptr read_whole(std::size_t n) {
@@ -128,7 +128,7 @@ public:
         try {
             readGrid(grid, entry.descriptor, stream_);
         } catch (...) {
-            keep_for_ever(grid);
+            leak_grid(grid);
             throw;
         }
         if (entry.descriptor.isInstance()) {
@@ -149,8 +149,9 @@ private:
         vdb::GridBase::Ptr empty_grid;
     };
 
-    /// The nodes of a tree that was read in part have children that are not there: it must not be destroyed.
-    static void keep_for_ever(const vdb::GridBase::Ptr& grid) {
+    /// Keeps a partially read tree for ever: its nodes refer to children that do not exist, so it must not be
+    /// destroyed.
+    static void leak_grid(const vdb::GridBase::Ptr& grid) {
         static std::mutex mutex;
         static auto& kept = *new std::vector<vdb::GridBase::Ptr>;
         const std::lock_guard lock(mutex);
@@ -213,7 +214,7 @@ bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 std::string list_grids(const Reader& reader) {
     std::string list;
     for (std::size_t n = 0; n < reader.size(); ++n)
-        list += (n == 0 ? "" : ", ") + reader.own_name(n) + " (" + reader.type(n) + ")";
+        list += (n == 0 ? "" : ", ") + reader.unique_name(n) + " (" + reader.type(n) + ")";
     return list.empty() ? "no grid at all" : list;
 }
 
@@ -229,10 +230,10 @@ void check_grids(const std::string& function, const std::string& path, const std
     }
 }
 
-/// OpenVDB gives every file a random number, a UUID in its header; here it comes from what follows it, so that runs
-/// that are the same write files that are the same.
+/// OpenVDB writes a random UUID into each file's header. Here it is replaced by a hash of the remaining contents, so
+/// that identical runs write identical files.
 void make_repeatable(const std::string& path) {
-    constexpr std::streamoff kUuid = 8 + 4 + 4 + 4 + 1;  // behind the magic number, three versions and a flag
+    constexpr std::streamoff kUuid = 8 + 4 + 4 + 4 + 1;  // after the magic number, three versions and a flag
     constexpr std::size_t kLength = 36;
     std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
     std::string uuid(kLength, '\0');
@@ -246,7 +247,7 @@ void make_repeatable(const std::string& path) {
         return true;
     };
     if (!file || !is_uuid()) OPENVDB_THROW(vdb::IoError, "expected a UUID in the header of the file just written");
-    // Two sums of the kind of MurmurHash's mixer. https://github.com/aappleby/smhasher
+    // Two hashes that use a mixing step like MurmurHash's. https://github.com/aappleby/smhasher
     std::array<std::uint64_t, 2> sums{0x9e3779b97f4a7c15, 0xc2b2ae3d27d4eb4f};
     std::vector<std::uint64_t> words(1U << 16);
     while (file) {
@@ -260,7 +261,7 @@ void make_repeatable(const std::string& path) {
     }
     sums[1] ^= sums[0] >> 32;
     std::array<char, kLength + 1> text{};
-    // Version 8: the bits are the writer's own. https://www.rfc-editor.org/rfc/rfc9562
+    // Version 8: the bits are defined by the writer. https://www.rfc-editor.org/rfc/rfc9562
     std::snprintf(text.data(), text.size(), "%08x-%04x-8%03x-%04x-%012llx", unsigned(sums[0] >> 32),
                   unsigned(sums[0] >> 16 & 0xFFFF), unsigned(sums[0] & 0xFFF),
                   unsigned(0x8000 | (sums[1] >> 48 & 0x3FFF)),
@@ -302,7 +303,7 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
         grid = reader.read_whole(n);
         grid->addStatsMetadata();
     }
-    info.name = reader.own_name(n);
+    info.name = reader.unique_name(n);
     info.type = reader.type(n) + (reader.is_half(n) ? "_HalfFloat" : "");
     info.grid_class = vdb::GridBase::gridClassToString(grid->getGridClass());
     info.voxel_size = grid->voxelSize()[0];
@@ -317,7 +318,8 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
     return info;
 }
 
-/// @throws Error InvalidInput unless numbers hold the grid's lattice well; transforms that are not linear have none.
+/// @throws Error InvalidInput unless floating-point numbers represent the grid's lattice accurately; transforms that
+/// are not linear have no lattice.
 void check_place(const std::string& path, const FloatGrid& grid) {
     const auto& transform = grid.transform();
     if (!transform.isLinear()) return;
@@ -343,7 +345,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     };
     vdb::MetaMap file_metadata;
     add_provenance(file_metadata);
-    vdb::GridPtrVec copies;  // of the metadata; the trees are shared
+    vdb::GridPtrVec copies;  // copies of the metadata; the trees are shared
     for (const FloatGridPtr& grid : grids) {
         const FloatGridPtr copy = grid->copy();
         add_provenance(*copy);

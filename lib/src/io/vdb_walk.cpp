@@ -41,7 +41,7 @@ T read(std::istream& stream) {
     return value;
 }
 
-/// @return the length of a text or value; the stream is at its beginning
+/// @return the length of a text or value; the stream is at that length
 std::uint32_t read_length(std::istream& stream, const std::string& what, std::int64_t file_bytes) {
     const auto length = read<std::uint32_t>(stream);
     if (length > file_bytes - std::int64_t(stream.tellg()))
@@ -49,22 +49,21 @@ std::uint32_t read_length(std::istream& stream, const std::string& what, std::in
     return length;
 }
 
-/// OpenVDB reads a byte into a bool.
+/// OpenVDB reads this byte into a bool, for which other values are undefined behaviour.
 void check_bool(std::uint8_t value) {
     if (value > 1) throw std::runtime_error("expected 0 or 1 for false or true, got " + std::to_string(value));
 }
 
-/// Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes.
+/// Checks Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes.
 void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t bytes, std::int64_t packed) {
     if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
         throw std::runtime_error("a block's header has other sizes than it");
 }
 
-/// What OpenVDB keeps of each leaf for delayed loading: two arrays, either packed behind its packed size, or as it is
-/// behind a 0; the second may be missing.
-/// @param length  of it all; more than 0
+/// Checks OpenVDB's data about each leaf for delayed loading: two arrays, each either packed after its packed size, or
+/// unpacked after a 0; the second may be missing. @param length  total length; more than 0
 void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t file_bytes) {
-    constexpr std::int64_t kMinLeaf = 64;  // bytes: its mask
+    constexpr std::int64_t kMinLeaf = 64;  // bytes; the size of its mask
     constexpr std::uint32_t kMissing = 0xFFFFFFFF;
     using vdb_io::DelayedLoadMetadata;
     const auto begin = stream.tellg();
@@ -80,7 +79,7 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
         if (packed > 0) {
             if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
             const auto header = read<std::array<std::uint32_t, 4>>(stream);
-            // OpenVDB fills what is small up with zeros.
+            // OpenVDB pads small blocks with zeros.
             constexpr std::int64_t kPadded = 128;
             check_blosc_header(header, bytes < kPadded && header[1] == kPadded ? kPadded : bytes, stored);
         }
@@ -106,7 +105,7 @@ public:
             internal_node(5);
         }
         for (const std::int64_t active : leaves_) {
-            skip(kLeafValues / 8);  // the mask once more
+            skip(kLeafValues / 8);  // the mask is repeated
             values(kLeafValues, active);
         }
     }
@@ -122,7 +121,7 @@ private:
     void skip(std::int64_t bytes) {
         if (bytes < 0 || bytes > layout_.file_bytes - std::int64_t(stream_.tellg()))
             throw std::runtime_error("a block of " + std::to_string(bytes) + " bytes does not fit into the file");
-        // To seek drops what the stream has read ahead.
+        // Seeking discards the stream's read-ahead, so short distances are read instead.
         constexpr std::int64_t kFar = 1 << 16;
         if (bytes < kFar)
             stream_.ignore(bytes);
@@ -144,10 +143,11 @@ private:
             else
                 internal_node(log2 - 1);
     }
-    /// @param count  of the node @param active  of them
+    /// @param count  number of values of the node
+    /// @param active  number of active ones
     void values(std::int64_t count, std::int64_t active) {
         const auto kind = read<std::int8_t>();
-        // io/Compression.h: what of inactive values follows, by kind
+        // io/Compression.h: the kind states which inactive values follow
         if (kind == vdb_io::NO_MASK_AND_ONE_INACTIVE_VAL || kind == vdb_io::MASK_AND_ONE_INACTIVE_VAL)
             skip(value_.whole);
         if (kind == vdb_io::MASK_AND_TWO_INACTIVE_VALS) skip(2 * value_.whole);
@@ -162,7 +162,7 @@ private:
         const bool blosc = (layout_.compression & vdb_io::COMPRESS_BLOSC) != 0;
         if (!blosc && (layout_.compression & vdb_io::COMPRESS_ZIP) == 0) return skip(bytes);
         const auto packed = read<std::int64_t>();
-        if (packed <= 0) {  // as it is
+        if (packed <= 0) {  // not packed
             if (packed != -bytes)
                 throw std::runtime_error("expected a block of " + std::to_string(bytes) +
                                          " bytes as it is, its length says " + std::to_string(packed));
@@ -177,7 +177,7 @@ private:
     std::istream& stream_;
     const VdbTreeLayout& layout_;
     ValueBytes value_;
-    std::vector<std::int64_t> leaves_;  ///< active values of each, in the file's order
+    std::vector<std::int64_t> leaves_;  ///< number of active values of each leaf, in the file's order
 };
 
 }  // namespace

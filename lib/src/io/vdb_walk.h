@@ -3,31 +3,30 @@
 #include <istream>
 #include <string>
 
-// What OpenVDB takes from a file without a look, lengths above all, is looked at here before. Each function begins
-// where the stream stands, and throws a std::exception where something does not fit; the stream throws at the file's
-// end.
+// Checks data that OpenVDB reads from a file without checking, lengths above all. Each function begins at the stream's
+// position, and throws a std::exception if the data is inconsistent; the stream throws at the file's end.
 namespace covol::detail {
 
-/// A text behind its length. @param what  for the message
+/// Skips a text after its length. @param what  for the message
 void skip_vdb_text(std::istream& stream, const char* what, std::int64_t file_bytes);
 
-/// A list of metadata: names, types and values. OpenVDB reads as many bytes as a value's type has, whatever length the
-/// file gives it.
+/// Skips a list of metadata: names, types and values. OpenVDB reads as many bytes as a value's type has, even if the
+/// file states another length.
 void skip_vdb_metadata(std::istream& stream, std::int64_t file_bytes);
 
-/// How a tree lies in a .vdb file.
+/// How a tree is stored in a .vdb file.
 struct VdbTreeLayout {
-    std::string type;               ///< of the grid, "Tree_float_5_4_3"
-    bool is_half = false;           ///< values are 16-bit floats
+    std::string type;               ///< of the grid, for example "Tree_float_5_4_3"
+    bool is_half = false;           ///< values are stored as 16-bit floats
     std::uint32_t compression = 0;  ///< OpenVDB's flags
     std::int64_t file_bytes = 0;
 };
 
-/// Goes over a tree without reading its values: OpenVDB reads as many bytes as a block claims into a buffer of the size
-/// that it should have. Trees of other types than 5_4_3 of float, double, int32, int64, vec3s and vec3d are not looked
-/// at. Files since OpenVDB 3.0 (version 222).
-/// @param stream  at the tree's beginning, behind the grid's transform; left anywhere
-/// @throws std::exception where a block does not have the size that it should have, or does not fit into the file.
+/// Goes through a tree without reading its values, and checks the size of each block: OpenVDB reads as many bytes as a
+/// block claims into a buffer of the size that it should have. Trees of types other than 5_4_3 of float, double, int32,
+/// int64, vec3s and vec3d are not checked. Supports files since OpenVDB 3.0 (version 222).
+/// @param stream  at the beginning of the tree, after the grid's transform; its final position is undefined
+/// @throws std::exception if a block does not have the expected size, or does not fit into the file.
 void walk_vdb_tree(std::istream& stream, const VdbTreeLayout& layout);
 
 }  // namespace covol::detail

@@ -2,7 +2,7 @@
 #include <map>
 #include <string>
 
-// As much of XML as the headers of images need.
+// A parser for the subset of XML that the headers of images use.
 namespace covol::detail {
 
 struct XmlTag {
@@ -16,14 +16,14 @@ struct XmlTag {
     }
 };
 
-/// Goes through the tags of an XML text; comments and declarations are passed over. Whatever is no XML ends it.
+/// Iterates over the tags of an XML text; comments and declarations are skipped. It ends at the first syntax error.
 class XmlTags {
 public:
-    /// @param text  has to outlive this
+    /// @param text  has to outlive this object
     explicit XmlTags(const std::string& text) : text_(text) {}
 
     bool next(XmlTag& tag);
-    /// What stands between the last tag and the one behind it.
+    /// The text between the current tag and the next one.
     [[nodiscard]] std::string text() const;
 
 private:

@@ -5,10 +5,10 @@
 
 namespace covol::detail {
 
-/// Refuses what is sure to take more than run.memory_budget, before it takes any.
-/// @param bytes   that are needed at least
-/// @param what    takes them: "a.zarr: the image"
-/// @param advice  what to do; options in backticks
+/// Rejects a computation that certainly needs more than run.memory_budget, before it allocates memory.
+/// @param bytes   minimum memory that is needed
+/// @param what    subject of the message: "a.zarr: the image"
+/// @param advice  how to avoid it; options in backticks
 /// @throws Error InvalidOptions
 void require_memory(double bytes, const std::string& what, const char* advice, const RunContext& run);
 

@@ -4,20 +4,20 @@
 
 #include "covol/fwd.h"
 
-// Lengths and places that numbers hold well, whatever file they come from.
+// Lengths and positions that floating-point numbers represent well, for files of any kind.
 namespace covol::detail {
 
-// Volumes are cubes of lengths, and some are held in single precision.
+// Volumes are cubes of lengths, and some are stored in single precision.
 constexpr double kMinLength = 1e-12, kLargestLength = 1e12;
-// From 0: double precision then has a million places within a voxel.
+// Distance from 0 at which double precision still resolves a millionth of a voxel.
 constexpr double kFarthestVoxel = 4294967296.0;
 
-/// How far from 0 an image or a grid with voxels of that size may begin, in world units.
+/// Maximum distance from 0 of the origin of an image or a grid with voxels of that size, in world units.
 [[nodiscard]] inline double farthest_origin(double voxel_size) {
     return std::min(kLargestLength, kFarthestVoxel * voxel_size);
 }
 
-/// Whether every coordinate is a number within `farthest` of 0.
+/// Whether every coordinate is a number whose absolute value is at most `farthest`.
 [[nodiscard]] inline bool is_within(const Vec3& place, double farthest) {
     return std::all_of(place.begin(), place.end(), [&](double x) { return std::abs(x) <= farthest; });
 }

@@ -12,9 +12,9 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // structures; of more only warnings are logged
+constexpr std::size_t kMaxInLines = 4;  // structures; for more only warnings are logged
 
-/// Hints of the points that `marks` ends with. Lists are made once a cloud has something for them.
+/// Adds the hints of the points that `marks` ends with. Lists are created once a cloud has values for them.
 void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, Marks& marks) {
     const std::size_t before = marks.points.size() - world.size();
     std::vector<Vec3>& normals = marks.hints.normals;
@@ -118,7 +118,7 @@ std::vector<Vec3> positions_of(const Marks& marks, const std::optional<ImageGeom
 }
 
 Marks* find_structure(std::vector<Marks>& structures, const std::string& name) {
-    const std::string safe = safe_text(name);  // it goes into files, tables and onto terminals
+    const std::string safe = safe_text(name);  // safe in files, tables and terminals
     const auto at =
         std::find_if(structures.begin(), structures.end(), [&](const Marks& marks) { return marks.name == safe; });
     return at != structures.end() ? &*at : nullptr;

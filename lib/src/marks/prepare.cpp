@@ -1,4 +1,4 @@
-// Marks as they are given, to what segment() takes once the voxel size is known.
+// Converts marks as given to the input of segment(), once the voxel size is known.
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -14,7 +14,7 @@
 namespace covol {
 namespace {
 
-/// What painted images say; each is understood when it is first asked for.
+/// The content of painted images; each is analysed when it is first needed.
 class PaintReader {
 public:
     PaintReader(const std::optional<ImageGeometry>& image, bool force) : image_(image), force_(force) {}
@@ -57,7 +57,7 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
                     "tag_distance");
 }
 
-/// One structure after the other.
+/// Prepares one structure after the other.
 class Preparer {
 public:
     Preparer(std::vector<Marks> structures, const std::optional<ImageGeometry>& image, const SegmentOptions& options,
@@ -105,12 +105,12 @@ public:
 private:
     [[nodiscard]] double h() const { return marks_options_.contours.step; }
 
-    /// Its lines are marks, and its sections tell sides.
+    /// The lines become marks, and the sections determine the sides.
     static void add_network(const Contours& network, Marks& marks, SegmentOptions& options) {
         const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
             list.insert(list.end(), more.begin(), more.end());
         };
-        // Other points have none: then nothing is known.
+        // Other points have no normals, and the list has to be complete.
         if (marks.points.empty()) {
             marks.hints.normals = network.outward;
             marks.hints.is_outward = true;
@@ -123,7 +123,7 @@ private:
         if (!marks.hints.to_sensor.empty()) marks.hints.to_sensor.resize(marks.points.size());
     }
 
-    /// Of the only view of the only painted image, which needs no common lattice; or null.
+    /// The contours of the only view of the only painted image, which needs no common lattice; or null.
     std::shared_ptr<const Contours> own_contours(const Marks& marks, const RunContext& run) {
         if (marks.paint.size() != 1 || !marks.contours.empty()) return nullptr;
         const PaintedLabel& label = paint_.label_of(marks.paint.front(), run);
@@ -134,7 +134,7 @@ private:
         return contours;
     }
 
-    /// Outlines in the world, to be joined with other contours.
+    /// Adds outlines in the world, to be combined with other contours.
     void add_outlines(Marks& marks, const RunContext& run) {
         for (const Marks::Paint& paint : marks.paint)
             for (const PaintedView& view : paint_.label_of(paint, run).views) {

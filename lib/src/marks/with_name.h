@@ -5,7 +5,7 @@
 
 namespace covol::detail {
 
-/// What `work` returns; its errors begin with the structure's name.
+/// Returns the result of `work`; its errors are prefixed with the structure's name.
 template <typename Work>
 auto with_name(const std::string& name, const Work& work) {
     try {

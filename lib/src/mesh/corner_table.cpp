@@ -15,7 +15,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
       opposite_(corner_count(triangles.size()), kNone),
       corner_of_(vertices, kNone),
       on_boundary_(vertices, 0) {
-    // Sides in the order of the vertex that they leave.
+    // Sides sorted by the vertex that they leave.
     const auto corners = std::uint32_t(opposite_.size());
     std::vector<std::uint32_t> first(vertices + 1, 0), leaving(corners);
     for (std::uint32_t c = 0; c < corners; ++c) ++first[vertex(c) + 1];
@@ -28,7 +28,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     std::atomic<std::uint32_t> twice = kNone;
     tbb::parallel_for(std::uint32_t(0), corners, [&](std::uint32_t c) {
         const std::uint32_t from = vertex(previous(c)),
-                            to = vertex(next(c));  // the side, as the other triangle runs it
+                            to = vertex(next(c));  // the side in the direction of the other triangle
         for (std::uint32_t n = first[from]; n < first[from + 1]; ++n) {
             if (vertex(next(leaving[n])) != to) continue;
             if (opposite_[c] != kNone) twice = c;
@@ -46,7 +46,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     for (std::uint32_t c = 0; c < corners; ++c) {
         if (opposite_[c] != kNone) continue;
         on_boundary_[vertex(next(c))] = on_boundary_[vertex(previous(c))] = 1;
-        corner_of_[vertex(next(c))] = next(c);  // with the clock from here is nothing
+        corner_of_[vertex(next(c))] = next(c);  // no triangle follows clockwise
     }
 }
 
@@ -91,7 +91,7 @@ void CornerTable::unflip(std::uint32_t corner) {
     link(c, o);
     if (corner_of_[w] == previous(c)) corner_of_[w] = o;
     if (corner_of_[v] == previous(o)) corner_of_[v] = c;
-    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // the first, where a or b lies on the boundary
+    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // the first corner, if a or b is on the boundary
     if (corner_of_[b] == next(o)) corner_of_[b] = previous(c);
 }
 
@@ -102,7 +102,7 @@ bool CornerTable::can_collapse(std::uint32_t corner) const {
     if (v == w) return false;
     int common = 0;
     around(a, [&](std::uint32_t c) { common += adjacent(b, vertex(next(c))); });
-    // The vertices beside the edge lose a triangle; of two triangles none can go.
+    // The vertices opposite to the edge lose a triangle each; at least three must remain.
     return common == 2 && (is_boundary(v) || valence(v) > 3) && (is_boundary(w) || valence(w) > 3);
 }
 
@@ -112,12 +112,13 @@ void CornerTable::collapse(std::uint32_t corner) {
     std::vector<std::uint32_t> at_b;
     around(b, [&](std::uint32_t at) { at_b.push_back(at); });
     for (const std::uint32_t at : at_b) triangles_[at / 3][at % 3] = a;
-    // c: (v, a, b), o: (w, b, a); what lay beyond their other sides meets.
+    // c: (v, a, b), o: (w, b, a); the triangles beyond their other sides become adjacent.
     const std::uint32_t beyond_vb = opposite_[next(c)], beyond_va = opposite_[previous(c)];
     const std::uint32_t beyond_wa = opposite_[next(o)], beyond_wb = opposite_[previous(o)];
     link(beyond_vb, beyond_va);
     link(beyond_wa, beyond_wb);
-    // The ends of the edge lie within the mesh, and so do these sides; a boundary vertex beside it begins elsewhere.
+    // The ends of the edge are not on the boundary, and neither are these sides; a boundary vertex opposite to the edge
+    // has its first corner elsewhere.
     const auto corner_beside = [&](std::uint32_t vertex_at, std::uint32_t beyond) {
         const std::uint32_t at = next(beyond);
         return vertex(at) == vertex_at ? at : previous(beyond);

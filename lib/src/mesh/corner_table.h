@@ -7,15 +7,14 @@
 
 namespace covol::meshing {
 
-/// Who is next to whom in a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t;
-/// `opposite` is the corner on the other side of the edge that a corner faces (Rossignac and others, Corner table,
-/// 1999).
+/// Adjacency of a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t; `opposite` is the
+/// corner on the other side of the edge opposite to a corner (Rossignac et al., Corner table, 1999).
 class CornerTable {
 public:
     static constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
     /// @param triangles  kept by reference, and changed by flip() and collapse().
-    /// @throws Error InvalidInput when an edge has more than two triangles, or two of the same direction.
+    /// @throws Error InvalidInput if an edge has more than two triangles, or two of the same direction.
     CornerTable(std::vector<Triangle>& triangles, std::size_t vertices);
 
     static std::uint32_t next(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
@@ -28,10 +27,10 @@ public:
     [[nodiscard]] bool is_closed() const {
         return std::find(on_boundary_.begin(), on_boundary_.end(), 1) == on_boundary_.end();
     }
-    /// A corner at the vertex, kNone where no triangle is; around a boundary vertex the first against the clock.
+    /// A corner at the vertex, kNone if it has no triangle; for a boundary vertex the first one counter-clockwise.
     [[nodiscard]] std::uint32_t corner_of(std::uint32_t v) const { return corner_of_[v]; }
 
-    /// Calls visit(corner) for each corner at the vertex, against the clock.
+    /// Calls visit(corner) for each corner at the vertex, counter-clockwise.
     template <typename Visit>
     void around(std::uint32_t v, const Visit& visit) const {
         const std::uint32_t first = corner_of_[v];
@@ -46,18 +45,18 @@ public:
     [[nodiscard]] bool adjacent(std::uint32_t v, std::uint32_t w) const;
     [[nodiscard]] int valence(std::uint32_t v) const;
 
-    /// Whether the edge that the corner faces can be turned with the mesh staying manifold.
+    /// Whether the mesh remains manifold if the edge opposite to the corner is flipped.
     [[nodiscard]] bool can_flip(std::uint32_t corner) const;
-    /// Turns the edge that the corner faces; the new one is faced by next(corner). @pre can_flip(corner)
+    /// Flips the edge opposite to the corner; the new edge is opposite to next(corner). @pre can_flip(corner)
     void flip(std::uint32_t corner);
     /// Undoes flip(corner).
     void unflip(std::uint32_t corner);
 
-    /// Whether the edge that the corner faces can be drawn together with the mesh staying manifold and of the same
-    /// topology: no vertex but the two beside the edge is next to both of its ends.
+    /// Whether the edge opposite to the corner can be collapsed such that the mesh remains manifold with the same
+    /// topology: no vertices except the two opposite to the edge are adjacent to both of its ends.
     [[nodiscard]] bool can_collapse(std::uint32_t corner) const;
-    /// Draws the edge from vertex(next(corner)) to vertex(previous(corner)) together in the former; the latter and two
-    /// triangles go: is_gone(). @pre can_collapse(corner)
+    /// Collapses the edge from vertex(next(corner)) to vertex(previous(corner)) into the former; the latter and two
+    /// triangles are removed: is_gone(). @pre can_collapse(corner)
     void collapse(std::uint32_t corner);
     [[nodiscard]] bool is_gone(std::uint32_t triangle) const { return triangles_[triangle][0] == kNone; }
 
@@ -72,7 +71,7 @@ private:
     std::vector<std::uint8_t> on_boundary_;
 };
 
-/// Takes out the triangles that are gone, and vertices without a triangle.
+/// Removes the triangles marked as gone, and vertices without triangles.
 void remove_gone(std::vector<Triangle>& triangles, Positions& positions);
 
 }  // namespace covol::meshing

@@ -22,7 +22,7 @@ Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(
 
 bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/// A triangle's side from corner k to corner k+1, number 3 t + k, under its lower vertex.
+/// A triangle's side from corner k to corner k+1, number 3 t + k, stored at its lower vertex.
 struct Side {
     std::uint32_t high;
     std::uint32_t number;
@@ -35,7 +35,7 @@ std::uint32_t corner_vertex(const TriangleMesh& mesh, std::uint32_t corner) {
 }
 std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 
-/// Calls visit(first, last) with the sides that lie on each edge; degenerate triangles have none.
+/// Calls visit(first, last) with the sides on each edge; degenerate triangles have none.
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
     const std::uint32_t corners = meshing::corner_count(mesh.triangles.size());
@@ -86,7 +86,7 @@ MeshMeasures measure(const TriangleMesh& mesh) {
 
     m.closed = m.manifold = !degenerate;
     DisjointSets components(mesh.triangles.size());
-    DisjointSets umbrellas(meshing::corner_count(mesh.triangles.size()));  // of corners, around their vertices
+    DisjointSets umbrellas(meshing::corner_count(mesh.triangles.size()));  // sets of corners around the same vertex
     std::int64_t edges = 0;
     for_each_edge(mesh, [&](const Side* first, const Side* last) {
         ++edges;
@@ -143,14 +143,15 @@ void meshing::add_normals(const std::array<Vec3, 3>& normals, const std::array<V
 
 std::array<float, 3> meshing::unit_normal(const Vec3& sum) {
     const double size = length(sum);
-    // A vertex without a direction of its own still needs a unit vector in most file formats.
+    // Most file formats require a unit vector even for a vertex without a direction.
     return size > 0 ? std::array{float(sum[0] / size), float(sum[1] / size), float(sum[2] / size)}
                     : std::array{0.0F, 0.0F, 1.0F};
 }
 
 std::vector<std::array<float, 3>> meshing::vertex_normals(const std::vector<std::array<float, 3>>& vertices,
                                                           const std::vector<Triangle>& triangles) {
-    // The angles take the time; sums are made in the triangles' order, whatever the number of threads.
+    // Computing the angles dominates the time and is parallel; the sums are in the order of the triangles for any
+    // number of threads.
     constexpr std::size_t kAtOnce = 1 << 15;
     std::vector<Vec3> sums(vertices.size(), Vec3{0, 0, 0});
     std::vector<std::array<Vec3, 3>> parts(std::min(kAtOnce, triangles.size()));

@@ -14,14 +14,15 @@ double turn(const Corner& a, const Corner& b, const Corner& c) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/// In the plane across Newell's normal, counter-clockwise. Empty where there is no normal.
+/// Projects the corners to the coordinate plane most perpendicular to Newell's normal, counter-clockwise. Empty if the
+/// normal is 0.
 std::vector<Corner> flatten(const std::vector<Vec3>& corners) {
     Vec3 normal{0, 0, 0};
     for (std::size_t n = 1; n + 1 < corners.size(); ++n) {
         const Vec3 part = cross(minus(corners[n], corners[0]), minus(corners[n + 1], corners[0]));
         for (std::size_t a = 0; a < 3; ++a) normal[a] += part[a];
     }
-    // Without the axis along which the normal is longest: areas keep their sign where the two others are in order.
+    // Drops the axis along which the normal is longest: areas keep their sign if the other two are in cyclic order.
     std::size_t out = 0;
     for (std::size_t a = 1; a < 3; ++a)
         if (std::abs(normal[a]) > std::abs(normal[out])) out = a;
@@ -40,7 +41,7 @@ std::vector<std::array<std::uint32_t, 3>> fan(std::size_t corners) {
     return triangles;
 }
 
-/// Cuts off ears (Meisters 1975).
+/// Ear clipping (Meisters 1975).
 class Clipper {
 public:
     explicit Clipper(const std::vector<Corner>& flat) : flat_(flat), next_(flat.size()), previous_(flat.size()) {
@@ -65,7 +66,7 @@ public:
     }
 
 private:
-    /// Where no ear is left, as of a polygon that crosses itself, the corner that comes nearest.
+    /// If no ear is left, as in a polygon that intersects itself, returns the corner with the largest area.
     std::uint32_t find_ear(std::uint32_t at, std::size_t left) const {
         std::uint32_t best = at;
         double maximum = -INFINITY;
@@ -80,7 +81,8 @@ private:
         return best;
     }
 
-    /// Whether no corner lies in the triangle, its border included, but for its own corners and others at their places.
+    /// Whether no corner lies in the triangle or on its border, except its own corners and others at the same
+    /// positions.
     bool is_empty(std::uint32_t ear) const {
         const Corner &a = flat_[previous_[ear]], &b = flat_[ear], &c = flat_[next_[ear]];
         for (std::uint32_t n = next_[next_[ear]]; n != previous_[ear]; n = next_[n]) {

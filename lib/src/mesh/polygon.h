@@ -7,12 +7,12 @@
 
 namespace covol::meshing {
 
-/// A polygon of more corners than this, which is not convex, is not cut into triangles.
+/// Maximum number of corners of a non-convex polygon that is cut into triangles.
 inline constexpr std::size_t kMaxPolygonCorners = 20000;
 
-/// Cuts a polygon, flat or nearly so, into triangles of its corners, n - 2 of them, with the polygon's orientation. It
-/// may be concave, and pass an edge twice on its way to a hole. Fans where they do.
-/// @returns by the corners' numbers; empty for concave ones of more than kMaxPolygonCorners
+/// Cuts a polygon that is flat, or nearly so, into n - 2 triangles of its corners, with the polygon's orientation. It
+/// may be concave, and pass an edge twice on its way to a hole. Uses a fan if possible.
+/// @returns triangles of the corners' numbers; empty for concave polygons of more than kMaxPolygonCorners
 [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> cut_polygon(const std::vector<Vec3>& corners);
 
 }  // namespace covol::meshing

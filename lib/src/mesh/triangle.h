@@ -1,5 +1,5 @@
 #pragma once
-// Triangles by their corners' positions.
+// Geometry of triangles from the positions of their corners.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -19,7 +19,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
 
-/// Three for each triangle. @throws Error Unsupported where 32 bits cannot number them.
+/// Three for each triangle. @throws Error Unsupported if 32 bits are not enough to number them.
 inline std::uint32_t corner_count(std::uint64_t triangles) {
     constexpr std::uint64_t kMax = (~std::uint32_t(0)) / 3;
     if (triangles > kMax)
@@ -33,7 +33,7 @@ inline double six_volumes(const std::array<Vec3, 3>& p, const Vec3& origin) {
     return dot(minus(p[0], origin), cross(minus(p[1], origin), minus(p[2], origin)));
 }
 
-/// Twice the area, along the outward normal.
+/// The outward normal, whose length is twice the area.
 inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(minus(b, a), minus(c, a)); }
 inline Vec3 area_normal(const Positions& p, const Triangle& t) {
     return area_normal(to_vec3(p[t[0]]), to_vec3(p[t[1]]), to_vec3(p[t[2]]));

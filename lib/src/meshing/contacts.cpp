@@ -12,12 +12,12 @@
 namespace covol::meshing {
 namespace {
 
-/// Rounding of a product of three lengths, of differences of single-precision numbers in double precision, is far below
-/// this.
+/// The rounding error of a product of three lengths, in double precision from differences of single-precision numbers,
+/// is far below this.
 constexpr double kRounding = 1e-13;
-constexpr double kFacing = 0.05;  // cosine: triangles of a single sheet look so far its way, at least
+constexpr double kFacing = 0.05;  // minimum cosine between triangles of a single sheet and its direction
 
-/// Of the projections onto an axis, does the first end before the second begins, or the other way round?
+/// Whether the projections onto an axis are disjoint.
 bool separates(const Vec3& axis, const Vec3* s, const Vec3* t, double margin) {
     double s_low = std::numeric_limits<double>::max(), s_high = -s_low, t_low = s_low, t_high = -s_low;
     for (int k = 0; k < 3; ++k) {
@@ -30,7 +30,7 @@ bool separates(const Vec3& axis, const Vec3* s, const Vec3* t, double margin) {
     return s_high + margin < t_low || t_high + margin < s_low;
 }
 
-/// Separating axes of two triangles that share no corner.
+/// Tests the separating axes of two triangles that share no corner.
 bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
     const Vec3 ns = area_normal(s[0], s[1], s[2]), nt = area_normal(t[0], t[1], t[2]);
     const double margin = kRounding * size * size * size;
@@ -40,15 +40,15 @@ bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
         for (int j = 0; j < 3; ++j)
             if (separates(cross(side, minus(t[(j + 1) % 3], t[j])), s, t, margin)) return true;
     }
-    for (int i = 0; i < 3; ++i) {  // in one plane
+    for (int i = 0; i < 3; ++i) {  // for triangles in one plane
         if (separates(cross(ns, minus(s[(i + 1) % 3], s[i])), s, t, margin * size)) return true;
         if (separates(cross(nt, minus(t[(i + 1) % 3], t[i])), s, t, margin * size)) return true;
     }
     return false;
 }
 
-/// Corner 0 is shared, at 0: whether a plane through it has the other two corners of each on its own side, where at
-/// most one of each lies in the plane, and these two in different directions.
+/// Corner 0 is shared and is the origin: whether a plane through it separates the other two corners of the two
+/// triangles. At most one corner of each may lie in the plane, and these two in different directions.
 bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     const double margin = kRounding * size * size * size;
     const auto side = [&](const Vec3& axis, const Vec3& p) { return dot(axis, p); };
@@ -59,12 +59,12 @@ bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     if ((s1 > margin && s2 > margin) || (s1 < -margin && s2 < -margin)) return true;
     for (int i = 1; i < 3; ++i)
         for (int j = 1; j < 3; ++j) {
-            const Vec3 axis = cross(s[i], t[j]);  // holds a corner of each
+            const Vec3 axis = cross(s[i], t[j]);  // normal of a plane through a corner of each
             if (!(length(axis) > kRounding * size * size)) continue;
             const double a = side(axis, s[3 - i]), b = side(axis, t[3 - j]);
             if ((a > margin && b < -margin) || (a < -margin && b > margin)) return true;
         }
-    for (int i = 1; i < 3; ++i) {  // across one triangle's plane along one of its sides
+    for (int i = 1; i < 3; ++i) {  // planes perpendicular to one triangle through one of its sides
         const Vec3 across_s = cross(ns, s[i]), across_t = cross(nt, t[i]);
         const double a = side(across_s, s[3 - i]), b1 = side(across_s, t[1]), b2 = side(across_s, t[2]);
         if ((a > 0 && b1 < -margin * size && b2 < -margin * size) ||
@@ -78,11 +78,11 @@ bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     return false;
 }
 
-/// Sides 0-1 are shared: apart unless in one plane and on one side.
+/// The side 0-1 is shared: the triangles are apart unless they are in one plane and on one side.
 bool apart_at_side(const Vec3* s, const Vec3* t, double size) {
     const Vec3 ns = area_normal(s[0], s[1], s[2]), nt = area_normal(t[0], t[1], t[2]);
     if (std::abs(dot(ns, minus(t[2], t[0]))) > kRounding * size * size * size) return true;
-    return dot(ns, nt) < 0;  // both seen in the order 0, 1, 2
+    return dot(ns, nt) < 0;  // both in the order 0, 1, 2
 }
 
 template <typename PerThread>
@@ -97,7 +97,7 @@ auto gathered(const PerThread& found) {
 }  // namespace
 
 bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t) {
-    // Shared corners first, in the same order in both.
+    // Shared corners first, in the same order in both triangles.
     Triangle first = s, second = t;
     int shared = 0;
     for (int i = 0; i < 3; ++i)
@@ -142,7 +142,7 @@ void ContactFinder::rebuild() {
     float longest = 0;
     for (int a = 0; a < 3 && !positions.empty(); ++a) longest = std::max(longest, high[a] - low[a]);
     const float scale = longest > 0 ? float((1 << kBits) - 1) / longest : 0.0F;
-    std::vector<std::uint64_t> keyed;  // place along a Z curve, number
+    std::vector<std::uint64_t> keyed;  // position along a Z curve, number
     keyed.reserve(triangles.size());
     for (std::size_t n = 0; n < triangles.size(); ++n)
         if (triangles[n][0] < positions.size()) keyed.push_back(n);
@@ -236,8 +236,8 @@ void ContactFinder::find_single_sheets() {
     cell_origin_ = boxes_[0].low;
     const float whole = std::max({boxes_[0].high[0] - boxes_[0].low[0], boxes_[0].high[1] - boxes_[0].low[1],
                                   boxes_[0].high[2] - boxes_[0].low[2]});
-    if (!(cell_size_ > 1e-5F * whole)) return;  // cells past counting
-    cell_size_ *= 1.001F;                       // for the rounding of the middles
+    if (!(cell_size_ > 1e-5F * whole)) return;  // too many cells for their keys
+    cell_size_ *= 1.001F;                       // margin for the rounding of the centres
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
     keyed.reserve(order_.size());
     for (std::size_t n = 0; n < order_.size(); ++n)
@@ -346,7 +346,7 @@ bool ContactFinder::would_touch(const std::vector<Change>& changed, const std::a
     return false;
 }
 
-bool ContactFinder::look_along_sheet(const std::vector<Change>& changed, const Position& around) const {
+bool ContactFinder::face_along_sheet(const std::vector<Change>& changed, const Position& around) const {
     constexpr double kAlong = 0.3;  // cosine
     const Vec3 direction = single_sheet(around);
     return dot(direction, direction) > 0 && std::all_of(changed.begin(), changed.end(), [&](const Change& change) {

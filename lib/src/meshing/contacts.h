@@ -9,12 +9,12 @@
 
 namespace covol::meshing {
 
-/// Whether two triangles are sure to have nothing in common beyond the corners and the side that they share: a plane is
-/// found that separates them by more than rounding can be wrong. Of triangles that only just miss each other it may not
-/// be. Triangles that share a side are apart unless folded flat onto each other.
+/// Whether two triangles certainly have nothing in common beyond the corners and the side that they share: whether a
+/// plane separates them by more than the rounding error. May be false for triangles that narrowly miss each other.
+/// Triangles that share a side are apart unless they are folded flat onto each other.
 [[nodiscard]] bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t);
 
-/// Finds triangles that touch: boxes around runs of triangles that lie close to each other, in a tree.
+/// Finds triangles that touch, by a tree of boxes around runs of nearby triangles.
 class ContactFinder {
 public:
     using Pair = std::pair<std::uint32_t, std::uint32_t>;
@@ -22,43 +22,42 @@ public:
     /// @param positions, triangles  kept by reference.
     ContactFinder(const Positions& positions, const std::vector<Triangle>& triangles);
 
-    /// Once positions, or corners of triangles, have changed.
+    /// Call after positions or corners of triangles have changed.
     void update();
 
-    /// Pairs of triangles that are not sure to be apart, each once, lower number first, sorted; those that are gone (a
-    /// corner that is no vertex) touch nothing.
-    /// @param was_free  whether the mesh is one of a closed surface without contacts whose vertices have moved by less
-    /// than a
-    ///                  triangle: single sheets need no look then.
+    /// Pairs of triangles that are not certainly apart, each once, lower number first, sorted. Removed triangles (with
+    /// a corner that is not a vertex) touch nothing.
+    /// @param was_free  whether the mesh is that of a closed surface without contacts whose vertices have moved by less
+    /// than a triangle: single sheets are then skipped.
     [[nodiscard]] std::vector<Pair> contacts(bool was_free);
-    /// The same, of pairs with one of these; sorted, unique.
+    /// The same for pairs that contain one of these triangles; sorted, unique.
     [[nodiscard]] std::vector<Pair> contacts_of(const std::vector<std::uint32_t>& some) const;
 
-    /// The same once most have changed, or many are gone: puts them in order anew.
+    /// Sorts the triangles again; call when most have changed or many are removed.
     void rebuild();
-    /// Finds where the surface is a single sheet: in cells as large as a triangle, whose neighbours have no triangle
-    /// that looks away from their common direction. A line in this direction can pass a closed surface without contacts
-    /// only once there, so that nothing touches (as the normal cones of Volino and Magnenat-Thalmann, Efficient
-    /// self-collision detection, 1994).
+    /// Finds where the surface is a single sheet: cells as large as a triangle such that no triangle in them or their
+    /// neighbours faces away from their common direction. A line in this direction can cross a closed surface without
+    /// contacts only once there, so that nothing touches (as the normal cones of Volino and Magnenat-Thalmann,
+    /// Efficient self-collision detection, 1994).
     void find_single_sheets();
-    /// The common direction where the last find_single_sheets() found a single sheet around a point; 0 where not.
+    /// The common direction if the last find_single_sheets() found a single sheet around a point; 0 otherwise.
     [[nodiscard]] Vec3 single_sheet(const Position& p) const;
-    /// Once one triangle, not yet in this place, or its corners have changed: much cheaper than update().
+    /// Enlarges the boxes after one triangle has moved or its corners have changed: much faster than update().
     void grow(std::uint32_t triangle);
 
-    /// A triangle as it would be.
+    /// A triangle with its future corners.
     struct Change {
         std::uint32_t number;
         Triangle corners;
     };
-    /// Whether, once these have changed and two others are gone, one of them would touch another triangle.
+    /// Whether, once these triangles have changed and two others are removed, one of them would touch another triangle.
     [[nodiscard]] bool would_touch(const std::vector<Change>& changed, const std::array<std::uint32_t, 2>& gone) const;
-    /// Whether there is a single sheet around a point, as the last find_single_sheets() has found it, and these look
-    /// its way.
-    [[nodiscard]] bool look_along_sheet(const std::vector<Change>& changed, const Position& around) const;
+    /// Whether there is a single sheet around a point according to the last find_single_sheets(), and these triangles
+    /// face in its direction.
+    [[nodiscard]] bool face_along_sheet(const std::vector<Change>& changed, const Position& around) const;
 
-    /// Calls visit(number) for the triangles whose boxes may meet that of a triangle with these corners, which need not
-    /// be in the mesh.
+    /// Calls visit(number) for the triangles whose boxes may intersect that of a triangle with these corners, which
+    /// need not be in the mesh.
     template <typename Visit>
     void near(const Triangle& t, const Visit& visit) const {
         descend(box_of(t), 0, [&](std::size_t place) { visit(order_[place]); });
@@ -87,7 +86,7 @@ private:
 
     const Positions* positions_ = nullptr;
     const std::vector<Triangle>* triangles_ = nullptr;
-    std::vector<std::uint32_t> order_, place_;  ///< the triangles along the tree's leaves, and where each is
+    std::vector<std::uint32_t> order_, place_;  ///< triangles in the order of the leaves, and position of each
     std::vector<Box> boxes_;                    ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
     std::vector<Box> triangle_boxes_;           ///< in the tree's order
     struct Cell {
@@ -102,11 +101,11 @@ private:
     std::size_t runs_ = 1;  ///< leaves of the tree, a power of two
 };
 
-/// Calls visit(place in the order) for the triangles whose boxes meet this one, from a run on.
+/// Calls visit(position in the order) for the triangles whose boxes intersect this one, starting from a run.
 template <typename Visit>
 void ContactFinder::descend(const Box& box, std::size_t first_run, const Visit& visit) const {
     struct Node {
-        std::size_t number, end, runs;  // it stands for the runs [end - runs, end)
+        std::size_t number, end, runs;  // the node contains the runs [end - runs, end)
     };
     Node stack[64];
     int size = 0;

@@ -18,8 +18,8 @@
 namespace covol::meshing {
 namespace {
 
-/// Collapses that make a triangle with a smaller angle than that of the cosine, 23, 14 and 6 degrees, and than there
-/// was, cost so many times as much.
+/// The cost of a collapse is multiplied by a factor if it makes a triangle whose smallest angle is below that of the
+/// cosine, 23, 14 or 6 degrees, and smaller than before.
 struct Needle {
     double cosine;
     float factor;
@@ -33,7 +33,7 @@ struct Traits : OpenMesh::DefaultTraitsDouble {
     FaceAttributes(OpenMesh::Attributes::Status);
 };
 
-/// The decimater asks is_collapse_ok() of each edge before it looks at its priority, and again right before it
+/// The decimater calls is_collapse_ok() for each edge before it evaluates its priority, and again immediately before it
 /// collapses the edge.
 class HalfEdges : public OpenMesh::TriMesh_ArrayKernelT<Traits> {
 public:
@@ -42,10 +42,10 @@ public:
     bool keeps_topology(HalfedgeHandle edge) { return OpenMesh::TriMesh_ArrayKernelT<Traits>::is_collapse_ok(edge); }
 };
 
-/// Faces and vertices have the numbers of the triangles and vertices until the garbage is collected, which we never do.
+/// Faces and vertices have the numbers of the triangles and vertices until garbage collection, which is never called.
 void build(HalfEdges& edges, const TriangleMesh& mesh) {
-    // Quadrics are differences of squares, and costs go with the fourth power of the size, in single precision: near 0,
-    // of about 1.
+    // Quadrics are differences of squares, and costs are fourth powers of lengths, in single precision: coordinates are
+    // therefore moved near 0 and scaled to about 1.
     const Vec3 middle = to_vec3(mesh.vertices[mesh.triangles.front()[0]]);
     double area = 0;
     for (const Triangle& t : mesh.triangles)
@@ -63,9 +63,8 @@ void build(HalfEdges& edges, const TriangleMesh& mesh) {
     }
 }
 
-/// What decides on collapses: OpenMesh's quadrics, the shorter edges first of those that cost the same, and no collapse
-/// that would let a vertex leave a face of a clip, turn a triangle, make a needle of it, move it off the level set or
-/// let it touch another.
+/// Decides on collapses: OpenMesh's quadrics, shorter edges first if the cost is equal, and no collapse after which a
+/// vertex would leave a face of a clip or a triangle would turn, be a needle, leave the level set or touch another.
 class SafeQuadric : public OpenMesh::Decimater::ModQuadricT<HalfEdges> {
 public:
     using Quadric = OpenMesh::Decimater::ModQuadricT<HalfEdges>;
@@ -74,7 +73,8 @@ public:
     explicit SafeQuadric(HalfEdges& mesh) : Quadric(mesh) {}
     DECIMATER_MODNAME(SafeQuadric)
 
-    /// @param trust  whether it is enough, where the finder has found a single sheet, that triangles look its way.
+    /// @param trust  whether triangles that face in the direction of a single sheet found by the finder are assumed not
+    /// to touch.
     void begin(TriangleMesh& mesh, const CornerTable& table, const Surface* surface, const DecimateGoal& goal,
                bool trust, const RunContext& run) {
         mesh_ = &mesh;
@@ -93,30 +93,30 @@ public:
         if (trust_) finder_->find_single_sheets();
         left_ = refreshed_ = mesh.triangles.size();
         cost_.assign(mesh.vertices.size(), 0);
-        careful_.assign(mesh.vertices.size(), 0);
+        check_contacts_.assign(mesh.vertices.size(), 0);
         this->mesh().is_chosen = [this](HalfEdges::HalfedgeHandle edge) { return is_chosen(edge); };
     }
 
-    /// Before each call of decimate(), which asks for all vertices.
+    /// Call before each decimate(), which examines all vertices.
     void begin_pass() {
         chosen_.assign(mesh_->vertices.size(), HalfEdges::HalfedgeHandle());
-        requested_ = kNobody;
+        requested_ = kNoVertex;
     }
     [[nodiscard]] std::size_t left() const { return left_; }
 
-    /// @return whether no triangles touch, where the checks have trusted single sheets
+    /// @return whether no triangles touch, if the checks have trusted single sheets
     [[nodiscard]] bool is_free() {
         if (!trust_) return true;
         finder_->rebuild();
         return finder_->contacts(true).empty();
     }
 
-    /// Of the chosen collapse.
+    /// The cost of the chosen collapse.
     float collapse_priority(const CollapseInfo& edge) override { return cost_[number(edge.v0)]; }
 
     void preprocess_collapse(const CollapseInfo& edge) override {
         gather(edge.v0v1);
-        for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();  // will be asked for anew
+        for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();  // to be chosen again
     }
 
     void postprocess_collapse(const CollapseInfo& edge) override {
@@ -126,10 +126,10 @@ public:
             mesh_->triangles[change.number] = change.corners;
             finder_->grow(change.number);
         }
-        requested_ = kNobody;
+        requested_ = kNoVertex;
         left_ -= gone_.size();
         if (left_ >= refreshed_ / 2) return;
-        finder_->rebuild();  // boxes only grow
+        finder_->rebuild();  // because boxes only grow
         if (trust_) finder_->find_single_sheets();
         refreshed_ = left_;
         const auto all = double(mesh_->triangles.size());
@@ -138,14 +138,14 @@ public:
     }
 
 private:
-    static constexpr std::uint32_t kNobody = CornerTable::kNone;
+    static constexpr std::uint32_t kNoVertex = CornerTable::kNone;
     template <typename Handle>
     static std::uint32_t number(Handle handle) {
         return std::uint32_t(handle.idx());
     }
 
-    /// The decimater asks for all edges that leave a vertex, one after the other, to queue the cheapest; and for that
-    /// one again when its turn has come.
+    /// The decimater queries all edges that leave a vertex in sequence, to queue the cheapest one, and that one again
+    /// when it is due.
     bool is_chosen(HalfEdges::HalfedgeHandle edge) {
         const auto lost = mesh().from_vertex_handle(edge);
         const bool again = requested_ == number(lost);
@@ -180,24 +180,26 @@ private:
         for (const auto& [cost, edge] : candidates_) {
             if (!std::isfinite(cost)) return;
             gather(edge);
-            if (!mesh().keeps_topology(edge) || leaves_surface(lost) || (careful_[lost] && touches(edge))) continue;
+            if (!mesh().keeps_topology(edge) || leaves_surface(lost) || (check_contacts_[lost] && touches(edge)))
+                continue;
             chosen_[lost] = edge;
             cost_[lost] = cost;
             return;
         }
     }
 
-    /// The neighbours' neighbours may have changed, and triangles that are not next to it come in its way; then this
-    /// vertex is looked at with more care next time, which most do not need.
+    /// Checks the chosen collapse again, because the neighbours of neighbours may have changed or other triangles may
+    /// be in its way. In that case this vertex is checked more thoroughly next time, which most vertices do not need.
     bool is_free_still(HalfEdges::HalfedgeHandle edge) {
         if (!mesh().keeps_topology(edge)) return false;
         gather(edge);
         const bool touching = touches(edge);
-        if (touching) careful_[number(mesh().from_vertex_handle(edge))] = 1;
+        if (touching) check_contacts_[number(mesh().from_vertex_handle(edge))] = 1;
         return !touching;
     }
 
-    /// What a collapse makes of the triangles around the vertex that goes; the first corner is where that has gone to.
+    /// Collects the triangles around the removed vertex as they are after the collapse; their first corner is the
+    /// vertex that replaces it.
     void gather(HalfEdges::HalfedgeHandle edge) {
         const HalfEdges& edges = mesh();
         const auto lost = edges.from_vertex_handle(edge), kept = edges.to_vertex_handle(edge);
@@ -214,7 +216,7 @@ private:
 
     [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_->vertices[v]); }
 
-    /// How many times as dear the collapse is for the shapes that it makes: infinite if it turns a triangle.
+    /// The factor of the cost for the shapes after the collapse: infinite if it turns a triangle.
     [[nodiscard]] float shape_factor(std::uint32_t lost) const {
         const Vec3 from = at(lost);
         double worst = -1;
@@ -244,7 +246,7 @@ private:
 
     [[nodiscard]] bool touches(HalfEdges::HalfedgeHandle edge) {
         const Position& there = mesh_->vertices[number(mesh().to_vertex_handle(edge))];
-        return !(trust_ && finder_->look_along_sheet(changed_, there)) && finder_->would_touch(changed_, gone_);
+        return !(trust_ && finder_->face_along_sheet(changed_, there)) && finder_->would_touch(changed_, gone_);
     }
 
     TriangleMesh* mesh_ = nullptr;
@@ -254,20 +256,20 @@ private:
     std::optional<Level> level_;
     std::vector<std::uint8_t> holds_;
     bool trust_ = false;
-    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and when the finder was put in order
-    std::uint32_t requested_ = kNobody;              // the vertex whose edges the decimater asks for
-    bool queued_ = false;                            // whether it has had the chosen one
-    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // that leaves each vertex; none where no collapse is possible
+    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and at the last rebuild of the finder
+    std::uint32_t requested_ = kNoVertex;            // the vertex whose edges the decimater queries
+    bool queued_ = false;                            // whether its chosen edge was among them
+    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // edge that leaves each vertex; invalid if no collapse is possible
     std::vector<float> cost_;                        // of that collapse
     std::vector<std::pair<float, HalfEdges::HalfedgeHandle>> candidates_;
-    std::vector<std::uint8_t> careful_;           // whether the collapse chosen before had something in its way
-    std::vector<ContactFinder::Change> changed_;  // by the collapse that is looked at
+    std::vector<std::uint8_t> check_contacts_;    // whether the previously chosen collapse was obstructed
+    std::vector<ContactFinder::Change> changed_;  // by the collapse under examination
     std::array<std::uint32_t, 2> gone_{};
 };
 
 /// @return whether no triangles touch afterwards
 bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal, bool trust, const RunContext& run) {
-    const CornerTable table(mesh.triangles, mesh.vertices.size());  // OpenMesh would print what is wrong with a mesh
+    const CornerTable table(mesh.triangles, mesh.vertices.size());  // throws if invalid; OpenMesh would only print
     HalfEdges edges;
     build(edges, mesh);
     OpenMesh::Decimater::DecimaterT<HalfEdges> decimater(edges);
@@ -278,7 +280,7 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     decimater.initialize();
     for (int pass = 0; pass < kDecimate.passes && decider.left() > goal.triangles; ++pass) {
         decider.begin_pass();
-        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // two triangles each
+        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // a collapse removes two
     }
     return decider.is_free();
 }
@@ -291,7 +293,7 @@ void decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     if (decimate(work, surface, goal, true, run))
         mesh = std::move(work);
     else
-        decimate(mesh, surface, goal, false, run);  // each collapse is checked
+        decimate(mesh, surface, goal, false, run);  // with a check of each collapse
     remove_gone(mesh.triangles, mesh.vertices);
 }
 

@@ -2,7 +2,7 @@
 
 namespace covol::meshing {
 
-bool EdgeCollapser::look(std::uint32_t corner) {
+bool EdgeCollapser::select(std::uint32_t corner) {
     if (!table_.can_collapse(corner)) return false;
     corner_ = corner;
     kept_ = table_.vertex(CornerTable::next(corner));

@@ -8,30 +8,29 @@
 
 namespace covol::meshing {
 
-/// Draws edges together, one after the other, where that leaves the mesh manifold, of its topology and free of
-/// contacts.
+/// Collapses edges one after the other, if the mesh then remains manifold, keeps its topology and has no contacts.
 class EdgeCollapser {
 public:
-    /// All three are kept by reference, and changed by collapse().
+    /// All three are kept by reference and changed by collapse().
     EdgeCollapser(CornerTable& table, Positions& positions, ContactFinder& finder)
         : table_(table), positions_(positions), finder_(finder) {}
 
-    /// A triangle that a collapse leaves, with the corner that moves.
+    /// A triangle that remains after a collapse, with the corner that moves.
     struct Left {
         std::uint32_t number, mover, next, previous;
     };
 
-    /// Looks at the edge that a corner faces. @return whether it can be drawn together as far as the topology goes
-    bool look(std::uint32_t corner);
-    /// The edge's ends; the first stays.
+    /// Selects the edge opposite to a corner. @return whether the topology permits its collapse
+    bool select(std::uint32_t corner);
+    /// The edge's ends; the first one is kept.
     [[nodiscard]] std::uint32_t kept() const { return kept_; }
     [[nodiscard]] std::uint32_t lost() const { return lost_; }
-    /// What the collapse leaves around the two, and the two triangles that go.
+    /// The triangles that remain around the two ends, and the two that are removed.
     [[nodiscard]] const std::vector<Left>& left() const { return left_; }
     [[nodiscard]] const std::array<std::uint32_t, 2>& going() const { return going_; }
 
-    /// Draws the edge together in a point unless a triangle would touch another that it does not share a corner with,
-    /// or more of one that it does. @return whether it was. @pre look() was true, and nothing has changed since.
+    /// Collapses the edge to a point unless a triangle would touch another one beyond shared corners. @return whether
+    /// it did. @pre look() returned true, and nothing has changed since.
     bool collapse(const Position& there);
 
 private:

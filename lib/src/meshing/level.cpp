@@ -12,10 +12,10 @@ namespace covol::meshing {
 namespace {
 
 constexpr double kConverged = 1e-4;  // voxels
-constexpr double kNearFace = 0.01;   // voxels: twice extract_mesh()'s chamfer
+constexpr double kNearFace = 0.01;   // voxels: twice the chamfer of extract_mesh()
 
-/// Calls visit(point) for points of a triangle at most `step` apart: its middle and those of its sides where it is not
-/// larger.
+/// Calls visit(point) for points of a triangle at most `step` apart: for small triangles its centre and the midpoints
+/// of its sides.
 template <typename Visit>
 void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, const Visit& visit) {
     const double longest = std::max({length(minus(b, a)), length(minus(c, b)), length(minus(a, c))});
@@ -28,9 +28,9 @@ void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, c
     visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
 }
 
-/// The smaller of two bends, none where they differ in sign: across a crease the distance has no bend that holds on
-/// both sides.
-double gentler(double a, double b) {
+/// The second difference of smaller magnitude, 0 if the signs differ: across a crease no second difference of the
+/// distance is valid on both sides.
+double minmod(double a, double b) {
     if (a * b <= 0) return 0;
     return std::abs(a) < std::abs(b) ? a : b;
 }
@@ -47,7 +47,8 @@ Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isov
     }
 }
 
-/// Undoes LatticeClip::position(): the last layer within and that on the face are not a voxel apart.
+/// Inverse of LatticeClip::position(): the distance between the last layer within and that on the face is not one
+/// voxel.
 double Level::lattice(int axis, double index, double& stretch) const {
     stretch = 1;
     for (const bool upper : {false, true}) {
@@ -65,14 +66,14 @@ const Level::Cell& Level::cell_at(const openvdb::Coord& base) const {
     Cell& cell = cells_[std::size_t((base[0] & 3) * 16 + (base[1] & 3) * 4 + (base[2] & 3))];
     if (cell.base != base) {
         cell.base = base;
-        look_at(cell);
+        load_cell(cell);
     }
     return cell;
 }
 
-void Level::look_at(Cell& cell) const {
+void Level::load_cell(Cell& cell) const {
     const openvdb::Coord& base = cell.base;
-    float v[4][4][4];  // the corners' neighbours along the axes; those with two odd ones out are not read
+    float v[4][4][4];  // the corners and their neighbours along the axes; other entries are not read
     const auto fill = [&](const auto& value) {
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j < 4; ++j)
@@ -89,7 +90,7 @@ void Level::look_at(Cell& cell) const {
     }
     for (int c = 0; c < 8; ++c) cell.corner[c] = v[1 + (c >> 2)][1 + (c >> 1 & 1)][1 + (c & 1)];
     const auto bend = [](double before, double from, double to, double after) {
-        return gentler(before - 2 * from + to, from - 2 * to + after);
+        return minmod(before - 2 * from + to, from - 2 * to + after);
     };
     for (int q = 0; q < 4; ++q) {
         const int s = 1 + (q >> 1), t = 1 + (q & 1);
@@ -123,7 +124,7 @@ Level::Sample Level::sample(const Vec3& world) const {
                (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) +
                    t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
 
-    for (int a = 0; a < 3; ++a) {  // less t (1 - t) / 2 of the second differences along each axis
+    for (int a = 0; a < 3; ++a) {  // subtracts t (1 - t) / 2 times the second difference along each axis
         const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
         const auto& bend = cell.bend[a];
         const double first = bend[0] + t[c] * (bend[1] - bend[0]), second = bend[2] + t[c] * (bend[3] - bend[2]);
@@ -196,7 +197,7 @@ MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
     struct Sum {
         double max = 0, whole = 0, area = 0;
     };
-    // Fixed pieces, joined in a fixed order: the same bits for any number of threads.
+    // Fixed parts are summed in a fixed order, so that the result is bitwise equal for any number of threads.
     constexpr std::size_t kPiece = 4096;
     std::vector<Sum> sums((mesh.triangles.size() + kPiece - 1) / kPiece);
     tbb::parallel_for(std::size_t(0), sums.size(), [&](std::size_t piece) {

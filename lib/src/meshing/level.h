@@ -16,40 +16,40 @@
 
 namespace covol::meshing {
 
-/// The surface of which extract_mesh() takes points on the lattice's edges: where the interpolation of a grid has a
-/// value, cut off at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second
-/// differences along its edges, so that it is of the third order: a trilinear one cuts off up to h^2/8 of the curvature
-/// along each axis. One object for each thread.
+/// The surface on which extract_mesh() takes points on the lattice's edges: the isosurface of an interpolated grid, cut
+/// off at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second differences along its
+/// edges, which makes it third-order; without the correction its error is up to h^2/8 times the second derivative along
+/// each axis. Use one object per thread.
 class Level {
 public:
-    /// @param grid  kept by reference. @param clip  where the grid has layers that stand for the faces of a cut.
-    /// @param origin  of the mesh: all places are relative to it
+    /// @param grid  kept by reference. @param clip  which layers of the grid represent the faces of a cut.
+    /// @param origin  of the mesh: all positions are relative to it
     Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const Vec3& origin);
 
     struct Sample {
-        double value = 0;  ///< above the isovalue, world units; < 0 inside
+        double value = 0;  ///< minus the isovalue, world units; < 0 inside
         Vec3 gradient{};
     };
     [[nodiscard]] Sample sample(const Vec3& world) const;
     [[nodiscard]] double voxel_size() const { return domain_.voxel_size; }
 
-    /// The point of the surface found from a point along the gradient, within a voxel or so; none where there is none.
-    /// A coordinate of which `held` has the bit stays.
+    /// The point of the surface found from a point along the gradient, at most about a voxel away; none if there is
+    /// none. Coordinates whose bit is set in `held` do not change.
     [[nodiscard]] std::optional<Vec3> project(const Vec3& world, unsigned held = 0) const;
-    /// How far a point is from the surface, to the first order, world units.
+    /// Distance of a point from the surface, to first order, world units.
     [[nodiscard]] double distance(const Vec3& world) const;
 
-    /// Whether a point of a triangle is farther from the surface than so many voxels.
+    /// Whether a point of a triangle is farther from the surface than this number of voxels.
     [[nodiscard]] bool is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const;
 
     /// A bit for each axis along which a point lies on a face of the clip.
     [[nodiscard]] unsigned faces(const Position& p) const;
-    /// Whether the clip has a face, and the point is so close to two of them that it belongs to the chamfer between
-    /// them.
+    /// Whether the clip has faces and the point is so close to two of them that it belongs to the chamfer between them.
     [[nodiscard]] bool on_chamfer(const Position& p) const;
 
 private:
-    /// A cell of the lattice: its corners' values, z fastest, and of each edge along an axis the second difference.
+    /// A cell of the lattice: the values at its corners, z fastest, and the second difference of each edge along an
+    /// axis.
     struct Cell {
         openvdb::Coord base{std::numeric_limits<int>::min()};
         std::array<double, 8> corner{};
@@ -58,25 +58,25 @@ private:
 
     [[nodiscard]] double lattice(int axis, double index, double& stretch) const;
     [[nodiscard]] const Cell& cell_at(const openvdb::Coord& base) const;
-    void look_at(Cell& cell) const;
+    void load_cell(Cell& cell) const;
 
     FloatGrid::ConstAccessor accessor_;
     detail::LatticeClip clip_;
     Domain domain_;
     double isovalue_;
-    mutable std::array<Cell, 64> cells_;  ///< looked at last, of each 4^3 places one
+    mutable std::array<Cell, 64> cells_;  ///< cache of one cell for each index modulo 4
     bool clipped_ = false;
-    std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite where there is none
+    std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite if there is none
 };
 
 /// The same surface for any number of threads.
 class Surface {
 public:
     /// @param level_set  kept by reference; its clip is undone as in extract_mesh().
-    /// @param origin  of the meshes that it is for
+    /// @param origin  of the meshes of this surface
     Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin);
     [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_, origin_}; }
-    /// Of points less than a voxel apart; faces of the clip left out.
+    /// From points less than a voxel apart; faces of the clip are excluded.
     [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
 
 private:
@@ -87,12 +87,12 @@ private:
     Vec3 origin_;
 };
 
-/// What a vertex lies on, and has to stay on when it moves.
+/// What a vertex lies on and must not leave when it moves.
 enum Hold : std::uint8_t {
     kFaces = 7,     ///< a bit for each axis: on a face of the clip across it
-    kOnLevel = 8,   ///< where the grid has its value; on a face that is its rim
-    kChamfer = 16,  ///< between two faces of the clip: does not move by itself
-    kFixed = 32     ///< on the mesh's boundary, or in no triangle: stays
+    kOnLevel = 8,   ///< on the isosurface; together with a face, on the face's rim
+    kChamfer = 16,  ///< between two faces of the clip: is not moved on its own
+    kFixed = 32     ///< on the mesh's boundary or without triangles: does not move
 };
 
 [[nodiscard]] std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& positions,

@@ -19,11 +19,11 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kFewPoints = 2048;  // whose way to every leaf takes less than a tree of all crossings
+constexpr std::size_t kFewPoints = 2048;  // up to these, testing every leaf is faster than a tree of all crossings
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Where edges of the lattice cut the surface, from voxels of this leaf on, with values up to `limit`.
+/// Crossings of the surface with edges of the lattice that start at voxels of this leaf with values up to `limit`.
 void add_crossings(const FloatGrid& surface, const Leaf& leaf, double limit, std::vector<Vec3>& crossings) {
     const auto at = surface.getConstAccessor();
     for (auto value = leaf.cbeginValueOn(); value; ++value) {
@@ -42,7 +42,7 @@ void add_crossings(const FloatGrid& surface, const Leaf& leaf, double limit, std
     }
 }
 
-/// add_crossings() finds some, in the leaf itself.
+/// Whether add_crossings() finds crossings within the leaf itself.
 bool has_crossing(const Leaf& leaf, double limit) {
     const float* values = leaf.buffer().data();
     const LeafMask negative = negative_mask(values);
@@ -57,7 +57,7 @@ bool has_crossing(const Leaf& leaf, double limit) {
     return false;
 }
 
-/// Squared distances, in voxels, from a place to the nearest and to the farthest point of the box of a leaf's edges.
+/// Squared distances, in voxels, from a position to the nearest and the farthest point of the box of a leaf's edges.
 struct LeafReach {
     double nearest = 0, farthest = 0;
     LeafReach(const openvdb::Vec3d& at, const openvdb::Coord& origin) {
@@ -69,7 +69,7 @@ struct LeafReach {
     }
 };
 
-/// The crossings among which each of these points finds its nearest one.
+/// Crossings that include the nearest one of each point.
 std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec3>& points) {
     const double limit = 2 * surface.voxelSize()[0];
     std::vector<const Leaf*> leaves;
@@ -101,7 +101,7 @@ std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec
 
 std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec3>& points) {
     using Range = tbb::blocked_range<std::size_t>;
-    // Within a voxel of the band's end corners of a point's cell lie beyond it, where values are cut.
+    // Within a voxel of the band's end, corners of a point's cell lie outside it, where values are clamped.
     const double limit = double(surface.background()) - surface.voxelSize()[0];
     std::vector<double> distances(points.size());
     std::vector<char> is_far(points.size());

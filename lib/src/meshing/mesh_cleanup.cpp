@@ -40,7 +40,7 @@ Point to_point(const std::array<float, 3>& p) { return {p[0], p[1], p[2]}; }
 bool intersect(const TriangleMesh& mesh, std::size_t a, std::size_t b) {
     auto t = mesh.triangles[a];
     auto s = mesh.triangles[b];
-    // Shared corners first, in the same order in both.
+    // Shared corners first, in the same order in both triangles.
     int shared = 0;
     for (int i = 0; i < 3; ++i)
         for (int j = shared; j < 3; ++j)
@@ -126,12 +126,12 @@ int repair(SurfaceMesh& mesh) {
     return holes;
 }
 
-/// Equilateral triangles of this edge length that cover `area`.
+/// Number of equilateral triangles of this edge length that cover `area`.
 std::size_t triangles_of(double edge, double area) {
     return std::size_t(std::max(4.0, area / (std::sqrt(3.0) / 4 * edge * edge)));
 }
 
-/// A mesh, and what it stands for where that is known.
+/// A mesh, and the level set that it represents, if known.
 struct Work {
     TriangleMesh& mesh;
     const FloatGrid* level_set;
@@ -142,7 +142,7 @@ struct Work {
     [[nodiscard]] double voxel_size() const { return domain_of(*level_set).voxel_size; }
 };
 
-/// Both ways: a part that is lost shows in the one, one that sticks out in the other.
+/// In both directions: one shows parts that are lost, the other parts that are added.
 MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
     const auto samples = [](const TriangleMesh& mesh) {
         std::vector<Vec3> points;
@@ -170,8 +170,8 @@ CleanupStep step_report(const Work& work, const TriangleMesh& before) {
     return step;
 }
 
-/// A round solid with vertices on its surface loses volume by the chords; an even offset along the normals brings it
-/// back. What lies on the faces of a clip stays there.
+/// A round solid with vertices on its surface loses the volume outside the chords; a constant offset along the normals
+/// restores it. Vertices on the faces of a clip are not moved.
 void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::Surface* surface) {
     const MeshMeasures after = measure(mesh);
     if (!before.closed || !after.closed || !(after.area > 0)) return;
@@ -186,7 +186,7 @@ void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::
 }
 
 CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
-    constexpr int kRounds = 3;  // what collapses leave is relaxed
+    constexpr int kRounds = 3;  // of relaxing the triangles after decimation
     const TriangleMesh before = work.mesh;
     std::optional<meshing::Surface> surface;
     if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue, work.mesh.origin);
@@ -212,8 +212,8 @@ void smooth_step(TriangleMesh& mesh, double weight) {
             mesh.vertices[v][c] += float(weight * (sums[v][c] / sums[v][3] - mesh.vertices[v][c]));
 }
 
-/// Taubin 1995: a shrinking and an inflating step in turn. Weights of nearly the same size keep the gain at low
-/// frequencies, and with it the growth of the volume, below 1e-4 an iteration.
+/// Taubin 1995: alternates a shrinking and an inflating step. Weights of nearly equal magnitude keep the gain at low
+/// frequencies, and with it the growth of the volume, below 1e-4 per iteration.
 CleanupStep smooth(const Work& work, bool proper) {
     const TriangleMesh before = work.mesh;
     for (int i = 0; i < work.options.smooth_iterations; ++i) {
@@ -229,7 +229,7 @@ CleanupStep smooth(const Work& work, bool proper) {
     return step_report(work, before);
 }
 
-/// Runs CGAL's part; what CGAL throws becomes an Error.
+/// Runs a function that uses CGAL and converts its exceptions to Error.
 void guarded(const std::function<void()>& work) {
     try {
         work();
@@ -262,7 +262,7 @@ Crossings count_crossings(const TriangleMesh& mesh) {
     }
     std::vector<std::uint32_t> piece_of(mesh.triangles.size());
     for (std::size_t n = 0; n < piece_of.size(); ++n) piece_of[n] = pieces.root(mesh.triangles[n][0]);
-    // Most pairs are apart by far; exact predicates decide on the others.
+    // Most pairs are far apart; exact predicates decide on the others.
     const std::vector<meshing::ContactFinder::Pair> pairs =
         meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
     return tbb::parallel_reduce(

@@ -29,7 +29,7 @@ using Primitive = CGAL::AABB_triangle_primitive<Cartesian, Triangles::const_iter
 
 Cartesian::Point_3 to_cgal(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
-/// Some of a mesh's triangles.
+/// A search tree of a part of a mesh's triangles.
 class TriangleTree {
 public:
     TriangleTree(const TriangleMesh& mesh, std::size_t begin, std::size_t end) : begin_(begin) {
@@ -39,23 +39,23 @@ public:
             triangles_.emplace_back(to_cgal(mesh.place(t[0])), to_cgal(mesh.place(t[1])), to_cgal(mesh.place(t[2])));
         }
         tree_.insert(triangles_.begin(), triangles_.end());
-        // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better
-        // one.
+        // A tree of the vertices, for initial bounds, would take as much time as all queries: the result for the
+        // previous point is a better bound.
         tree_.do_not_accelerate_distance_queries();
-        tree_.build();  // now, for queries from many threads must find it finished
+        tree_.build();  // now, because it must be complete before parallel queries
     }
-    /// The closest of `guess` and the points of the triangles.
+    /// The closest to the query of `guess` and all points of the triangles.
     [[nodiscard]] Cartesian::Point_3 closest_point(const Cartesian::Point_3& query,
                                                    const Cartesian::Point_3& guess) const {
         return tree_.closest_point(query, guess);
     }
-    /// How far along a ray the first of the triangles lies; infinite where it meets none.
-    /// @param own  a triangle of the mesh that does not count
+    /// Distance along a ray to the first triangle; infinite if it hits none.
+    /// @param own  a triangle of the mesh to be ignored
     [[nodiscard]] double first_hit(const Cartesian::Ray_3& ray, std::size_t own) const {
         const auto is_own = [&](Triangles::const_iterator t) {
             return begin_ + std::size_t(t - triangles_.begin()) == own;
         };
-        // CGAL skips none in a tree of one.
+        // CGAL does not apply the filter in a tree of a single triangle.
         if (triangles_.size() == 1 && is_own(triangles_.begin())) return std::numeric_limits<double>::infinity();
         const auto hit = tree_.first_intersection(ray, is_own);
         if (!hit) return std::numeric_limits<double>::infinity();
@@ -70,8 +70,8 @@ private:
     CGAL::AABB_tree<CGAL::AABB_traits<Cartesian, Primitive>> tree_;
 };
 
-/// Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and
-/// the faster the smaller it is. Each more costs a query a look at its root.
+/// Several trees of consecutive triangles, which mostly are close together: CGAL builds a tree on one thread, and
+/// smaller trees faster. Each additional tree costs a query one test of its root.
 std::vector<std::unique_ptr<TriangleTree>> trees_of(const TriangleMesh& mesh) {
     constexpr std::size_t kTriangles = 1 << 17;
     const std::size_t count = mesh.triangles.size();
@@ -122,7 +122,7 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
 
 double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
     constexpr std::size_t kMaxRays = 512;
-    constexpr double kThinFraction = 0.01;  // a sliver of a triangle or two says nothing of the wall
+    constexpr double kThinFraction = 0.01;  // ignores single slivers, which do not represent the wall
     const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMaxRays);
     std::vector<double> walls(rays, std::numeric_limits<double>::infinity());
     with_threads(run, [&] {

@@ -14,16 +14,16 @@
 
 namespace covol::meshing {
 
-/// Which voxel centres lie inside a closed mesh: winding numbers along the lattice's rows.
+/// Determines which voxel centres lie inside a closed mesh, by winding numbers along the lattice's rows.
 ///
-/// Rows that meet an edge or a corner are moved by an infinitesimal step (Edelsbrunner and Mücke 1990), so that each
-/// closed surface is crossed a consistent number of times.
+/// Rows that meet an edge or a corner are shifted by an infinitesimal step (Edelsbrunner and Mücke 1990), so that the
+/// number of crossings of each closed surface is consistent.
 class MeshRows {
 public:
     MeshRows(const TriangleMesh& mesh, const ImageGeometry& lattice)
         : mesh_(mesh), triangles_of_(lattice.size[2] + 1, 0) {
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v) points_.push_back(lattice.world_to_index(mesh.place(v)));
-        // Triangles by the slices that they reach.
+        // Triangles sorted by the slices that they reach.
         for_each_slice(lattice.size[2], [&](std::uint32_t, int k) { ++triangles_of_[k + 1]; });
         std::partial_sum(triangles_of_.begin(), triangles_of_.end(), triangles_of_.begin());
         order_.resize(triangles_of_.back());
@@ -31,7 +31,7 @@ public:
         for_each_slice(lattice.size[2], [&](std::uint32_t t, int k) { order_[next[k]++] = t; });
     }
 
-    /// Of the slices [first, first + size[2]), i fastest; 1 inside. @throws Error InvalidInput, with `not_closed`.
+    /// Fills the slices [first, first + size[2]), i fastest; 1 inside. @throws Error InvalidInput, with `not_closed`.
     void fill(int first, const Index3& size, std::vector<std::uint8_t>& out, const std::string& not_closed) const {
         std::fill(out.begin(), out.end(), std::uint8_t(0));
         std::vector<std::uint8_t> open(std::size_t(size[2]), 0);
@@ -70,7 +70,7 @@ private:
         }
     }
 
-    /// Twice the area of (a, b, row) in the plane of j and k; the same number with the other sign for (b, a, row).
+    /// Twice the signed area of (a, b, row) in the plane of j and k; exactly the negative for (b, a, row).
     struct Turn {
         double area;
         int sign;
@@ -86,7 +86,7 @@ private:
         return swapped ? Turn{-area, -sign} : Turn{area, sign};
     }
 
-    /// False when some row does not leave the solid as often as it enters it.
+    /// False if a row does not leave the solid as often as it enters it.
     bool fill_slice(int k, const Index3& size, std::uint8_t* out) const {
         std::vector<Crossing> crossings;
         for (std::size_t n = triangles_of_[k]; n < triangles_of_[k + 1]; ++n) {

@@ -32,7 +32,7 @@ public:
           tolerance_(tolerance),
           run_(run) {}
 
-    /// The first round concerns the whole mesh, the others what is still badly shaped.
+    /// The first round processes the whole mesh, the others only badly shaped triangles.
     void relax(int rounds, RelaxReport& report) {
         for (int round = 0; round < rounds; ++round) {
             if (round > 0) report.collapses += std::int64_t(collapse_slivers());
@@ -43,7 +43,7 @@ public:
                 move();
                 run_.check();
             }
-            take_back(before, turned);
+            undo_contacts(before, turned);
             report.flips += std::int64_t(turned.size());
             run_.report("relax", double(round + 1) / rounds);
             run_.check();
@@ -52,8 +52,8 @@ public:
     }
 
 private:
-    /// Chooses the corners of triangles worse than this, the vertices next to them, and the triangles around all these;
-    /// all where `poor` is above 1.
+    /// Chooses the corners of triangles worse than this, their neighbours, and the triangles around all these; all if
+    /// `poor` is above 1.
     void choose(double poor) {
         std::vector<std::uint8_t> vertex(mesh_.vertices.size(), poor > 1), triangle(mesh_.triangles.size(), 0);
         if (poor <= 1) {
@@ -82,7 +82,7 @@ private:
         return holds_[a] & holds_[b] & holds_[c] & kFaces;
     }
 
-    /// Whether turning the edge that the corner faces widens the smallest angle and leaves the surface as it is.
+    /// Whether flipping the edge opposite to the corner increases the smallest angle and preserves the surface.
     [[nodiscard]] bool worth_flipping(std::uint32_t corner) const {
         const std::uint32_t across = table_.opposite(corner);
         if (across == CornerTable::kNone) return false;
@@ -110,10 +110,10 @@ private:
     }
 
     struct Flip {
-        std::uint32_t corner, across;  ///< that faced the edge
+        std::uint32_t corner, across;  ///< corners opposite to the edge
     };
 
-    /// @return the edges turned, in this order
+    /// @return the flipped edges, in this order
     std::vector<Flip> flip_edges() {
         std::vector<std::uint8_t> wanted(3 * scope_.size(), 0);
         const auto corner = [&](std::size_t n) { return 3 * scope_[n / 3] + std::uint32_t(n % 3); };
@@ -137,11 +137,11 @@ private:
         return turned;
     }
 
-    /// Undoes the flips that made these triangles, with all flips that they depend on. @return the triangles changed
+    /// Undoes the flips that made these triangles, and all flips that depend on them. @return the triangles changed
     std::vector<std::uint32_t> undo_flips(const std::vector<std::uint32_t>& some, std::vector<Flip>& turned) {
         std::vector<std::uint8_t> dirty(mesh_.triangles.size(), 0);
         for (const std::uint32_t t : some) dirty[t] = 1;
-        for (bool grown = true; grown;) {  // whole chains of flips that share triangles
+        for (bool grown = true; grown;) {  // includes whole chains of flips with common triangles
             grown = false;
             for (const Flip& flip : turned) {
                 std::uint8_t &s = dirty[flip.corner / 3], &t = dirty[flip.across / 3];
@@ -160,7 +160,7 @@ private:
         return changed;
     }
 
-    /// Where the middle of a vertex's neighbours would have it.
+    /// The position of a vertex after a step towards the mean of its neighbours.
     [[nodiscard]] Position moved(std::uint32_t v) const {
         const Position& here = mesh_.vertices[v];
         if (holds_[v] & (kFixed | kChamfer)) return here;
@@ -191,32 +191,32 @@ private:
         return there;
     }
 
-    /// Whether a move turns the triangle over, or moves it off the surface.
-    [[nodiscard]] bool spoilt(const Triangle& t, const Positions& before, const Positions& after) const {
+    /// Whether a move turns the triangle over or moves it off the surface.
+    [[nodiscard]] bool is_invalid_move(const Triangle& t, const Positions& before, const Positions& after) const {
         if (is_turned(t, before, after, kRelax.same_side)) return true;
         return tolerance_ > 0 && has_moved(t, before, after) &&
                is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
     }
-    /// Whether a triangle lies farther off the surface than it may; of one on a face of the clip no.
+    /// Whether a triangle is farther from the surface than the tolerance; false on a face of the clip.
     [[nodiscard]] bool is_off(const Vec3& a, const Vec3& b, const Vec3& c, unsigned face) const {
         return face == 0 && levels_.local().is_farther(a, b, c, tolerance_);
     }
 
-    /// One step of the chosen vertices at once; those of a triangle that it would turn over stay.
+    /// Moves all chosen vertices by one step, except those whose triangles would turn over.
     void move() {
         Positions next = mesh_.vertices;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 512), [&](const auto& range) {
             for (std::size_t n = range.begin(); n < range.end(); ++n) next[vertices_[n]] = moved(vertices_[n]);
         });
-        const auto bad = [&](std::uint32_t t) { return spoilt(mesh_.triangles[t], mesh_.vertices, next); };
+        const auto bad = [&](std::uint32_t t) { return is_invalid_move(mesh_.triangles[t], mesh_.vertices, next); };
         restore_all(table_, those(scope_, bad), mesh_.vertices, next, bad);
         mesh_.vertices.swap(next);
     }
 
-    /// Moves vertices back to `before`, and undoes flips, until no triangles touch that did not before.
-    void take_back(const Positions& before, std::vector<Flip>& turned) {
+    /// Moves vertices back to `before` and undoes flips until no triangles touch that did not touch before.
+    void undo_contacts(const Positions& before, std::vector<Flip>& turned) {
         finder_.update();
-        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // cheaper then
+        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // is then faster
         std::vector<ContactFinder::Pair> contacts =
             all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
         while (!contacts.empty()) {
@@ -228,15 +228,15 @@ private:
             }
             std::vector<std::uint32_t> changed = undo_flips(still, turned);
             moved.insert(moved.end(), changed.begin(), changed.end());
-            const std::vector<std::uint32_t> more =
-                restore_all(table_, moved, before, mesh_.vertices,
-                            [&](std::uint32_t t) { return spoilt(mesh_.triangles[t], before, mesh_.vertices); });
+            const std::vector<std::uint32_t> more = restore_all(
+                table_, moved, before, mesh_.vertices,
+                [&](std::uint32_t t) { return is_invalid_move(mesh_.triangles[t], before, mesh_.vertices); });
             changed.insert(changed.end(), more.begin(), more.end());
             finder_.update();
             contacts = finder_.contacts_of(changed);
         }
     }
-    /// The chosen triangles, and those of flips.
+    /// The chosen triangles and those of flips.
     [[nodiscard]] std::vector<std::uint32_t> touched(const std::vector<Flip>& turned) const {
         std::vector<std::uint32_t> all = scope_;
         for (const Flip& flip : turned) {
@@ -248,8 +248,8 @@ private:
         return all;
     }
 
-    /// Draws the shortest sides of slivers together: those that moves cannot widen, for they stand on an edge of the
-    /// solid that is narrower than a triangle. @return how many
+    /// Collapses the shortest sides of slivers that moves cannot widen, because they are on an edge of the solid that
+    /// is narrower than a triangle. @return how many
     std::size_t collapse_slivers() {
         finder_.update();
         std::deque<std::uint32_t> queue;
@@ -274,7 +274,7 @@ private:
     }
     [[nodiscard]] bool is_sliver(std::uint32_t t) const { return is_worse(t, kRelax.sliver); }
 
-    /// The corner that faces it.
+    /// The corner opposite to the shortest side.
     [[nodiscard]] std::uint32_t shortest_side(std::uint32_t t) const {
         std::uint32_t best = 3 * t;
         double minimum = std::numeric_limits<double>::max();
@@ -288,7 +288,8 @@ private:
         return best;
     }
 
-    /// Where an edge's ends can meet: half-way on what both lie on, or at the end that lies on all that the other does.
+    /// Positions at which an edge's ends can merge: halfway if they are bound to the same surfaces, otherwise the end
+    /// that is bound to all surfaces of the other one.
     [[nodiscard]] std::vector<Position> meeting_points(std::uint32_t a, std::uint32_t b) const {
         const Level& level = levels_.local();
         const unsigned all = holds_[a] | holds_[b];
@@ -316,10 +317,10 @@ private:
 
     bool try_collapse(std::uint32_t corner) {
         EdgeCollapser edge(table_, mesh_.vertices, finder_);
-        if (!edge.look(corner)) return false;
+        if (!edge.select(corner)) return false;
         const std::uint32_t a = edge.kept(), b = edge.lost();
         for (const Position& there : meeting_points(a, b)) {
-            // Fewer slivers, and none narrower than the narrowest was.
+            // Requires fewer slivers, and no angle smaller than the smallest one before.
             int slivers = 0;
             double narrowest_before = 0, narrowest = 0;
             bool worse = false;
@@ -355,7 +356,7 @@ private:
     ContactFinder finder_;
     mutable tbb::enumerable_thread_specific<Level> levels_;
     std::vector<std::uint8_t> holds_;
-    std::vector<std::uint32_t> vertices_, scope_;  // chosen: to be moved, and the triangles around them, sorted
+    std::vector<std::uint32_t> vertices_, scope_;  // chosen vertices to be moved, and the triangles around them, sorted
     const double tolerance_;                       // voxels; 0: none
     const RunContext& run_;
 };

@@ -9,21 +9,21 @@
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
 
-// Moves of vertices that are taken back where they would do harm.
+// Moves of vertices that are undone if they do harm.
 namespace covol::meshing {
 
-/// Whether a corner of the triangle moves.
+/// Whether a corner of the triangle has moved.
 [[nodiscard]] inline bool has_moved(const Triangle& t, const Positions& before, const Positions& after) {
     return before[t[0]] != after[t[0]] || before[t[1]] != after[t[1]] || before[t[2]] != after[t[2]];
 }
 
-/// Whether the triangle turns farther than by the angle of this cosine.
+/// Whether the triangle turns by more than the angle of this cosine.
 [[nodiscard]] inline bool is_turned(const Triangle& t, const Positions& before, const Positions& after, double cosine) {
     const Vec3 was = area_normal(before, t), is = area_normal(after, t);
     return has_moved(t, before, after) && !(dot(was, is) > cosine * length(was) * length(is));
 }
 
-/// Those of these triangles for which bad(number) holds; it is asked from many threads.
+/// Those of these triangles for which bad(number) is true; it is called from many threads.
 template <typename Bad>
 [[nodiscard]] std::vector<std::uint32_t> those(const std::vector<std::uint32_t>& some, const Bad& bad) {
     std::vector<std::uint8_t> found(some.size(), 0);
@@ -36,12 +36,12 @@ template <typename Bad>
     return result;
 }
 
-/// Moves the corners of these triangles back. @return the triangles that this changes, sorted
+/// Moves the corners of these triangles back. @return the triangles that change, sorted
 std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
                                    const Positions& before, Positions& after);
 
-/// Moves the corners of these triangles back, and of those around them that are bad then, until none is. bad(number)
-/// may not hold of a triangle that has not moved. @return the triangles that this changes
+/// Moves the corners of these triangles back, and then those of bad triangles around them, until none is bad.
+/// bad(number) must be false for triangles that have not moved. @return the triangles that change
 template <typename Bad>
 std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vector<std::uint32_t>& some,
                                        const Positions& before, Positions& after, const Bad& bad) {
@@ -51,8 +51,8 @@ std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vect
     return all;
 }
 
-/// Moves all vertices to `goal` but those whose triangles would turn over or touch others that they did not touch.
-/// @return how many stay. @throws Error InvalidInput (a mesh that is not manifold)
+/// Moves all vertices to `goal`, except those whose triangles would turn over or touch others that they did not touch
+/// before. @return how many do not move. @throws Error InvalidInput (a mesh that is not manifold)
 std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal);
 
 }  // namespace covol::meshing

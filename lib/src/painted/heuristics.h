@@ -1,37 +1,37 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder: docs/heuristics.md shows the effect of halving and doubling each.
 #include "base/heuristic.h"
 
 namespace covol {
 
-/// What painted labels mean: painted.cpp, whole_runs.cpp.
+/// Interpretation of painted labels: painted.cpp, whole_runs.cpp.
 struct PaintedHeuristics {
-    /// [voxels] A patch that is nowhere wider says little about a cross-section.
+    /// [voxels] A narrower patch gives little information about a cross-section.
     int narrowest = heuristic("painted.narrowest", 3);
-    /// [ratio] Of the widest patch to a run of painted slices, at least, for them to be slices.
+    /// [ratio] Minimum of the widest patch to a run of painted slices, for them to be separate slices.
     int thin_run = heuristic("painted.thin_run", 3);
-    /// [of the largest section] A section that is taken for as large.
+    /// [of the largest section] Minimum of a section that counts as equally large.
     double about_largest = heuristic("painted.about_largest", 0.9);
-    /// [squares of its width] A section that is larger is longer than wide: a disc has 1.3 to 1.8.
+    /// [squares of its width] A larger section is longer than wide: a disc has 1.3 to 1.8.
     double elongated = heuristic("painted.elongated", 2);
-    /// [of the widest ends] Ends that are taken for as wide.
+    /// [of the widest ends] Minimum of ends that count as equally wide.
     double as_wide = heuristic("painted.as_wide", 0.98);
 };
 COVOL_HEURISTICS PaintedHeuristics kPainted{};
 
-/// Outlines of patches: outline.cpp. Measured over digitised discs of radius 1.5 to 40 at 20 places each: the mean
+/// Outlines of patches: outline.cpp. Measured on digitised discs of radius 1.5 to 40 at 20 positions each: the mean
 /// error is below 0.025 voxel (0.44 with a Gaussian of 1 voxel at radius 1.5), the root mean square 0.10 to 0.13 from
-/// radius 5 on, where the staircase has 0.235.
+/// radius 5 on, compared to 0.235 for the staircase.
 struct OutlineHeuristics {
-    /// [voxels] To either side along the line, of the quadratic that smooths it.
+    /// [voxels] Half-width along the line of the quadratic that smooths it.
     int window = heuristic("outline.window", 8);
-    /// [of the line's length] The same, at most.
+    /// [of the line's length] Maximum of this half-width.
     double window_of_line = heuristic("outline.window_of_line", 0.15);
-    /// [voxels] That smoothing may move a place.
+    /// [voxels] Maximum displacement of a vertex by smoothing.
     double max_shift = heuristic("outline.max_shift", 0.5);
-    /// [voxels] Of a scribble.
+    /// [voxels] Maximum width of a scribble.
     int widest_stroke = heuristic("outline.widest_stroke", 4);
-    /// [widths] Of a scribble, at least.
+    /// [widths] Minimum length of a scribble.
     double stroke_length = heuristic("outline.stroke_length", 6);
 };
 COVOL_HEURISTICS OutlineHeuristics kOutline{};

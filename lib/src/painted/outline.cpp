@@ -12,9 +12,9 @@ namespace {
 using detail::Polygon;
 using detail::Vec2;
 
-/// The weights of the value at 0 of the quadratic that fits values at -n..n best.
+/// The weights of the value at 0 of the least-squares quadratic through values at -n..n.
 std::vector<double> quadratic_weights(int n) {
-    // With S0 = sum 1, S2 = sum t^2, S4 = sum t^4: (S4 - S2 t^2) / (S0 S4 - S2^2).
+    // With S0 = sum 1, S2 = sum t^2, S4 = sum t^4 they are (S4 - S2 t^2) / (S0 S4 - S2^2).
     double s0 = 0, s2 = 0, s4 = 0;
     for (int t = -n; t <= n; ++t) {
         s0 += 1;
@@ -26,14 +26,14 @@ std::vector<double> quadratic_weights(int n) {
     return weights;
 }
 
-/// The lines between the voxels of a slice, as a walk over the edges of the lattice between neighbours' centres.
+/// Traces the lines between the voxels of a slice, over the edges of the lattice between neighbours' centres.
 class Walk {
 public:
     explicit Walk(const Slice& slice) : slice_(slice), seen_(2 * nodes(), 0) {}
 
     std::vector<Polygon> go() {
         std::vector<Polygon> lines;
-        // Every line passes between a voxel inside and its lower neighbour along i that is outside.
+        // Every line passes between some voxel inside and its lower neighbour along i that is outside.
         for (int j = 0; j < slice_.ny; ++j)
             for (int i = 0; i < slice_.nx; ++i)
                 if (slice_.at(i, j) && !slice_.at(i - 1, j) && !seen_[id({i, j}, {-1, 0})])
@@ -45,14 +45,14 @@ private:
     using Step = std::array<int, 2>;
 
     [[nodiscard]] std::size_t nodes() const { return std::size_t(slice_.nx + 1) * std::size_t(slice_.ny + 1); }
-    /// Of the pair of a voxel and its neighbour in a direction.
+    /// Index of the pair of a voxel and its neighbour in a direction.
     [[nodiscard]] std::size_t id(const Step& p, const Step& to) const {
         const int i = p[0] + std::max(to[0], 0), j = p[1] + std::max(to[1], 0);
         return (std::size_t(j) * std::size_t(slice_.nx + 1) + std::size_t(i)) * 2 + (to[0] != 0 ? 0 : 1);
     }
     [[nodiscard]] bool inside(const Step& p) const { return slice_.at(p[0], p[1]); }
 
-    /// Around the inside, counter-clockwise; `p` is inside, its neighbour along `out` is not.
+    /// Traces a line around the inside, counter-clockwise; `p` is inside, its neighbour along `out` is not.
     Polygon follow(Step p, Step out) {
         Polygon line;
         while (!seen_[id(p, out)]) {
@@ -61,7 +61,7 @@ private:
             const Step ahead{-out[1], out[0]};
             const Step next{p[0] + ahead[0], p[1] + ahead[1]}, corner{next[0] + out[0], next[1] + out[1]};
             if (!inside(next)) {
-                out = ahead;  // round the voxel itself; one that touches at the corner is another patch
+                out = ahead;  // turn around this voxel; one that touches at the corner belongs to another patch
             } else if (inside(corner)) {
                 p = corner;
                 out = {-ahead[0], -ahead[1]};
@@ -76,7 +76,7 @@ private:
     std::vector<std::uint8_t> seen_;
 };
 
-/// The slice with what lies at the image's ends repeated beyond them.
+/// The slice, with the voxels at the image's ends repeated beyond them.
 Slice grown(const Slice& slice, const std::array<bool, 4>& ends, int by) {
     const int left = ends[0] ? by : 0, right = ends[1] ? by : 0, low = ends[2] ? by : 0, high = ends[3] ? by : 0;
     Slice wide;
@@ -114,7 +114,7 @@ std::vector<int> depths(const Slice& slice) {
 }
 
 /// @param deepest  the largest depth; @param sum  of all depths
-Patch judged(std::size_t area, int deepest, double sum) {
+Patch classified(std::size_t area, int deepest, double sum) {
     Patch patch;
     patch.area = area;
     // Depths across a band of 1, 2, 3 and 4 voxels: 1, 1 1, 1 2 1, 1 2 2 1.
@@ -133,7 +133,7 @@ std::vector<Polygon> pixel_outlines(const Slice& slice) { return Walk(slice).go(
 Polygon smoothed(const Polygon& outline) {
     const int count = int(outline.size());
     const int n = std::min(kOutline.window, int(kOutline.window_of_line * count));
-    if (n < 2) return outline;  // a quadratic passes through three values
+    if (n < 2) return outline;  // a quadratic interpolates three values exactly
     const std::vector<double> weights = quadratic_weights(n);
     Polygon line(outline.size());
     for (int v = 0; v < count; ++v) {
@@ -196,7 +196,7 @@ std::vector<Patch> patches(const Slice& slice) {
                             stack.push_back({x + dx, y + dy});
                         }
             }
-            found.push_back(judged(area, deepest, sum));
+            found.push_back(classified(area, deepest, sum));
         }
     return found;
 }

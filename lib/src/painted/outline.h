@@ -15,24 +15,24 @@ struct Slice {
     }
 };
 
-/// Closed lines between the voxels inside and the others, in voxels (centres at integers), through the middle between
-/// two neighbours; voxels that touch at a corner are apart. The inside lies to the left.
+/// Closed lines between the voxels inside and the others, in voxels (centres at integers), through the midpoints
+/// between neighbours; voxels that touch at a corner are separate. The inside lies to the left.
 [[nodiscard]] std::vector<detail::Polygon> pixel_outlines(const Slice& slice);
 
 /// A line through the middle of a staircase: each coordinate is fitted by a quadratic over its neighbours along the
-/// line (Savitzky and Golay, Anal. Chem. 36, 1964), which leaves circles where they are. No vertex moves by more than
-/// half a voxel along either axis.
+/// line (Savitzky and Golay, Anal. Chem. 36, 1964), which preserves circles. No vertex moves by more than half a voxel
+/// along either axis.
 [[nodiscard]] detail::Polygon smoothed(const detail::Polygon& outline);
 
-/// The outlines of a slice that is part of an image: smoothed as if the paint went on beyond the image's end on the
-/// sides where it reaches that, and cut half a voxel beyond the last centres.
+/// The outlines of a slice that is part of an image: smoothed as if the paint continued beyond the image's end on the
+/// sides where it reaches it, and cut half a voxel beyond the last centres.
 /// @param ends  whether i = 0, i = nx - 1, j = 0, j = ny - 1 are the image's ends
 [[nodiscard]] std::vector<detail::Polygon> outlines(const Slice& slice, const std::array<bool, 4>& ends);
 
 /// A connected patch of a slice (neighbours by edge or corner).
 struct Patch {
     std::size_t area = 0;  ///< voxels
-    int width = 0;         ///< of its widest place, voxels
+    int width = 0;         ///< at its widest position, voxels
     bool stroke = false;   ///< at most 4 voxels wide and 6 times as long
 };
 [[nodiscard]] std::vector<Patch> patches(const Slice& slice);

@@ -112,7 +112,7 @@ std::vector<Paint> Paint::pieces() const {
     return found;
 }
 
-AxisPaint look_across(const Paint& paint, int axis) {
+AxisPaint properties_across(const Paint& paint, int axis) {
     const int first = paint.box().min[axis], count = paint.box().size()[axis];
     std::vector<std::vector<Patch>> found(static_cast<std::size_t>(count));
     tbb::parallel_for(0, count, [&](int n) { found[std::size_t(n)] = patches(paint.slice(axis, first + n)); });

@@ -1,5 +1,5 @@
 #pragma once
-// The paint of one label, whole and slice by slice.
+// The paint of one label, as a whole and by slice.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -19,12 +19,12 @@ public:
     [[nodiscard]] const VoxelBox& box() const { return box_; }
     [[nodiscard]] const Index3& image_size() const { return image_; }
 
-    /// Counted from the image's first slice.
+    /// @param number  counted from the image's first slice
     [[nodiscard]] Slice slice(int axis, int number) const;
-    /// Whether the box's sides within the slices are the image's.
+    /// Whether the box's sides within the slices are the image's ends.
     [[nodiscard]] std::array<bool, 4> ends(int axis) const;
     void erase(int axis, int number);
-    /// Positions, in voxels of the image, of those that have a neighbour outside.
+    /// Positions, in voxels of the image, of the voxels that have a neighbour outside.
     [[nodiscard]] std::vector<Vec3> outer() const;
     /// The connected parts (neighbours by face, edge or corner), each in its own box.
     [[nodiscard]] std::vector<Paint> pieces() const;
@@ -32,7 +32,7 @@ public:
     static std::array<int, 2> plane(int axis) { return {axis == 0 ? 1 : 0, axis == 2 ? 1 : 2}; }
 
 private:
-    /// A part of an image of this size. @param voxels  of it, at least one
+    /// A part of an image of this size. @param voxels  of the part, at least one
     Paint(const Index3& image, const std::vector<Index3>& voxels);
 
     [[nodiscard]] std::size_t at(const Index3& p) const {
@@ -47,15 +47,15 @@ private:
     std::vector<std::uint8_t> inside_;
 };
 
-/// What the slices across one axis hold.
+/// Properties of the slices across one axis.
 struct AxisPaint {
     std::vector<int> areas;           ///< slices with an area
-    std::vector<int> painted;         ///< with any paint
+    std::vector<int> painted;         ///< slices with any paint
     std::vector<std::size_t> voxels;  ///< by painted slice
-    std::vector<char> small;          ///< by painted slice: patches that are neither areas nor strokes, alone
+    std::vector<char> small;          ///< by painted slice: only patches that are neither areas nor strokes
     int widest = 0;                   ///< voxels
     int longest_run = 0;              ///< of neighbouring slices with an area
 };
-[[nodiscard]] AxisPaint look_across(const Paint& paint, int axis);
+[[nodiscard]] AxisPaint properties_across(const Paint& paint, int axis);
 
 }  // namespace covol::painted

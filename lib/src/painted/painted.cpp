@@ -95,7 +95,7 @@ std::map<int, VoxelBox> boxes_of(const Image& labels) {
     return all;
 }
 
-/// Whether the slices across the axis were painted one by one, apart or in thin runs.
+/// Whether the slices across the axis were painted one by one, separately or in thin runs.
 bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) {
     if (paint.areas.empty()) return false;
     if (paint.longest_run == 1) return true;
@@ -105,7 +105,7 @@ bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) 
            kPainted.thin_run * paint.longest_run * geometry.spacing[axis] <= across;
 }
 
-/// Small patches alone in their slice, away from other paint: the tip of what tapers.
+/// Adds small patches that are alone in their slice, away from other paint: tips of tapering structures.
 std::vector<int> with_tips(const AxisPaint& paint) {
     std::vector<int> slices = paint.areas;
     for (std::size_t n = 0; n < paint.painted.size(); ++n) {
@@ -168,7 +168,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
     const std::string source = labels.path() + ": " + name.name;
     if (as != PaintedAs::Scribbles) {
         std::array<AxisPaint, 3> axes;
-        for (int a = 0; a < 3; ++a) axes[a] = painted::look_across(paint, a);
+        for (int a = 0; a < 3; ++a) axes[a] = painted::properties_across(paint, a);
         for (const int a : {2, 1, 0})
             if (axes[a].widest >= kPainted.narrowest && is_sliced(axes[a], a, labels.geometry()))
                 result.views.push_back(view_of(paint, a, with_tips(axes[a]), source));
@@ -176,7 +176,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
             if (const std::optional<int> a = painted::find_whole_runs(paint, labels.geometry()))
                 result.views.push_back(view_of(paint, *a, with_tips(axes[*a]), source));
         if (result.views.empty() && as == PaintedAs::Slices) {
-            // The axis along which the fewest slices of the paint's box hold any.
+            // The axis along which the smallest fraction of the slices of the paint's box contains any.
             const auto fraction = [&](int a) { return double(axes[a].painted.size()) / box.size()[a]; };
             int best = 2;
             for (const int a : {1, 0})

@@ -4,7 +4,7 @@
 
 namespace covol::painted {
 
-/// The names that 3D Slicer's segmentations (.seg.nrrd) give their label values: SegmentN_Name, SegmentN_LabelValue.
+/// The names that 3D Slicer's segmentations (.seg.nrrd) assign to label values: SegmentN_Name, SegmentN_LabelValue.
 /// Empty for other files, and for those that cannot be read.
 [[nodiscard]] std::map<int, std::string> segment_names(const std::string& path);
 

@@ -11,16 +11,16 @@ namespace {
 
 /// An end of a piece's slices.
 struct End {
-    double fraction = 0;  ///< of the end slice's section to the largest one
-    bool blunt = false;   ///< larger than that of any ellipsoid which ends before the next slice
+    double fraction = 0;  ///< ratio of the end slice's section to the largest one
+    bool blunt = false;   ///< larger than that of any ellipsoid that ends before the next slice
 };
 
-/// @param areas      of the slices, from the end on
-/// @param elongated  the sections are: across a tube's side they shrink as its chords do, not as their squares
+/// @param areas      of the slices, beginning at the end
+/// @param elongated  whether the sections are: across a tube's side they shrink like its chords, not like their squares
 End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     const auto largest = double(*std::max_element(areas.begin(), areas.end()));
-    // The ellipsoid's middle lies beside the first slice that is about as large as any, and its end, at most a slice
-    // beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
+    // The ellipsoid's middle lies beside the first slice that is about as large as the largest, and it ends at most a
+    // slice beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
     double w = 0;
     for (const std::size_t area : areas) {
         if (double(area) >= kPainted.about_largest * largest) break;
@@ -30,17 +30,18 @@ End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     return {fraction, w == 0 || fraction > (elongated ? std::sqrt(of_round) : of_round)};
 }
 
-/// How wide the ends are across the axis, the mean of the fractions; 0 where none is blunt.
+/// The width of the ends across the axis, as the mean of the ratios; 0 if none is blunt.
 double blunt_ends(const Paint& piece, int axis) {
-    const AxisPaint look = look_across(piece, axis);
+    const AxisPaint slice_paint = properties_across(piece, axis);
     // A stroke, or a wall of strokes on neighbouring slices.
-    if (look.widest <= kOutline.widest_stroke || int(look.voxels.size()) <= kOutline.widest_stroke) return 0;
-    const auto largest = *std::max_element(look.voxels.begin(), look.voxels.end());
-    const bool elongated = double(largest) > kPainted.elongated * look.widest * look.widest;
+    if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
+        return 0;
+    const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
+    const bool elongated = double(largest) > kPainted.elongated * slice_paint.widest * slice_paint.widest;
     std::vector<End> ends;
-    if (piece.box().min[axis] > 0) ends.push_back(end_of(look.voxels, elongated));
+    if (piece.box().min[axis] > 0) ends.push_back(end_of(slice_paint.voxels, elongated));
     if (piece.box().max[axis] < piece.image_size()[axis] - 1)
-        ends.push_back(end_of({look.voxels.rbegin(), look.voxels.rend()}, elongated));
+        ends.push_back(end_of({slice_paint.voxels.rbegin(), slice_paint.voxels.rend()}, elongated));
     if (ends.empty()) return 1;
     double sum = 0;
     for (const End& end : ends) sum += end.fraction;
@@ -48,7 +49,7 @@ double blunt_ends(const Paint& piece, int axis) {
     return any ? sum / double(ends.size()) : 0;
 }
 
-/// Whether the box is as long along all axes, up to a voxel.
+/// Whether the box is equally long along all axes, up to a voxel.
 bool is_cube(const VoxelBox& box, const Vec3& spacing) {
     const Index3 n = box.size();
     const std::array<double, 3> side{n[0] * spacing[0], n[1] * spacing[1], n[2] * spacing[2]};
@@ -59,7 +60,7 @@ bool is_cube(const VoxelBox& box, const Vec3& spacing) {
 }  // namespace
 
 std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry) {
-    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // means of the fractions, and voxels of the pieces
+    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // weighted means of the ratios, and voxels of the pieces
     for (const Paint& piece : paint.pieces())
         for (int a = 0; a < 3; ++a) {
             const double ends = blunt_ends(piece, a);

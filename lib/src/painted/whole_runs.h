@@ -6,14 +6,14 @@
 
 namespace covol::painted {
 
-/// The axis across which paint on adjacent slices shows whole cross-sections, or none.
+/// The axis across which paint on adjacent slices shows complete cross-sections, or none.
 ///
-/// A brush leaves paint that tapers off everywhere: a ball, or a ball that was dragged along. Slices that were painted
-/// one by one end bluntly across the axis of the slices: the sections of the paint, carried on as those of an
-/// ellipsoid, would go on in the next slice, and nothing is painted there. That is asked of each connected piece that
-/// is wider than a stroke; pieces that hold more than half of the paint have to say so. Of several axes it is the one
-/// whose ends are the widest, of equally wide ones the last; paint that is as long in all directions, as a cube of it
-/// is, says nothing. An end at the image's end says nothing either, but paint through all of the image is no brush's.
+/// Paint by a brush tapers off in all directions: it is a ball, or a ball that was dragged along. Slices that were
+/// painted one by one have blunt ends across the axis of the slices: if the paint's sections are extrapolated as those
+/// of an ellipsoid, the next slice should contain paint, but does not. Each connected piece that is wider than a stroke
+/// is tested; pieces with more than half of the paint have to be blunt. Of several such axes the one with the widest
+/// ends is chosen, and the last of equally wide ones; but paint that is equally long in all directions, such as a cube,
+/// gives no axis. An end at the image's end is not considered, but paint through all of the image is not by a brush.
 [[nodiscard]] std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry);
 
 }  // namespace covol::painted

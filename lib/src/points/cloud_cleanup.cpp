@@ -23,16 +23,16 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-/// A point and its place in the input: CGAL's tools shuffle.
+/// A point and its index in the input, because CGAL's algorithms reorder points.
 using Entry = std::pair<Point, std::size_t>;
 using PointMap = CGAL::First_of_pair_property_map<Entry>;
 using Tag = CGAL::Parallel_tag;
 
-constexpr std::size_t kFewest = 7;  // points that say anything about a neighbourhood
+constexpr std::size_t kFewest = 7;  // minimum number for a meaningful neighbourhood
 
 class Cleaner {
-    // CGAL keeps references to what it is given.
-    [[nodiscard]] auto parameters() const { return CGAL::parameters::point_map(point_map_).callback(goes_on_); }
+    // CGAL keeps references to its arguments.
+    [[nodiscard]] auto parameters() const { return CGAL::parameters::point_map(point_map_).callback(not_cancelled_); }
 
 public:
     Cleaner(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run)
@@ -70,7 +70,7 @@ public:
         run_.check();
         double sum = 0;
         for (std::size_t n = 0; n < entries_.size(); ++n) {
-            // No quadric fits points on a line.
+            // Quadrics cannot be fitted to points on a line.
             if (!is_finite(entries_[n].first)) entries_[n] = before[n];
             const double shift = std::sqrt(CGAL::squared_distance(entries_[n].first, before[n].first));
             sum += shift;
@@ -107,7 +107,7 @@ public:
     }
 
 private:
-    /// Neighbours of few points are too far off to tell.
+    /// If there are few points, neighbours are too far away for the other criterion.
     std::size_t remove_isolated() {
         std::set<std::size_t> isolated;
         for (const IsolatedPoint& one : find_isolated_points(points())) isolated.insert(entries_[one.index].second);
@@ -117,7 +117,7 @@ private:
     [[nodiscard]] unsigned neighbours() const {
         return static_cast<unsigned>(std::min<std::size_t>(std::size_t(options_.neighbours), entries_.size() - 1));
     }
-    /// Drops what CGAL has put behind `end`; the input's order again. Returns how many.
+    /// Removes the entries that CGAL has moved behind `end` and restores the input's order. Returns how many.
     std::size_t keep_until(std::vector<Entry>::iterator end) {
         run_.check();
         const auto removed = static_cast<std::size_t>(entries_.end() - end);
@@ -132,14 +132,14 @@ private:
     const CloudCleanupOptions& options_;
     const RunContext& run_;
     const PointMap point_map_{};
-    /// Called by CGAL, possibly from a thread of its own: false stops it.
-    struct GoesOn {
+    /// Called by CGAL, possibly from another thread; false stops CGAL.
+    struct NotCancelled {
         const RunContext& run;
         bool operator()(double) const { return !run.cancelled(); }
     };
-    // No std::function: CGAL 5.5 keeps a reference to its own copy of one, which is gone by then; of others it makes
-    // one that stays.
-    const GoesOn goes_on_{run_};
+    // Not a std::function: CGAL 5.5 keeps a reference to its own temporary copy of one; other callables are copied
+    // permanently.
+    const NotCancelled not_cancelled_{run_};
     std::vector<Entry> entries_;
 };
 

@@ -1,35 +1,36 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
 #include <cstddef>
 
 #include "base/heuristic.h"
 
 namespace covol {
 
-/// Search for the nearest points of each point: neighbours.h.
+/// Search for the nearest neighbours of each point: neighbours.h.
 struct NeighboursHeuristics {
-    /// [spacings] In which they are looked for first; time, not the result.
+    /// [spacings] Initial search radius; affects the time, not the result.
     double first_radius = heuristic("neighbours.first_radius", 2);
-    /// [spacings] Beyond which they are given up.
+    /// [spacings] Search radius at which the search ends.
     double max_radius = heuristic("neighbours.max_radius", 40);
 };
 COVOL_HEURISTICS NeighboursHeuristics kNear{};
 
 /// Scans whose layer of points is thicker than their spacing: scan_noise.cpp.
 struct ScanNoiseHeuristics {
-    /// [voxels] Mean distance to the local plane at which a voxel size holds a layer.
+    /// [voxels] Maximum mean distance to the local plane for a voxel size that resolves the layer as one surface.
     double thin_fraction = heuristic("scan_noise.thin_fraction", 0.35);
-    /// [voxels] The same where larger ones bend; scans as thick as their spacing is wide have 0.3 to 0.45.
+    /// [voxels] The same if larger voxel sizes exceed it because the surface is curved; scans as thick as their spacing
+    /// have 0.3 to 0.45.
     double clean_fraction = heuristic("scan_noise.clean_fraction", 0.25);
     /// [voxels] Radius of the local plane.
     double plane_voxels = heuristic("scan_noise.plane_voxels", 2.5);
-    /// [ratio] Of a voxel size that is tried to the one below.
+    /// [ratio] Of a voxel size to the next smaller one that is tried.
     double growth = heuristic("scan_noise.growth", 1.25);
-    /// [steps] Of them above the spacing.
+    /// [steps] Maximum number above the spacing.
     int coarsest = heuristic("scan_noise.coarsest", 7);
-    /// [points] Whose planes are looked at.
+    /// [points] Number of sampled points whose planes are evaluated.
     std::size_t samples = heuristic("scan_noise.samples", 3000);
-    /// [points] That make a plane, and one more.
+    /// [points] Minimum number besides the point itself to which a plane is fitted.
     std::size_t min_neighbours = heuristic("scan_noise.min_neighbours", 6);
     /// [passes] Of averaging layers.
     int passes = heuristic("scan_noise.passes", 2);
@@ -38,38 +39,38 @@ COVOL_HEURISTICS ScanNoiseHeuristics kScan{};
 
 /// Distance to the nearest point: spacing.cpp.
 struct SpacingHeuristics {
-    /// [points] Of which it is taken.
+    /// [points] Maximum number of sampled points.
     std::size_t queries = heuristic("spacing.queries", 50000);
 };
 COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 
-/// Marks that a click went astray for: isolated_points.cpp.
+/// Marks from misplaced clicks: isolated_points.cpp.
 struct IsolatedHeuristics {
-    /// [points] Fewer tell nothing of what is usual.
+    /// [points] Minimum number for which typical links can be estimated.
     std::size_t min_points = heuristic("isolated.min_points", 10);
-    /// [points] More are no marks, but a cloud.
+    /// [points] Maximum number; more are a cloud instead of marks.
     std::size_t max_points = heuristic("isolated.max_points", 4000);
-    /// [longest links] Marks that lie closer to each other are one that was read or clicked twice.
+    /// [longest links] Distance below which marks are the same one, read or clicked twice.
     double same_place = heuristic("isolated.same_place", 1e-3);
-    /// [points] That are linked more closely, and apart from the others, at most: four already enclose something.
+    /// [points] Maximum in a group apart from the others: four already enclose a volume.
     std::size_t max_group = heuristic("isolated.max_group", 3);
-    /// [share of the points] That lie apart, at most.
+    /// [fraction of the points] Maximum that may be apart from the others.
     double max_fraction = heuristic("isolated.max_fraction", 0.1);
-    /// [ratio] Of the shortest link to one of them to the longest between the others: of marks on seven structures,
-    /// evenly and on outlines, successive links differ by 1.4 at most.
+    /// [ratio] Minimum of the shortest link to one of them to the longest link among the others: for marks on seven
+    /// structures, evenly distributed and on outlines, successive links differ by a factor of at most 1.4.
     double gap = heuristic("isolated.gap", 2.0);
-    /// [median links] The same where many lie apart, each elsewhere: of marks on these structures links have 2.6 at
-    /// most.
+    /// [median links] Alternative minimum of that shortest link, for several points apart at different places: for
+    /// marks on these structures, links are at most 2.6.
     double far = heuristic("isolated.far", 6.0);
 };
 COVOL_HEURISTICS IsolatedHeuristics kIsolated{};
 
 /// Cleaning on demand: cloud_cleanup.cpp.
 struct CleanupHeuristics {
-    /// [passes] Of removing outliers; each lowers the mean distance that they have raised.
+    /// [passes] Maximum number for removing outliers; each pass reduces the mean distance, which outliers increase.
     int max_passes = heuristic("cleanup.max_passes", 10);
-    /// [distances to 6 neighbours] Radius of WLOP: two rings of new neighbours; CGAL's own 8 spacings flatten what is
-    /// curved.
+    /// [distances to 6 neighbours] Radius of WLOP: two rings of new neighbours; CGAL's default of 8 spacings flattens
+    /// curved surfaces.
     double rings = heuristic("cleanup.rings", 2.5);
     /// [points] Neighbours in a ring.
     unsigned ring = heuristic("cleanup.ring", 6U);

@@ -1,4 +1,4 @@
-// Points that a click went astray for: single linkage, whose links are the edges of the shortest spanning tree.
+// Finds misplaced marks by single linkage, whose links are the edges of the minimum spanning tree.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,7 +17,7 @@ struct Link {
     std::size_t from, to;
 };
 
-/// Prim's algorithm, which asks for all distances once; the shortest link first.
+/// Prim's algorithm, which evaluates every distance once; the shortest link first.
 std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
     std::vector<double> squared(points.size(), std::numeric_limits<double>::infinity());
     std::vector<std::size_t> nearest(points.size(), 0), left(points.size() - 1);
@@ -44,7 +44,7 @@ std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
     return links;
 }
 
-/// Points that links join, each group known by its least.
+/// Points joined by links, each group identified by its smallest index.
 class Groups {
 public:
     explicit Groups(std::size_t points) : sets_(points), size_(points, 1), places_(points) {}
@@ -57,14 +57,14 @@ public:
         large_ += is_large(minimum);
         if (size_[minimum] > size_[largest_]) largest_ = minimum;
     }
-    /// Two points at one place count once. @pre no link between places was joined
+    /// Counts two points at the same position as one. @pre no link between different positions was joined
     void merge(const Link& link) {
         sets_.unite(of(link.from), of(link.to));
         --places_;
     }
     [[nodiscard]] std::size_t places() const { return places_; }
     [[nodiscard]] std::uint32_t largest() const { return largest_; }
-    /// Whether all others have no more points than clicks that went astray together, and few in all.
+    /// Whether all other groups are small enough to be misplaced clicks, and contain few points in total.
     [[nodiscard]] bool largest_is_all_but_few() const {
         return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.max_fraction) * double(places_);
     }
@@ -73,7 +73,7 @@ private:
     [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.max_group; }
 
     detail::DisjointSets sets_;
-    std::vector<std::size_t> size_;  ///< places of each group
+    std::vector<std::size_t> size_;  ///< distinct positions in each group
     std::size_t places_;
     std::uint32_t largest_ = 0;
     int large_ = 0;
@@ -99,7 +99,8 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     if (points.size() < kIsolated.min_points || points.size() > kIsolated.max_points) return {};
     const std::vector<Link> links = shortest_tree(points);
     Groups groups(points.size());
-    // Marks that were read or clicked twice: beside the distance between them every other one is long.
+    // Marks that were read or clicked twice are merged first: compared with the distance between them, every other link
+    // would be long.
     const auto first =
         std::size_t(std::upper_bound(links.begin(), links.end(), kIsolated.same_place * links.back().length,
                                      [](double length, const Link& link) { return length < link.length; }) -

@@ -13,14 +13,14 @@
 namespace covol::cloud {
 
 struct Neighbour {
-    double squared;    ///< distance
-    std::uint32_t at;  ///< sorted position
+    double squared;    ///< squared distance
+    std::uint32_t at;  ///< position in the sorted order
     friend bool operator<(const Neighbour& a, const Neighbour& b) {
         return a.squared != b.squared ? a.squared < b.squared : a.at < b.at;
     }
 };
 
-/// Sums over neighbours, of where they lie from a point.
+/// Sums over neighbours, of their positions relative to a point.
 struct Moments {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
@@ -37,9 +37,9 @@ struct Moments {
     return moments;
 }
 
-/// visit(point, neighbours), from several threads, for each point as it was given: its `count` nearest others, the
-/// nearest first; fewer where the points end, or lie farther than 40 spacings.
-/// @param cells   of an edge of about two spacings
+/// visit(point, neighbours), from several threads, with the input index of each point and its `count` nearest other
+/// points, the nearest first; fewer if there are no more, or they are farther than 40 spacings.
+/// @param cells   with an edge of about two spacings
 /// @param wanted  (sorted position) -> whether that point is visited
 template <typename Visit, typename Wanted>
 void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit, Wanted wanted) {

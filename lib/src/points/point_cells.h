@@ -1,6 +1,6 @@
 #pragma once
-// Points sorted into cubic cells, so that all in a box are a few contiguous ranges. No tree, no pointers: sorting is
-// all that it costs, for any number of points.
+// Points sorted into cubic cells, so that all points in a box are in a few contiguous ranges. Sorting is the only cost,
+// for any number of points.
 #include <cstdint>
 #include <vector>
 
@@ -14,11 +14,11 @@ public:
         std::uint32_t begin, end;
     };
 
-    /// @param edge  of a cell, > 0; grown where the points' box would have more than 2^20 cells along an axis.
-    /// At most 2^32 - 1 points.
+    /// @param edge  of a cell, > 0; increased if the points' box would have more than 2^20 cells along an axis. At most
+    /// 2^32 - 1 points.
     PointCells(const std::vector<Vec3>& points, double edge);
 
-    /// Sorted position -> index of the point as it was given.
+    /// Sorted position -> index of the point in the input.
     [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
     /// The points, sorted.
     [[nodiscard]] const std::vector<Vec3>& sorted() const { return sorted_; }
@@ -30,7 +30,7 @@ public:
     /// Ranges of sorted positions that hold all points of the box (and others of the cells it touches); `ranges` is
     /// overwritten.
     void find(const WorldBox& box, std::vector<Range>& ranges) const;
-    /// Of the cube that reaches so far from the place on each side.
+    /// The same for the cube that extends by `reach` from the position in each direction.
     void find(const Vec3& place, double reach, std::vector<Range>& ranges) const;
     [[nodiscard]] bool any_within(const Vec3& place, double reach) const;
 
@@ -43,7 +43,7 @@ private:
     std::array<std::int64_t, 3> count_;  // cells along each axis
     std::vector<std::uint32_t> order_, starts_;
     std::vector<std::uint64_t> keys_;  // of the cells, ascending
-    std::vector<std::uint32_t> rows_;  // along k, the first of each in keys_; empty where most would be, too
+    std::vector<std::uint32_t> rows_;  // for each row along k, its first cell in keys_; empty if most rows would be
     std::vector<Vec3> sorted_;
 };
 

@@ -1,5 +1,5 @@
-// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): how far points lie from them,
-// and their projection (a moving average of order one).
+// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): distances of points from them,
+// and the projection onto them (a moving average of order one).
 #include "covol/scan_noise.h"
 
 #include <tbb/parallel_for.h>
@@ -18,7 +18,7 @@ namespace {
 
 Eigen::Vector3d vector(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
-/// The points by cells of edge `radius`: all within it of a place lie in 27 of them.
+/// The points in cells of edge `radius`: all points within that distance of a position are in 27 cells.
 class Neighbourhoods {
 public:
     Neighbourhoods(const std::vector<Vec3>& points, double radius) : points_(points), radius_(radius) {
@@ -28,13 +28,13 @@ public:
         std::sort(cells_.begin(), cells_.end());
     }
 
-    /// visit(point, squared distance) for all within the radius of x, x itself among them.
+    /// visit(point, squared distance) for all points within the radius of x, including x itself.
     template <typename Visit>
     void around(const Vec3& x, Visit visit) const {
         const Index3 c = cell(x);
         for (int i = -1; i <= 1; ++i)
             for (int j = -1; j <= 1; ++j) {
-                // Three cells along k are neighbours in the order, too.
+                // Three successive cells along k are contiguous in the order.
                 const std::uint64_t first = key({c[0] + i, c[1] + j, c[2] - 1}), last = first + 2;
                 auto at = std::lower_bound(cells_.begin(), cells_.end(), std::pair{first, std::size_t(0)});
                 for (; at != cells_.end() && at->first <= last; ++at) {
@@ -48,7 +48,7 @@ public:
 private:
     [[nodiscard]] Index3 cell(const Vec3& p) const {
         Index3 c;
-        for (int a = 0; a < 3; ++a)  // coarser than asked at a distance of 2^20 radii: slow, never wrong
+        for (int a = 0; a < 3; ++a)  // coarser at a distance of 2^20 radii: slow, but correct
             c[a] = static_cast<int>(std::min((p[a] - lowest_[a]) / radius_, double(1 << 20)));
         return c;
     }
@@ -134,7 +134,8 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     if (!(spacing > 0) || points.empty()) return choice;
     const double widest = second_longest_edge(bounding_box(points)) / 2;
     bool any = false, thin = false, thick = false;
-    // From the coarsest down: in a ball of a few spacings even points that fill space are few enough for a plane.
+    // Starts from the coarsest size: in a ball of a few spacings, even points that fill space are few enough to fit a
+    // plane.
     for (int k = kScan.coarsest; k >= 0; --k) {
         const double h = spacing * std::pow(kScan.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;

@@ -21,7 +21,7 @@ Point cross(const Point& a, const Point& b) {
 }
 
 constexpr int kSide = kLeafDim + 1;                                 ///< voxels along an edge of a leaf's cells
-constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< stands for a voxel outside the domain
+constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< marks a voxel outside the domain
 
 constexpr int cell_voxel(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
 constexpr std::array<int, 8> kCornerOffset = [] {
@@ -35,7 +35,7 @@ class CellValues {
 public:
     CellValues(const FloatGrid& u, const Domain& domain) : accessor_(u.getConstAccessor()), domain_(box_of(domain)) {}
 
-    /// False when no cell has a crossing.
+    /// False if no cell has a crossing.
     bool load(const Coord& origin) {
         std::array<Block, 8> blocks;
         for (int block = 0; block < 8; ++block)
@@ -60,7 +60,7 @@ public:
         return any && !all;
     }
 
-    /// Bit k says that the corners of the cell (i, j, k) are not on one side.
+    /// Bit k: the corners of the cell (i, j, k) are not all on one side.
     [[nodiscard]] unsigned crossed(int i, int j) const {
         const int* row = negative_.data() + i * kSide + j;
         int any = row[0] | row[1] | row[kSide] | row[kSide + 1], all = row[0] & row[1] & row[kSide] & row[kSide + 1];
@@ -69,20 +69,20 @@ public:
         return unsigned(any & ~all) & ((1U << kLeafDim) - 1);
     }
 
-    /// Bit c says that corner c of the cell is inside.
+    /// Bit c: corner c of the cell is inside.
     [[nodiscard]] int signs(int i, int j, int k) const {
         const int* row = negative_.data() + i * kSide + j;
         const auto along_k = [k](int bits) { return bits >> k & 3; };
         return along_k(row[0]) | along_k(row[1]) << 2 | along_k(row[kSide]) << 4 | along_k(row[kSide + 1]) << 6;
     }
 
-    /// A corner of the cell lies outside the domain.
-    [[nodiscard]] bool sticks_out(int i, int j, int k) const {
+    /// Whether a corner of the cell lies outside the domain.
+    [[nodiscard]] bool leaves_domain(int i, int j, int k) const {
         const float* at = values_.data() + cell_voxel(i, j, k);
         return std::any_of(kCornerOffset.begin(), kCornerOffset.end(), [at](int c) { return at[c] == kOutside; });
     }
 
-    /// Where edge e of the cell crosses zero, relative to the cell.
+    /// The zero crossing on edge e of the cell, relative to the cell.
     [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
         const float* at = values_.data() + cell_voxel(i, j, k);
         const int a = kEdgeStart[e], b = edge_end(e);
@@ -93,9 +93,9 @@ public:
     }
 
 private:
-    /// What the cells need of one of the eight leaves, or tiles, around them.
+    /// The part of one of the eight surrounding leaves or tiles that the cells need.
     struct Block {
-        const float* buffer;  ///< null: of one value
+        const float* buffer;  ///< null: a constant value
         float constant;
         std::array<int, 3> size;
         float* to;
@@ -154,7 +154,7 @@ void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) 
     for (int i = 0; i < kLeafDim; ++i)
         for (int j = 0; j < kLeafDim; ++j)
             for (unsigned cells = values.crossed(i, j); cells != 0; cells &= cells - 1)
-                if (const int k = __builtin_ctz(cells); end == DomainEnd::Closed || !values.sticks_out(i, j, k))
+                if (const int k = __builtin_ctz(cells); end == DomainEnd::Closed || !values.leaves_domain(i, j, k))
                     visit(i, j, k, kCubeCases[values.signs(i, j, k)]);
 }
 
@@ -184,7 +184,7 @@ void add_with_lower_neighbours(const Coord& block, std::vector<Coord>& blocks) {
         blocks.push_back(block.offsetBy(-kLeafDim * (n >> 2 & 1), -kLeafDim * (n >> 1 & 1), -kLeafDim * (n & 1)));
 }
 
-/// Blocks of 8^3 in tiles that are inside, where something outside may be next to them without a leaf between: the
+/// Adds blocks of 8^3 in tiles that are inside, if something outside may be next to them without a leaf in between: the
 /// domain's end, or a tile of the other sign.
 void add_tile_blocks(const FloatGrid& u, const openvdb::CoordBBox& domain, std::vector<Coord>& blocks) {
     const auto accessor = u.getConstAccessor();
@@ -237,7 +237,7 @@ std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
 PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bound) const {
     const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
     const Point arm = p - patch.center;
-    // The patch lies in a cylinder: what is farther from that than `bound` need not be looked at.
+    // The patch lies in a cylinder: if that is farther away than `bound`, so is the patch.
     const float along = dot(arm, patch.normal);
     const float beyond = std::max(0.0F, std::abs(along) - patch.height);
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);

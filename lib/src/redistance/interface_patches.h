@@ -22,8 +22,8 @@ struct Patch {
     std::uint32_t count;
 };
 
-/// The zero level set of linear interpolation along the voxel edges, cell by cell. Cells of a leaf have their first
-/// voxel there.
+/// The zero level set for linear interpolation along the voxel edges, cell by cell. A cell belongs to the leaf that
+/// contains its first voxel.
 struct InterfacePatches {
     std::vector<Coord> leaves;         ///< sorted origins of the leaves with patches
     std::vector<std::uint32_t> first;  ///< leaf i has the patches [first[i], first[i+1])
@@ -33,17 +33,17 @@ struct InterfacePatches {
     [[nodiscard]] PatchOutline outline(const Patch& patch) const {
         return {patch.normal.data(), patch.center.data(), vertices.data() + patch.first, static_cast<int>(patch.count)};
     }
-    /// From the centre of voxel `at` to the patch; infinitely far where the square is not below `bound`.
+    /// Distance from the centre of voxel `at` to the patch; infinite if its square is not below `bound`.
     [[nodiscard]] PatchHit nearest(const Coord& at, const Patch& patch, float bound) const;
 };
 
-/// What becomes of a surface that reaches the domain's boundary.
+/// Treatment of a surface that reaches the domain's boundary.
 enum class DomainEnd {
     Closed,  ///< beyond it is outside: the surface is closed half a voxel beyond the last voxel centres
     Open     ///< it ends there
 };
 
-/// Finds them; negative is inside.
+/// Finds the patches of u; negative is inside.
 [[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end,
                                               const RunContext& run);
 

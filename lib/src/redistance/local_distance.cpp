@@ -14,7 +14,7 @@ namespace {
 constexpr float kFallTolerance = 5e-3F;  // voxels
 constexpr float kUnclamped = 0.99F;
 
-/// A padded leaf of u; beyond the domain there is no surface.
+/// Loads a padded leaf of u; beyond the domain there is no surface.
 void load_u(const HaloField& u, const LeafBand& band, const Domain& domain, std::size_t leaf, float* out) {
     load_star(u, leaf, out);
     const LeafBounds bounds(domain, band.origin(leaf));
@@ -65,10 +65,11 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
     load_star_from(distance(leaf), across, out);
 }
 
-// Leaves in two colours; one is visited again when a leaf across a face has changed since, in the rows beside.
+// Visits leaves in two colours; a leaf is visited again if a leaf across a face has changed since then, in the rows
+// beside.
 void LocalDistance::spread() {
     const SchemeKernels& kernel = kernels();
-    std::vector<RowMask> fell(band_.size() + 1, 0);  // in the last visit
+    std::vector<RowMask> decreased(band_.size() + 1, 0);  // rows that decreased in the last visit
     bool first = true;
     for (std::atomic<bool> again = true; again; first = false) {
         again = false;
@@ -76,24 +77,24 @@ void LocalDistance::spread() {
         for (int colour = 0; colour < 2; ++colour)
             tbb::parallel_for(begins[colour], begins[colour + 1], [&](std::size_t leaf) {
                 if (!zone_[leaf]) return;
-                const RowMask due = first ? ~RowMask{0} : beside(fell, leaf);
-                fell[leaf] = 0;
+                const RowMask due = first ? ~RowMask{0} : beside(decreased, leaf);
+                decreased[leaf] = 0;
                 if (due == 0) return;
                 alignas(64) float d[kPaddedSize];
                 load_distance(leaf, d);
-                fell[leaf] = kernel.eikonal(d, cut(leaf), due, kFallTolerance);
-                if (fell[leaf] == 0) return;
+                decreased[leaf] = kernel.eikonal(d, cut(leaf), due, kFallTolerance);
+                if (decreased[leaf] == 0) return;
                 store_inner(d, distances(leaf));
                 again = true;
             });
     }
 }
 
-// The rows of a leaf beside which others, across its faces, fell.
-RowMask LocalDistance::beside(const std::vector<RowMask>& fell, std::size_t leaf) const {
+// The rows of a leaf beside which rows of leaves across its faces decreased.
+RowMask LocalDistance::beside(const std::vector<RowMask>& decreased, std::size_t leaf) const {
     constexpr RowMask kFirst = 0x0101010101010101ULL;  // j = 0
     RowMask across[6];
-    for (int face = 0; face < 6; ++face) across[face] = fell[band_.neighbours(leaf)[kFaceSlots[face]]];
+    for (int face = 0; face < 6; ++face) across[face] = decreased[band_.neighbours(leaf)[kFaceSlots[face]]];
     return across[kMinusI] >> 56 | across[kPlusI] << 56 | (across[kMinusJ] >> 7 & kFirst) |
            (across[kPlusJ] & kFirst) << 7 | across[kMinusK] | across[kPlusK];
 }
@@ -102,7 +103,7 @@ void LocalDistance::settle(std::size_t leaf) {
     alignas(64) float d[kPaddedSize], u[kPaddedSize];
     load_distance(leaf, d);
     load_u(u_, band_, domain_, leaf, u);
-    kernels().settle(u, d, cut(leaf));  // its cuts are not asked for again
+    kernels().settle(u, d, cut(leaf));  // its cuts are not needed any more
 }
 
 }  // namespace covol::detail

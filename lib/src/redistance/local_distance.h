@@ -9,32 +9,32 @@
 
 namespace covol::detail {
 
-/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
-/// before the band is made again.
+/// How far the band of a moving surface extends, in voxels: the 3 of the clamp and about two that the surface may move
+/// before the band is rebuilt.
 inline constexpr double kTrackingWidth = 5.0;
 
 /// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with
-/// the surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest
-/// points.
+/// the surface's intersections with voxel edges as boundary values. First order, at a twentieth of the cost of a search
+/// for nearest points.
 class LocalDistance {
 public:
     static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
     struct Scratch {
         float* cuts;                           ///< kCuts for each leaf to compute
         float* distances;                      ///< kLeafSize for each leaf
-        const std::uint32_t* place = nullptr;  ///< of a leaf among `cuts`; null: the leaf's own number
+        const std::uint32_t* place = nullptr;  ///< position of a leaf among `cuts`; null: the leaf's own number
     };
 
-    /// @param u        in voxels; blocks beyond the band say nothing of distances
-    /// @param zone     one flag for each leaf: those to compute; the others give what their |u| says
-    /// @param clamp    |u| from there on says nothing
-    /// @param width    how far to go, voxels
-    /// @param scratch  nothing in it is read
+    /// @param u        in voxels; blocks beyond the band contain no distances
+    /// @param zone     one flag for each leaf: those to compute; the others contribute their |u|
+    /// @param clamp    |u| from there on is not a distance
+    /// @param width    maximum distance, voxels
+    /// @param scratch  its content is not read
     LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone,
                   const Domain& domain, float clamp, float width, Scratch scratch);
     void compute();
 
-    /// The width where the surface is farther.
+    /// The width if the surface is farther away.
     [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
     /// The same, but next to the surface |u| is only scaled, see SchemeKernels::settle.
     [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
@@ -47,7 +47,7 @@ private:
     void start(std::size_t leaf);
     void load_distance(std::size_t leaf, float* out) const;
     void spread();
-    [[nodiscard]] RowMask beside(const std::vector<RowMask>& fell, std::size_t leaf) const;
+    [[nodiscard]] RowMask beside(const std::vector<RowMask>& decreased, std::size_t leaf) const;
     void settle(std::size_t leaf);
 
     const LeafBand& band_;

@@ -5,8 +5,8 @@
 
 namespace covol {
 
-/// Nothing lies on both sides of a level set in the place where its surface was looked for. Some callers expect that;
-/// for all others it is invalid input.
+/// A level set has no zero crossing where its surface was searched for. Some callers handle this; for all others it is
+/// invalid input.
 class NoSurface : public Error {
 public:
     explicit NoSurface(const std::string& message) : Error(Errc::InvalidInput, message) {}

@@ -10,7 +10,7 @@
 namespace covol::detail {
 namespace {
 
-// Of triangles that have a normal.
+// Limits for triangles that have a normal.
 constexpr float kSmallestArea = 1e-24F;  // squared: edges of a millionth of a voxel
 constexpr float kSmallestAngle = 1e-4F;
 
@@ -31,8 +31,8 @@ COVOL_INLINE Real unit(Real x) {
     return x < 1.0F ? x : Real{} + 1.0F;
 }
 
-// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a float and for
-// eight.
+// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a single float and
+// for eight.
 template <typename Real>
 COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
     Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;
@@ -71,7 +71,7 @@ COVOL_INLINE Float8 ceil_of(Float8 x) {
     return whole < x ? whole + 1.0F : whole;
 }
 
-/// Positions first, first + 1, ... along an axis that may lie within `half` of a place that moves from lane to lane.
+/// Positions first, first + 1, ... along an axis that may lie within `half` of a centre that moves from lane to lane.
 struct Positions {
     Float8 first;
     int maximum;
@@ -84,11 +84,11 @@ struct Positions {
 
 COVOL_INLINE Int8 is_in_leaf(Int8 at) { return (at & ~7) == 0; }
 
-/// No more than the squared distance to a polygon that lies in a cylinder, from a position `along` its axis and with
-/// the square `outside` off it.
+/// A lower bound of the squared distance to a polygon that lies in a cylinder, for a position `along` the axis and with
+/// the squared distance `outside` from it.
 COVOL_INLINE Float8 min_square(const PatchCylinder& cylinder, Float8 along, Float8 outside) {
     const Float8 above = positive((along < 0.0F ? -along : along) - cylinder.patch_height);
-    // (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r²: no root.
+    // (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r² avoids the square root.
     const Float8 excess = positive(outside - cylinder.patch_radius * cylinder.patch_radius);
     return (1 - 1e-5F) * (above * above + 0.25F * excess * excess / (outside + 1e-12F));
 }
@@ -117,12 +117,13 @@ void PatchFan::make(const PatchOutline& outline) {
         const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
         t.inverse_from = inverse(t.from_from);
         t.inverse_edge = inverse(product(t.edge, t.edge));
-        // Of what is that narrow, or that small, the normal is what rounding leaves. Its edges are as near.
+        // The normal of a triangle that is so narrow or small is dominated by rounding. Its edges are as near as its
+        // interior.
         if (!(t.area > std::max(kSmallestArea, kSmallestAngle * kSmallestAngle * t.from_from * t.to_to))) {
             t.area = 0;
             std::fill_n(t.normal, 3, 0.0F);
         }
-        t.inverse_area = 1 / t.area;  // without one nothing is within
+        t.inverse_area = 1 / t.area;  // infinite without a normal, so that nothing is within
     }
 }
 

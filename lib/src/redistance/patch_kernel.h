@@ -16,17 +16,17 @@ struct PatchOutline {
 /// The polygon as a fan of triangles around its centre.
 struct PatchFan {
     static constexpr int kMaxTriangles = 12;  ///< a cell has twelve edges
-    /// Of the centre and two vertices that follow each other.
+    /// Of the centre and two consecutive vertices.
     struct Triangle {
         float from[3];  ///< the first vertex, from the centre
         float edge[3];  ///< from the first to the second vertex
         float normal[3];
         float from_from, from_to, to_to;   ///< products of the vertices' arms
-        float area;                        ///< the normal's square; 0 where there is none
-        float inverse_area;                ///< infinite where there is none
-        float inverse_from, inverse_edge;  ///< of squared lengths; 0 where there is none
+        float area;                        ///< the normal's square; 0 if there is none
+        float inverse_area;                ///< infinite if there is none
+        float inverse_from, inverse_edge;  ///< of squared lengths; 0 if there is none
     };
-    int count = 0;  ///< none: not made yet
+    int count = 0;  ///< 0: not made yet
     Triangle triangles[kMaxTriangles];
 
     PatchFan() {}  // NOLINT: the triangles are large and may not be needed
@@ -39,23 +39,23 @@ struct PatchHit {
     bool is_interior;  ///< the nearest point lies within the polygon, not on its outline
 };
 
-/// @param arm  from the polygon's centre to the point that asks
+/// @param arm  from the polygon's centre to the query point
 [[nodiscard]] PatchHit nearest_on(const PatchFan& fan, const float arm[3]);
 
-/// A cylinder above and below a polygon, in a leaf's voxels, and what the leaf's voxels know.
+/// A cylinder above and below a polygon, in a leaf's voxels, and the nearest patches of the leaf's voxels so far.
 struct PatchCylinder {
     float center[3];     ///< of the polygon
     float radius;        ///< of the cylinder
-    float half_width;    ///< no voxel farther away asks
+    float half_width;    ///< voxels farther away are ignored
     float patch_radius;  ///< no part of the polygon is farther from the axis ...
     float patch_height;  ///< ... nor from the plane through the center
 };
 struct PatchLeaf {
     float* squared;           ///< 512 squared distances
-    std::int32_t* patch;      ///< whose they are
+    std::int32_t* patch;      ///< the patches that these refer to
     std::uint64_t* interior;  ///< 512 bits, PatchHit::is_interior
 
-    /// Voxel p takes the patch `index` where that is nearer than the one it has. @return whether it did
+    /// Voxel p takes the patch `index` if that is nearer than its current one. @return whether it did
     [[nodiscard]] bool offer(int p, const PatchHit& hit, std::int32_t index) const {
         if (!(hit.squared < squared[p])) return false;
         take(p, hit, index);
@@ -69,8 +69,9 @@ struct PatchLeaf {
     }
 };
 
-/// Gives the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to what they have.
-/// @param fan  of the outline; made when it is needed
+/// Assigns the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to their current
+/// one.
+/// @param fan  of the outline; made on demand
 void offer_patch(const PatchOutline& outline, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf,
                  PatchFan& fan);
 

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::int32_t kNoPatch = -1;
 
-/// Leaves with voxels that may be nearer than the band's half width to a patch.
+/// Leaves with voxels that may be closer to a patch than the band's half width.
 std::vector<Coord> band_leaves(const InterfacePatches& interface, double half_width) {
     const int reach = static_cast<int>(std::ceil(half_width));
     std::vector<Coord> result;
@@ -42,7 +42,7 @@ std::vector<Coord> band_leaves(const InterfacePatches& interface, double half_wi
     return result;
 }
 
-/// Each voxel of the band with the nearest patch that it knows.
+/// For each voxel of the band the nearest patch found so far.
 class NearestPatches {
 public:
     NearestPatches(const InterfacePatches& interface, const LeafBand& band, double half_width)
@@ -54,10 +54,11 @@ public:
           interior_(band.size(), LeafMask{}) {}
 
     // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
-    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
+    // lie in none; they, and those that inaccurate normals of the patches exclude, get candidates from their
+    // neighbours.
     void find(const RunContext& run) {
         seed();
-        // Of two voxels above the insides of their patches neither has anything to learn from the other.
+        // Two voxels that are both above the inside of their patches cannot improve each other.
         std::vector<LeafMask> beside(band_.size());
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
         propagate(band_, beside, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
@@ -82,7 +83,7 @@ private:
         return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
     }
 
-    /// Sources of one colour are three leaves apart: they reach no leaf in common.
+    /// Sources of one colour are three leaves apart, so that they reach no leaf in common.
     void seed() {
         std::array<std::vector<std::size_t>, 27> colours;
         for (std::size_t n = 0; n < interface_.leaves.size(); ++n) {
@@ -138,7 +139,7 @@ private:
             for (int sign = -1; sign <= 1; sign += 2) {
                 const std::int32_t across = band_.neighbours(
                     leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
-                const LeafMask look = looking_at(own, across != band_.none() ? outside(across) : kNone, axis, sign);
+                const LeafMask look = beside_marked(own, across != band_.none() ? outside(across) : kNone, axis, sign);
                 for (int word = 0; word < 8; ++word) result[word] |= look[word];
             }
         for (int p = 0; p < kLeafSize; ++p)

@@ -17,21 +17,20 @@
 namespace covol::detail {
 namespace {
 
-/// Where the interface lies, seen from a voxel beside it.
+/// The position of the interface, relative to a voxel beside it.
 struct Foot {
     Vec3 point;                   // index space
     std::array<float, 3> normal;  // towards phi > 0
 };
 
-/// What the search for the interface reads.
+/// Input of the search for the interface.
 struct Field {
     const LeafBand& band;
     const LeafArray<float>& phi;
-    const std::vector<LeafMask>& valid;  // voxels that take part
+    const std::vector<LeafMask>& valid;  // voxels that are used
     std::vector<LeafMask> inside;        // phi < 0, of those
 
-    /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; nothing where it takes no
-    /// part.
+    /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; none if it is not used.
     [[nodiscard]] std::optional<float> at(std::size_t leaf, int i, int j, int k) const {
         const int slot = neighbour_slot(i >> 3, j >> 3, k >> 3);
         const std::int32_t there = slot == 13 ? std::int32_t(leaf) : band.neighbours(leaf)[slot];
@@ -51,16 +50,16 @@ LeafMask beside_interface(const Field& field, std::size_t leaf) {
             const std::int32_t across = field.band.neighbours(leaf)[slot];
             const bool has_neighbour = across != field.band.none();
             const LeafMask inside =
-                looking_at(field.inside[leaf], has_neighbour ? field.inside[across] : kNone, axis, sign);
+                beside_marked(field.inside[leaf], has_neighbour ? field.inside[across] : kNone, axis, sign);
             const LeafMask valid =
-                looking_at(field.valid[leaf], has_neighbour ? field.valid[across] : kNone, axis, sign);
+                beside_marked(field.valid[leaf], has_neighbour ? field.valid[across] : kNone, axis, sign);
             for (int word = 0; word < 8; ++word)
                 result[word] |= (field.inside[leaf][word] ^ inside[word]) & valid[word] & field.valid[leaf][word];
         }
     return result;
 }
 
-/// visit(offset) for each bit that is on.
+/// Calls visit(offset) for each bit that is on.
 template <typename Visit>
 void for_each_on(const LeafMask& mask, const Visit& visit) {
     for (int word = 0; word < 8; ++word)
@@ -97,7 +96,7 @@ Foot find_foot(const Field& field, std::size_t leaf, int i, int j, int k, float&
     return foot;
 }
 
-/// Feet are about one voxel apart: a lateral offset up to that is the sampling's, not the surface's.
+/// Feet are about one voxel apart: a lateral offset up to that is due to the sampling, not to the surface.
 float distance_to_foot(const Foot& foot, const Coord& voxel) {
     constexpr float kSampling = 0.75F;
     float squared = 0, along = 0;
@@ -110,7 +109,7 @@ float distance_to_foot(const Foot& foot, const Coord& voxel) {
     return std::sqrt(along * along + lateral * lateral);
 }
 
-/// The interface, seen from the voxels beside it.
+/// The interface, represented by the voxels beside it.
 struct Interface {
     std::vector<LeafMask> inside;    ///< by leaf: phi < 0
     std::vector<LeafMask> beside;    ///< by leaf: voxels with a foot

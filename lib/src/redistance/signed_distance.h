@@ -5,9 +5,10 @@ namespace covol::detail {
 
 /// Signed distance, in voxels and clamped to [-width, width], to the interface between voxels of phi < 0 and phi >= 0.
 ///
-/// Beside the interface phi tells where between two voxels it lies; its scale does not matter. Each such voxel gives
-/// one foot point with a normal; the other voxels measure their distance to the plane of the nearest foot point.
-/// @param inside_domain  by leaf; other voxels take no part and get +width.
+/// Beside the interface, phi determines its position between two voxels; the scale of phi does not matter. Each such
+/// voxel gives one foot point with a normal; the distances of the other voxels are those to the plane of the nearest
+/// foot point.
+/// @param inside_domain  by leaf; other voxels are ignored and get +width.
 /// @param width  at most a few voxels; leaves of the band that the result needs must exist.
 [[nodiscard]] LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& phi,
                                                const std::vector<LeafMask>& inside_domain, const CoordBBox& box,
@@ -23,8 +24,8 @@ namespace covol::detail {
                                      const Domain& domain, float width);
 
 /// The start of an evolution from a signed distance u in voxels: make_band, active where |u| < kHalfWidthVoxels.
-/// @param u  by leaf; changed: clamped, and outside of the domain set to the outside value.
-/// @throws Error InvalidInput when no voxel is active; `where` is the caller's name.
+/// @param u  by leaf; modified: clamped, and outside of the domain set to the outside value.
+/// @throws Error InvalidInput if no voxel is active; `where` is the caller's name.
 [[nodiscard]] FloatGridPtr make_start(const LeafBand& band, LeafArray<float>& u, const Domain& domain,
                                       const char* where);
 

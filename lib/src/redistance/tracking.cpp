@@ -24,7 +24,7 @@ namespace {
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 constexpr float kWidth = float(kTrackingWidth);
 
-/// Tiles, which are far from the surface, and the background get the limit.
+/// Clamps the values; tiles, which are far from the surface, and the background get the limit.
 void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) {
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         float* values = tree.probeLeaf(band.origin(leaf))->buffer().data();
@@ -41,7 +41,7 @@ void remove_leaf(const Coord& origin, bool is_inside, FloatGrid& u) {
         u.tree().addTile(1, origin, is_inside ? -u.background() : u.background(), false);
 }
 
-/// Leaves with an edge, those to the next leaf among them, that the surface crosses; sorted.
+/// Leaves with an edge, possibly to the next leaf, that the surface crosses; sorted.
 std::vector<Coord> crossed_leaves(const FloatGrid& u) {
     const LeafBand band(u);
     std::vector<LeafMask> negative(band.size());
@@ -56,7 +56,7 @@ std::vector<Coord> crossed_leaves(const FloatGrid& u) {
                 beyond = negative[next];
             else
                 beyond.fill(u.tree().getValue(neighbour_origin(band.origin(leaf), kFaceSlots[face])) < 0 ? ~0ULL : 0);
-            crosses[leaf] = looking_at(negative[leaf], beyond, face / 2, face % 2 == 0 ? -1 : 1) != negative[leaf];
+            crosses[leaf] = beside_marked(negative[leaf], beyond, face / 2, face % 2 == 0 ? -1 : 1) != negative[leaf];
         }
     });
     std::vector<Coord> result;
@@ -66,10 +66,11 @@ std::vector<Coord> crossed_leaves(const FloatGrid& u) {
     return result;
 }
 
-/// Distances on the leaves of a region that are in the zone; u is left alone where no surface is near one of these.
-/// @return whether there was one
-bool remake(const LeafBand& region, const std::vector<unsigned char>& zone, FloatGrid& u, const Domain& domain,
-            double clamp) {
+/// Recomputes the distances on the leaves of a region that are in the zone; u is not changed if no surface is near one
+/// of these.
+/// @return whether there is one
+bool recompute(const LeafBand& region, const std::vector<unsigned char>& zone, FloatGrid& u, const Domain& domain,
+               double clamp) {
     const auto limit = static_cast<float>(clamp), h = static_cast<float>(domain.voxel_size);
     std::vector<std::uint32_t> place(region.size());
     std::uint32_t zone_size = 0;
@@ -116,8 +117,9 @@ bool remake(const LeafBand& region, const std::vector<unsigned char>& zone, Floa
 
 constexpr float kNear = 1.5F;  // voxels
 
-/// |u| / |grad u| next to the front: its distance to second order, from voxel `u` of a padded buffer, voxels; infinity
-/// where u is no distance, or has a kink: there the slope towards the front is not that of central differences.
+/// |u| / |grad u| next to the front, its distance to second order, from voxel `u` of a padded buffer, in voxels;
+/// infinity if u is not close to a distance, or has a kink: the slope towards the front is then not that of central
+/// differences.
 float near_distance(const float* u) {
     constexpr float kKink = 0.25F, kNone = std::numeric_limits<float>::infinity();
     if (!(std::abs(*u) < kNear * float(kSteepest))) return kNone;
@@ -138,20 +140,20 @@ float near_distance(const float* u) {
 
 std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
                                       double clamp) {
-    // One more ring for what the leaves beyond say.
+    // One more ring for the values of the leaves beyond.
     std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());
     for (std::size_t leaf = 0; leaf < region.size(); ++leaf)
         zone[leaf] = std::binary_search(changed.begin(), changed.end(), region.origin(leaf));
-    remake(region, zone, u, domain, clamp);
+    recompute(region, zone, u, domain, clamp);
     return changed;
 }
 
 void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
     static_assert(kTrackingWidth < kLeafDim);
     const std::vector<Coord> near = dilate_leaves(crossed_leaves(u), 1, domain);
-    if (!remake(LeafBand(near), std::vector<unsigned char>(near.size(), 1), u, domain, clamp))
+    if (!recompute(LeafBand(near), std::vector<unsigned char>(near.size(), 1), u, domain, clamp))
         throw NoSurface("grid '" + u.getName() +
                         "' has no zero crossing: nothing in the domain is inside, or nothing "
                         "outside");
@@ -163,7 +165,8 @@ void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
 }
 
 void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& run) {
-    // The stencil reaches beyond the band, and there the distance has to go on: a plateau spreads by a voxel a step.
+    // The stencil reads beyond the band, where the distance has to continue: a plateau would spread by a voxel per
+    // step.
     constexpr double kReach = kFreeWidth + 0.9;
     static_assert(kReach < kLeafDim);
     const FloatGridPtr next = redistance(u, domain, kReach, DomainEnd::Open, u.getName().c_str(), run);

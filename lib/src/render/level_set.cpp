@@ -11,7 +11,7 @@
 namespace covol::figure {
 namespace {
 
-/// Places near the surface, a voxel's centre each, joined by `add`.
+/// The extent of positions near the surface, the centres of voxels, which `add` joins.
 template <typename Add>
 Extent extent_of(const FloatGrid& grid, const Add& add) {
     const openvdb::tree::LeafManager<const FloatGrid::TreeType> leaves(grid.tree());
@@ -110,7 +110,7 @@ Extent surface_extent(const FloatGrid& grid, const Basis& basis) {
 }
 
 Extent turning_extent(const FloatGrid& grid, const Vec3& center, double elevation) {
-    const Basis level = look(0, elevation);
+    const Basis level = view_basis(0, elevation);
     return extent_of(grid, [&](const Vec3& at, Extent& extent) {
         const Vec3 away = minus(at, center);
         const double r = std::hypot(away[0], away[1]);

@@ -1,5 +1,5 @@
 #pragma once
-// A level set between its voxels.
+// Interpolation of a level set between its voxels.
 #include <openvdb/openvdb.h>
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace covol::figure {
 
 inline openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
-/// The cubic B-spline whose coefficients are the voxels: two times differentiable, so that normals show no voxels. It
-/// lies h/(3R) voxels inside of a ball of radius R. For one thread.
+/// The cubic B-spline whose coefficients are the voxels: twice differentiable, so that normals do not show the voxels.
+/// It lies h/(3R) voxels inside a ball of radius R. For one thread.
 class SmoothField {
 public:
     explicit SmoothField(const FloatGrid& grid);
@@ -21,7 +21,7 @@ public:
         Vec3 gradient;  ///< world
     };
     [[nodiscard]] Sample at(const Vec3& world);
-    /// The value alone; away from the band that of the nearest voxel.
+    /// Only the value; away from the band that of the nearest voxel.
     [[nodiscard]] double value(const Vec3& world);
     [[nodiscard]] double voxel_size() const { return h_; }
 
@@ -37,13 +37,13 @@ private:
     double h_;
 };
 
-/// The corners of the world box of the voxels inside or near the surface. @throws Error InvalidInput where there are
-/// none, or the voxels are no cubes.
+/// The world box of the voxels inside or near the surface.
+/// @throws Error InvalidInput if there are none, or the voxels are not cubes.
 [[nodiscard]] WorldBox surface_box(const FloatGrid& grid);
 
-/// How far the surface reaches.
+/// The extent of the surface.
 [[nodiscard]] Extent surface_extent(const FloatGrid& grid, const Basis& basis);
-/// How far it reaches from `center` when it is turned about the vertical axis through it, seen from that elevation.
+/// Its extent from `center` if it is rotated about the vertical axis through it, seen from that elevation.
 [[nodiscard]] Extent turning_extent(const FloatGrid& grid, const Vec3& center, double elevation);
 
 }  // namespace covol::figure

@@ -14,7 +14,7 @@ void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& ca
     struct Seen {
         double x, y, depth;
         Color color;
-        bool veiled;  // behind a surface that lets light through
+        bool is_behind_translucent;  // behind a translucent surface
     };
     std::vector<Seen> seen;
     const double reach = slack + 1.5 * radius * camera.pixel;
@@ -28,7 +28,7 @@ void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& ca
     }
     std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) { return a.depth < b.depth; });
     for (const Seen& ball : seen) {
-        const double fraction = ball.veiled ? 0.45 : 1;
+        const double fraction = ball.is_behind_translucent ? 0.45 : 1;
         const Rect& clip = camera.at;
         canvas.disc(ball.x, ball.y, radius + std::max(0.5, 0.18 * radius), gray(0.08), 0.8 * fraction, clip);
         canvas.disc(ball.x, ball.y, radius, ball.color, fraction, clip);

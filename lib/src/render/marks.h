@@ -6,7 +6,7 @@
 
 namespace covol::figure {
 
-/// Of marks where there is one structure, or none, and of those that belong to none of several.
+/// Colours of marks if there is at most one structure, and of marks that belong to none of several.
 inline constexpr Color kLoneMark = kSkyBlue, kLooseMark{0.95F, 0.95F, 0.95F};
 
 struct Ball {
@@ -17,7 +17,7 @@ struct Ball {
 /// Pixels: the more marks, the smaller.
 [[nodiscard]] double mark_radius(double text, std::size_t count);
 
-/// Draws those that no surface hides; one may lie as far as `slack` (world units) behind the surface that it marks.
+/// Draws the balls that no surface hides; one may lie up to `slack` (world units) behind the surface that it marks.
 void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer, double radius,
                 double slack);
 

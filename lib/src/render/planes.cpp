@@ -1,4 +1,4 @@
-// Which slices a figure shows, and how they lie on it.
+// The slices that a figure shows, and their orientation on it.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,8 +12,8 @@
 namespace covol::figure {
 namespace {
 
-/// Of each axis of the image the world's axis that it runs along, and whether it runs the other way. No two have the
-/// same.
+/// For each axis of the image the world axis along which it runs, and whether in the opposite direction. The three
+/// world axes are different.
 struct Directions {
     std::array<int, 3> world{0, 1, 2};
     std::array<bool, 3> reversed{false, false, false};
@@ -33,7 +33,7 @@ Directions directions_of(const ImageGeometry& geometry) {
     return best;
 }
 
-/// Indices along an axis between which a box of the world lies.
+/// Range of a world box in indices along an axis.
 std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometry& geometry) {
     double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
     for (const Vec3& corner : corners(box)) {
@@ -44,7 +44,7 @@ std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometr
     return {low, high};
 }
 
-/// The same within the image.
+/// The same, limited to the image.
 std::array<double, 2> inside(const std::array<double, 2>& range, int axis, const ImageGeometry& geometry) {
     const double last = geometry.size[axis] - 1.0;
     return {std::clamp(range[0], 0.0, last), std::clamp(range[1], 0.0, last)};
@@ -71,7 +71,7 @@ Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& ge
     }
     for (int a = 0; a < 3; ++a) {
         const double wider = margin * longest / geometry.spacing[a] + 0.5;
-        // Beyond the image only where a structure is.
+        // Beyond the image only if a structure extends there.
         const double beyond = 0.25 * wider, little = 0.01 * (ranges[a][1] - ranges[a][0]);
         const double first = -0.5, last = geometry.size[a] - 0.5;
         const double low = ranges[a][0] < first - little ? ranges[a][0] - beyond : first;
@@ -87,7 +87,7 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
         constexpr std::array<std::array<int, 2>, 3> kLaid{{{2, 1}, {0, 2}, {0, 1}}};
         return {axis, index, kLaid[axis][0], kLaid[axis][1], false, false};
     }
-    // To the right the patient's left, in sagittal planes the back; down the back in axial planes, else the feet.
+    // The patient's left is on the right, in sagittal planes the back; down is the back in axial planes, else the feet.
     const Directions directions = directions_of(scene.image->geometry());
     const int normal = directions.world[axis], right = normal == 0 ? 1 : 0, down = normal == 2 ? 1 : 2;
     Plane plane{axis, index, 0, 0, false, false};
@@ -105,9 +105,9 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
 }
 
 MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeometry& geometry) {
-    constexpr double kNear = 0.1, kMax = 0.9;  // of an index; share of the marks
+    constexpr double kNear = 0.1, kMax = 0.9;  // of an index; fraction of the marks
     MarkedSlices found;
-    double fewest = 0.6;  // share of the slices between the first and the last mark
+    double min_fraction = 0.6;  // fraction of the slices between the first and the last mark
     for (const int a : {2, 1, 0}) {
         std::set<int> slices;
         std::size_t on = 0;
@@ -119,8 +119,8 @@ MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeome
         }
         if (slices.empty() || double(on) < kMax * double(marks.size()) || 2 * slices.size() > marks.size()) continue;
         const double fraction = double(slices.size()) / (*slices.rbegin() - *slices.begin() + 1.0);
-        if (fraction >= fewest && slices.size() > 1) continue;
-        fewest = fraction;
+        if (fraction >= min_fraction && slices.size() > 1) continue;
+        min_fraction = fraction;
         found = {a, {slices.begin(), slices.end()}};
     }
     return found;

@@ -22,15 +22,15 @@ namespace {
 constexpr double kLow = 0.005, kHigh = 0.998;  // intensity percentiles shown as black and white
 constexpr double kRegionMargin = 0.08;         // around the structures on slices, of their longest side
 constexpr double kVolumeMargin = 0.15;
-constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // share of a view around what it shows
-// Opacity of what lies around another structure, and of all where the image's volume is to be seen inside.
-constexpr double kVeil = 0.35, kVolumeVeil = 0.16;
+constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // fraction of a view around its content
+// Opacity of structures around others, and of all structures if the image's volume is to be visible inside.
+constexpr double kEnclosingOpacity = 0.35, kVolumeOpacity = 0.16;
 constexpr double kVolumeDensity = 4.0;
-constexpr double kBytesPerPixel = 90;  // what colours, depths and normals take while a picture is made
+constexpr double kBytesPerPixel = 90;  // of colours, depths and normals while a picture is made
 constexpr int kPlanes = 3;
 constexpr std::size_t kMaxBalls = 3000;
 
-/// Text is as large as a picture of that size bears.
+/// Text size that suits a picture of that size.
 double text_size(int width, int height) { return std::max(9.0, 0.0185 * std::sqrt(double(width) * height)); }
 
 class Drawing {
@@ -60,24 +60,24 @@ public:
     Picture go() {
         if (scene_.image != nullptr) find_planes();
         const int margin = int(std::lround(0.6 * text_));
-        const Rect room{margin, margin, options_.width - 2 * margin, options_.height - 2 * margin};
+        const Rect available{margin, margin, options_.width - 2 * margin, options_.height - 2 * margin};
         if (options_.figure == FigureKind::Slices)
-            draw_slices_alone(room);
+            draw_slices_alone(available);
         else if (options_.figure == FigureKind::Surface || (scene_.image != nullptr && planes_.empty()))
-            draw_view_alone(room);
+            draw_view_alone(available);
         else if (scene_.image == nullptr)
-            draw_views(room);
+            draw_views(available);
         else
-            draw_composed(room);
+            draw_composed(available);
         run_.check();
         return canvas_.picture();
     }
 
 private:
-    /// Structures that lie around others let them be seen.
+    /// Structures that enclose others are translucent.
     [[nodiscard]] double opacity_of(std::size_t n) const {
         if (const auto& stated = scene_.structures[n].opacity) return *stated;
-        if (options_.volume) return kVolumeVeil;
+        if (options_.volume) return kVolumeOpacity;
         for (std::size_t m = 0; m < boxes_.size(); ++m) {
             if (m == n) continue;
             bool around = true;
@@ -86,7 +86,7 @@ private:
                 around = around && boxes_[n].min[a] <= boxes_[m].min[a] + slack &&
                          boxes_[n].max[a] >= boxes_[m].max[a] - slack;
             }
-            if (around && longest_side(boxes_[n]) > longest_side(boxes_[m])) return kVeil;
+            if (around && longest_side(boxes_[n]) > longest_side(boxes_[m])) return kEnclosingOpacity;
         }
         return 1;
     }
@@ -110,7 +110,7 @@ private:
                         std::lround(std::clamp(geometry.world_to_index(*options_.at)[a], 0.0, geometry.size[a] - 1.0)));
                 across[a] = plane_across(a, index, scene_);
             }
-            // In the first way to lay them the first shares a side with each of the others.
+            // In the first arrangement, the first plane shares a side with each of the others.
             choose_first(across);
         }
         window_ = scene_.image->percentiles(kLow, kHigh);
@@ -125,8 +125,8 @@ private:
         }
     }
 
-    /// The order in which ways() has the planes. Beside the first one the second lies on its side, so that both share
-    /// an axis; elsewhere it lies as the third does. Slices come column by column.
+    /// Puts the planes into the order of ways(). Beside the first plane the second lies on its side, so that both share
+    /// an axis; in other arrangements it lies like the third. Slices come column by column.
     void arrange(int way) {
         if (options_.slices) {
             std::vector<Plane> ordered;
@@ -135,7 +135,7 @@ private:
                 for (std::size_t n = c; n < planes_.size(); n += columns) ordered.push_back(planes_[n]);
             planes_ = ordered;
         } else if (way == 0) {
-            std::swap(planes_[1], planes_[2]);  // the first column holds the first and the third
+            std::swap(planes_[1], planes_[2]);  // the first column contains the first and the third
         } else {
             planes_[1] = upright();
         }
@@ -177,15 +177,15 @@ private:
                        scene_.unit, {gray(1), style.text, rim});
     }
 
-    void draw_slices_alone(const Rect& room) {
+    void draw_slices_alone(const Rect& available) {
         if (planes_.empty()) throw Error(Errc::InvalidOptions, "render: slices: expected > 0, got 0");
-        Rect rest = room;
+        Rect rest = available;
         const auto entries = legend();
         const auto [width, height] = legend_size(entries, text_);
-        Split found = fill(room, ways(), gap_);
+        Split found = fill(available, ways(), gap_);
         if (!place_legend_in_corner(found)) {
             rest.height -= int(height + 0.6 * text_);
-            if (entries.empty()) rest = room;
+            if (entries.empty()) rest = available;
             found = fill(rest, ways(), gap_);
             draw_legend(canvas_, found.parts.bounds.x, found.parts.bounds.bottom() + 0.6 * text_, entries, text_,
                         theme_.ink);
@@ -249,14 +249,14 @@ private:
         draw_balls(canvas_, balls, camera, layer, radius_, slack);
     }
 
-    /// Of very many marks some: they would hide the surface.
+    /// Of very many marks only some, because they would hide the surface.
     void add_balls(const std::vector<Vec3>& marks, const Color& color, std::vector<Ball>& balls) const {
         const std::size_t stride = all_marks_.size() / kMaxBalls + 1;
         for (std::size_t n = 0; n < marks.size(); n += stride) balls.push_back({marks[n], color});
     }
 
     void draw_view(const Rect& at) {
-        const Basis basis = look(options_.view.azimuth, options_.view.elevation);
+        const Basis basis = view_basis(options_.view.azimuth, options_.view.elevation);
         Rect inside = at;
         inside.height = std::max(1, at.height - rim());
         const Camera camera =
@@ -283,28 +283,28 @@ private:
     [[nodiscard]] int rim() const { return int(std::lround(3.0 * text_)); }
 
     [[nodiscard]] double aspect() const {
-        const Extent all = extent(look(options_.view.azimuth, options_.view.elevation));
+        const Extent all = extent(view_basis(options_.view.azimuth, options_.view.elevation));
         return std::clamp(all.size(0) / std::max(1e-12, all.size(1)), 0.1, 10.0);
     }
 
-    void draw_view_alone(const Rect& room) {
-        draw_view(room);
-        draw_legend(canvas_, room.x, room.y, legend(), text_, theme_.ink);
+    void draw_view_alone(const Rect& available) {
+        draw_view(available);
+        draw_legend(canvas_, available.x, available.y, legend(), text_, theme_.ink);
     }
 
     /// A large view, and the structures from the front, from the right and from above.
-    void draw_views(const Rect& room) {
+    void draw_views(const Rect& available) {
         std::array<const char*, kPlanes> names{"front", scene_.is_anatomical ? "left" : "right", "top"};
         std::array<Basis, kPlanes> bases;
         std::array<Extent, kPlanes> extents;
         std::array<Cell, kPlanes> sizes{};
         for (int n = 0; n < kPlanes; ++n) {
             const ViewDirection view = parse_view(names[n], scene_.is_anatomical);
-            bases[n] = look(view.azimuth, view.elevation);
+            bases[n] = view_basis(view.azimuth, view.elevation);
             for (const Body& body : bodies_) extents[n].add(surface_extent(*body.surface, bases[n]));
             sizes[n] = {1.12 * extents[n].size(0), 1.12 * extents[n].size(1) + 0.06 * extents[n].size(0)};
         }
-        const Split found = split(room, aspect(), rim(), ways_for_three(sizes), gap_);
+        const Split found = split(available, aspect(), rim(), ways_for_three(sizes), gap_);
         draw_view(found.view);
         draw_legend(canvas_, found.view.x, found.view.y, legend(), text_, theme_.ink);
         const double text = std::max(9.0, 0.85 * text_);
@@ -321,8 +321,8 @@ private:
         }
     }
 
-    void draw_composed(const Rect& room) {
-        const Split found = split(room, aspect(), rim(), ways(), gap_);
+    void draw_composed(const Rect& available) {
+        const Split found = split(available, aspect(), rim(), ways(), gap_);
         draw_view(found.view);
         arrange(found.way);
         draw_slices(found.parts);
@@ -344,18 +344,19 @@ private:
         return entries;
     }
 
-    /// Where three planes leave room: in the corner of the first way, beside the second plane of a column.
-    /// @returns false where there is none, or it is too small.
+    /// Places the legend in the space that three planes leave free: in the corner of the first arrangement, or beside
+    /// the second plane of a column.
+    /// @returns false if there is no such space, or it is too small.
     bool place_legend_in_corner(const Split& found) {
         if (options_.slices || found.way % 2 != 0 || found.parts.at.size() != kPlanes) return false;
         const std::vector<Rect>& at = found.parts.at;
         const auto entries = legend();
         const auto [width, height] = legend_size(entries, text_);
-        const Rect room = found.way == 0 ? Rect{at[2].x, at[1].y, at[2].width, at[1].height}
-                                         : Rect{at[1].right() + gap_, at[1].y,
-                                                found.parts.bounds.right() - at[1].right() - gap_, at[1].height};
-        if (width > room.width - 0.5 * text_ || height > room.height - 0.3 * text_) return false;
-        draw_legend(canvas_, room.x + 0.4 * text_, room.y + 0.3 * text_, entries, text_, theme_.ink);
+        const Rect available = found.way == 0 ? Rect{at[2].x, at[1].y, at[2].width, at[1].height}
+                                              : Rect{at[1].right() + gap_, at[1].y,
+                                                     found.parts.bounds.right() - at[1].right() - gap_, at[1].height};
+        if (width > available.width - 0.5 * text_ || height > available.height - 0.3 * text_) return false;
+        draw_legend(canvas_, available.x + 0.4 * text_, available.y + 0.3 * text_, entries, text_, theme_.ink);
         return true;
     }
 

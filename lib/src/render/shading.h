@@ -1,5 +1,5 @@
 #pragma once
-// Light on surfaces.
+// Lighting of surfaces.
 #include <cmath>
 
 #include "base/geometry.h"
@@ -8,8 +8,8 @@
 
 namespace covol::figure {
 
-/// A key light over the left shoulder, a weaker one from the right, and some from everywhere; a highlight that is wide
-/// and faint; and rims that turn away are darker, as under a cloudy sky.
+/// A key light over the left shoulder, a weaker one from the right, and ambient light; a wide and faint highlight;
+/// parts that turn away from the eye are darker, as under a cloudy sky.
 struct Lights {
     explicit Lights(const Basis& basis)
         : to_eye(basis.to_eye),

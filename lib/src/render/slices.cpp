@@ -90,11 +90,11 @@ public:
         for (const RenderStructure& structure : scene_.structures)
             draw_marks(structure.marks, scene_.structures.size() > 1 ? to_color(structure.color) : kLoneMark);
         draw_marks(scene_.marks, scene_.structures.size() > 1 ? kLooseMark : kLoneMark);
-        draw_words();
+        draw_labels();
     }
 
 private:
-    /// Along the plane's two axes, of a place on the picture.
+    /// Indices along the plane's two axes at a position on the picture.
     [[nodiscard]] std::array<double, 2> indices(double x, double y) const {
         const int a = plane_.across, b = plane_.down;
         const double u = (x - at_.x) * style_.pixel / geometry_.spacing[a];
@@ -138,7 +138,7 @@ private:
         });
     }
 
-    /// Of a pixel the two structures whose outlines are next to it: signed distances in pixels.
+    /// For each pixel the two structures whose outlines are nearest: signed distances in pixels.
     struct Nearest {
         int structure[2] = {-1, -1};
         float away[2] = {kFar, kFar};
@@ -152,9 +152,9 @@ private:
         }
     };
 
-    /// The zero of the level set: the distance from it is the value over its slope within the plane.
+    /// The zero of the level set: the distance from it is the value divided by its slope within the plane.
     void find_outline(int n, std::vector<Nearest>& nearest) const {
-        const int width = at_.width + 2, height = at_.height + 2;  // a pixel more on every side, for slopes
+        const int width = at_.width + 2, height = at_.height + 2;  // one more pixel on every side, for slopes
         std::vector<float> values(std::size_t(width) * height);
         tbb::enumerable_thread_specific<SmoothField> fields([&] { return SmoothField(*scene_.structures[n].surface); });
         tbb::parallel_for(0, height, [&](int y) {
@@ -172,7 +172,7 @@ private:
         });
     }
 
-    /// Lines of the same width everywhere. Along a border that two structures share each lies on its own side of it.
+    /// Lines have the same width everywhere. Along a border of two structures, each line lies on its own side of it.
     void draw_outlines() const {
         std::vector<Nearest> nearest(std::size_t(at_.width) * at_.height);
         for (int n = 0; n < int(scene_.structures.size()); ++n) find_outline(n, nearest);
@@ -200,7 +200,7 @@ private:
         });
     }
 
-    /// Where the other planes cut this one: dashes at the rims, so that they do not cross what is shown.
+    /// Intersections with the other planes, as faint dashed lines.
     void draw_planes() const {
         const double dash = std::max(4.0, 0.5 * style_.text), width = std::max(1.0, 0.07 * style_.text);
         for (const Plane& other : style_.others) {
@@ -228,7 +228,7 @@ private:
             if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] <= 0.5 * thick)
                 places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
         }
-        // Of very many some: they would hide the outline.
+        // Of very many marks only some, because they would hide the outline.
         const std::size_t stride = places.size() / kMaxMarks + 1;
         for (std::size_t n = 0; n < places.size(); n += stride) {
             const auto [x, y] = places[n];
@@ -237,13 +237,13 @@ private:
         }
     }
 
-    void draw_words() const {
+    void draw_labels() const {
         const double size = style_.text, pad = 0.45 * size, rim = std::max(1.0, 0.11 * size);
         TextStyle style{size, gray(1), Align::Left, rim, gray(0)};
         const std::string name = name_of(plane_, scene_);
         const double cap = kCapHeight * size;
-        const double room = at_.width - 2 * pad;
-        if (text_width(name, size) <= room && at_.height > 2 * size)
+        const double available = at_.width - 2 * pad;
+        if (text_width(name, size) <= available && at_.height > 2 * size)
             draw_text(canvas_, at_.x + pad, at_.y + pad + cap, name, style);
         if (!scene_.is_anatomical || std::min(at_.width, at_.height) < 5 * size) return;
         const auto across = letters_of(plane_.across, geometry_), down = letters_of(plane_.down, geometry_);
@@ -253,7 +253,7 @@ private:
         draw_text(canvas_, at_.right() - pad, middle_y, across[plane_.mirror_across ? 1 : 0], style);
         style.align = Align::Center;
         draw_text(canvas_, middle_x, at_.bottom() - pad, down[plane_.mirror_down ? 1 : 0], style);
-        // Beneath the name where that reaches below the middle.
+        // Below the name if that extends beyond the middle.
         const bool under = at_.x + 2 * pad + text_width(name, size) > middle_x - 0.5 * size;
         draw_text(canvas_, middle_x, at_.y + pad + cap + (under ? 1.2 * size : 0), down[plane_.mirror_down ? 0 : 1],
                   style);

@@ -22,22 +22,22 @@ using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
 constexpr int kMaxHits = 12;                             // of one ray with one translucent body
 constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
-constexpr double kOneWall = 1;                           // voxels: bodies closer than that share a wall
+constexpr double kOneWall = 1;                           // voxels: bodies closer than that have a common wall
 constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
 constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
-constexpr double kOpaque = 0.999;                        // hides what is behind
+constexpr double kOpaque = 0.999;                        // hides everything behind
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
-constexpr double kCosEdge = 0.8;  // of the angle between neighbours' normals, above which a pixel is smooth
+constexpr double kCosEdge = 0.8;  // cosine of the angle between neighbours' normals, above which a pixel is smooth
 constexpr int kRows = 8;
 
 struct Hit {
     double depth = kMissing;  // towards the eye
     Vec3 normal{0, 0, 0};
     int body = -1;
-    bool enters = true;  ///< the ray goes into the body here
+    bool enters = true;  ///< the ray enters the body here
 };
 
-/// What one ray sees.
+/// The result of one ray.
 struct Seen {
     Color color{0, 0, 0};
     float fraction = 0, depth = kMissing, solid = kMissing;
@@ -45,7 +45,7 @@ struct Seen {
     int body = -1;
 };
 
-/// Rays of one thread.
+/// Traces the rays of one thread.
 class Tracer {
 public:
     Tracer(const std::vector<Body>& bodies, std::vector<Intersector> intersectors, const Camera& camera, double reach)
@@ -86,7 +86,7 @@ public:
     }
 
 private:
-    /// Where the ray leaves one body and enters the next through the wall that they share, the next is seen.
+    /// If the ray leaves one body and enters the next through their common wall, the next is visible.
     [[nodiscard]] bool is_behind_neighbour(const Hit& hit) const {
         if (hit.enters) return false;
         return std::any_of(hits_.begin(), hits_.end(), [&](const Hit& other) {
@@ -97,7 +97,7 @@ private:
 
     void find_hits(int n, const Vec3& middle) {
         const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
-        double from = openvdb::math::Delta<double>::value();  // 0 is before all that a ray meets
+        double from = openvdb::math::Delta<double>::value();  // before everything that the ray meets
         const double h = fields_[n].voxel_size();
         const int maximum = bodies_[n].opacity >= 1 ? 1 : kMaxHits;
         for (int tries = 0, found = 0; tries < kMaxHits && found < maximum; ++tries) {
@@ -113,8 +113,8 @@ private:
         }
     }
 
-    /// The place on the smooth field that lies next to where the ray meets the voxels. No body where the ray only
-    /// grazes the voxels: their own outline would show.
+    /// The position on the smooth field nearest to the ray's intersection with the voxels. No body if the ray only
+    /// grazes the voxels, because their own outline would be visible.
     Hit refined(int n, const Vec3& origin, double t) {
         SmoothField& field = fields_[n];
         const Vec3 along = times(-1, camera_.basis.to_eye);
@@ -145,7 +145,7 @@ private:
     }
 
     const std::vector<Body>& bodies_;
-    std::vector<Intersector> intersectors_;  // each keeps the ray that it follows
+    std::vector<Intersector> intersectors_;  // each stores its current ray
     const Camera& camera_;
     double reach_;
     Lights lights_;

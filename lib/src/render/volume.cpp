@@ -13,9 +13,9 @@ namespace {
 constexpr double kMaxVoxels = 3.2e7;
 constexpr double kMaxRays = 1.2e6;
 constexpr int kMaxSteps = 1200;
-constexpr double kDark = 0.12;  // is taken for nothing
+constexpr double kDark = 0.12;  // treated as empty
 
-Index3 thinning(const VoxelBox& region, const Vec3& spacing) {
+Index3 choose_step(const VoxelBox& region, const Vec3& spacing) {
     Index3 step{1, 1, 1};
     const auto count = [&] {
         double n = 1;
@@ -35,7 +35,7 @@ Index3 thinning(const VoxelBox& region, const Vec3& spacing) {
 
 Volume::Volume(const Image& image, const VoxelBox& region, const std::array<double, 2>& window, const RunContext& run)
     : geometry_(cropped(image.geometry(), region)) {
-    const Index3 step = thinning(region, geometry_.spacing), whole = region.size();
+    const Index3 step = choose_step(region, geometry_.spacing), whole = region.size();
     Vec3 first{0, 0, 0};
     for (int a = 0; a < 3; ++a) {
         geometry_.size[a] = std::max(1, whole[a] / step[a]);
@@ -94,7 +94,7 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
     const ImageGeometry& g = volume.geometry();
     const double finest = g.smallest_spacing();
     const Rect& at = camera.at;
-    // Rays need not be finer than voxels; between them colours are interpolated.
+    // Rays need not be finer than voxels; colours are interpolated between them.
     const double coarse =
         std::max({1.0, 0.6 * finest / camera.pixel, std::sqrt(double(at.width) * at.height / kMaxRays)});
     const int width = std::max(2, int(std::ceil(at.width / coarse)) + 1);

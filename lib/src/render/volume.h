@@ -10,22 +10,22 @@
 
 namespace covol::figure {
 
-/// The image's values between black and white, as bytes; large images are thinned by means.
+/// The image's values between black and white, as bytes; large images are downsampled by averaging.
 class Volume {
 public:
-    /// @throws what reading the image throws.
+    /// @throws whatever reading the image throws.
     Volume(const Image& image, const VoxelBox& region, const std::array<double, 2>& window, const RunContext& run);
     /// In [0,1]; at an index of the image, trilinear; 0 outside.
     [[nodiscard]] double at(const Vec3& index) const;
     [[nodiscard]] const ImageGeometry& geometry() const { return geometry_; }
 
 private:
-    ImageGeometry geometry_;  // of the thinned voxels
+    ImageGeometry geometry_;  // of the downsampled voxels
     std::vector<std::uint8_t> voxels_;
 };
 
-/// What is seen of it behind the plane through the camera's center. Bright voxels hide what is behind them: of a
-/// `density` of 1 so many lie along a side of the volume that it is nearly opaque.
+/// The view of it behind the plane through the camera's center. Bright voxels hide what is behind them: with a
+/// `density` of 1, bright voxels along one side of the volume are nearly opaque.
 [[nodiscard]] Layer cast_volume(const Volume& volume, const Camera& camera, double density, bool on_white,
                                 const RunContext& run);
 

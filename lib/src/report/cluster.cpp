@@ -12,9 +12,9 @@ namespace covol::detail {
 namespace {
 
 constexpr double kGrowth = 1.15;  // of the cells, until the triangles are few enough
-constexpr double kFirstFraction =
-    0.8;  // of the edge at which that is expected: too fine costs a turn, too coarse detail
-constexpr std::uint64_t kAxisBits = 21;  // of a cell's number
+// Of the edge at which that is expected: starting too fine costs an iteration, too coarse loses detail.
+constexpr double kFirstFraction = 0.8;
+constexpr std::uint64_t kAxisBits = 21;  // of a cell's number, per axis
 
 struct Box {
     std::array<float, 3> min{}, max{};
@@ -36,7 +36,7 @@ double area_of(const TriangleMesh& mesh) {
     return area;
 }
 
-/// The number of each vertex's cell, in the order in which they are met.
+/// The number of each vertex's cell, in the order of first occurrence.
 struct Cells {
     std::vector<std::uint32_t> of_vertex;
     std::size_t count = 0;
@@ -56,7 +56,7 @@ Cells cells_of(const TriangleMesh& mesh, const Box& box, double edge) {
     return cells;
 }
 
-/// Of three different cells each, no two the same.
+/// Triangles of three different cells each, without duplicates.
 std::vector<std::array<std::uint32_t, 3>> triangles_of(const TriangleMesh& mesh, const Cells& cells) {
     std::vector<std::array<std::uint32_t, 3>> triangles;
     for (const auto& t : mesh.triangles) {
@@ -83,7 +83,7 @@ std::vector<float> means(const std::vector<float>& values, const Cells& cells) {
     return result;
 }
 
-/// Of each cell the vertex nearest to its mean.
+/// For each cell the vertex nearest to its mean.
 std::vector<std::array<float, 3>> representatives(const TriangleMesh& mesh, const Cells& cells) {
     std::array<std::vector<float>, 3> middle;
     for (int a = 0; a < 3; ++a) {
@@ -111,7 +111,8 @@ PageMesh cluster(PageMesh in, std::int64_t maximum) {
     if (std::int64_t(mesh.triangles.size()) <= maximum) return in;
     const Box box = box_of(mesh);
     const double longest = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]});
-    // Cells no finer than their number holds; a mesh with a size has cells that grow until one holds all of it.
+    // Cells are no finer than their numbers allow. For a mesh with extent the loop ends, once one cell contains all of
+    // it.
     double edge = std::max(kFirstFraction * std::sqrt(2 * area_of(mesh) / double(maximum)), longest / double(1 << 20));
     if (!(edge > 0) || !std::isfinite(edge)) return in;
     Cells cells = cells_of(mesh, box, edge);

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-// Bytes as text that a page may hold.
+// Encodings of bytes as text for a page.
 namespace covol::detail {
 
 /// RFC 4648, with padding.
@@ -15,9 +15,9 @@ namespace covol::detail {
 /// The same as base64.
 [[nodiscard]] std::string pack(const std::vector<std::uint8_t>& bytes);
 
-/// JSON text that may stand in a script element: no character in it ends one or begins a comment.
+/// JSON text for a script element: no character in it ends the element or begins a comment.
 [[nodiscard]] std::string safe_in_script(std::string_view json);
-/// A text between the tags of HTML, or in an attribute's quotes.
+/// Text for use between HTML tags, or in an attribute's quotes.
 [[nodiscard]] std::string escape_html(std::string_view text);
 
 }  // namespace covol::detail

@@ -16,7 +16,7 @@ namespace covol {
 namespace {
 
 constexpr double kMaxCode = 65535;
-constexpr int kFast = 1;  // zlib's level: a person waits for it
+constexpr int kFast = 1;  // zlib's level: a user waits for it
 
 template <typename T>
 void append(std::vector<std::uint8_t>& bytes, T value) {
@@ -26,12 +26,12 @@ void append(std::vector<std::uint8_t>& bytes, T value) {
     for (int n = 0; n < 4; ++n) bytes.push_back(std::uint8_t(bits >> (8 * n)));
 }
 
-/// Where the pixels of a slice lie in a level of the image.
+/// The position of a slice's pixels in a level of the image.
 struct SlicePlan {
     std::size_t level = 0, along = 2, right = 0, down = 1;
     std::int32_t at = 0;                ///< the level's voxel
     Index3 size{0, 0, 0};               ///< of the level
-    std::int32_t across = 1, rows = 1;  ///< the level's voxels of a pixel, right and down
+    std::int32_t across = 1, rows = 1;  ///< voxels of the level per pixel, right and down
     SliceRequest::Part part;            ///< of the slice's pixels
 };
 
@@ -61,13 +61,13 @@ SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
     return plan;
 }
 
-/// The first and last voxel of a pixel. A coarse level may lack the image's last voxels: then its own last one counts.
+/// The first and last voxel of a pixel. A coarse level may lack the image's last voxels: then its own last one is used.
 std::array<std::int32_t, 2> voxels_of(std::int32_t pixel, std::int32_t step, std::int32_t size) {
     const std::int32_t first = std::int32_t(std::min(std::int64_t(pixel) * step, std::int64_t(size) - 1));
     return {first, std::int32_t(std::min(std::int64_t(first) + step, std::int64_t(size)) - 1)};
 }
 
-/// Pixels of rows `first` to `last`, from as many of the level's voxels as that takes.
+/// Encodes the pixels of rows `first` to `last` from the level's voxels that they need.
 void code_rows(const ImageLevels& image, const SlicePlan& plan, int first, int last, const std::array<double, 2>& range,
                std::uint8_t* out, const RunContext& run) {
     const SliceRequest::Part& part = plan.part;
@@ -104,7 +104,7 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
                           const RunContext& run) {
     const SlicePlan plan = plan_slice(image, wanted);
     const int width = plan.part.width, height = plan.part.height;
-    if (!image.is_in_chunks() && image.image().chunks()) {  // a packed stream: its layers are decoded once
+    if (!image.is_in_chunks() && image.image().chunks()) {  // a compressed stream: its layers are decoded once
         VoxelBox slice = image.image().held();
         slice.min[plan.along] = slice.max[plan.along] = plan.at;
         image.image().load(slice, run);
@@ -113,7 +113,7 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
     PageSlice coded{width, height, *std::max_element(factor.begin(), factor.end()), {}};
     const std::size_t bytes_of_row = 2 * std::size_t(width);
     std::vector<std::uint8_t> bytes(bytes_of_row * std::size_t(height));
-    // Of an image in chunks so many rows at once that each chunk is looked up once; more would take much memory.
+    // For an image in chunks, as many rows at once that each chunk is looked up only once; more would take much memory.
     const int chunk = image.is_in_chunks() ? std::max(1, image.chunk_size(plan.level)[plan.down] / plan.rows) : 1;
     const int offset = plan.part.y % chunk;
     tbb::parallel_for(0, (offset + height - 1) / chunk + 1, [&](int n) {

@@ -16,8 +16,8 @@ namespace covol::detail {
 namespace {
 
 constexpr double kLow = 0.002, kHigh = 0.998;  // intensity percentiles shown as black and white
-constexpr double kMargin = 0.15;               // around the places, of their box's longest side
-constexpr int kFewest = 3;                     // voxels along an axis, however long the others are
+constexpr double kMargin = 0.15;               // around the positions, as a fraction of their box's longest side
+constexpr int kMinVoxels = 3;                  // minimum number of voxels along an axis, however long the others are
 
 std::int64_t count_of(const Index3& size) { return std::int64_t(size[0]) * size[1] * size[2]; }
 
@@ -26,7 +26,7 @@ Index3 shown_size(const VoxelBox& region, const Index3& step) {
     return {std::max(1, size[0] / step[0]), std::max(1, size[1] / step[1]), std::max(1, size[2] / step[2])};
 }
 
-/// The held voxels around the places.
+/// The held voxels around the positions.
 VoxelBox around(const ImageGeometry& geometry, const VoxelBox& held, const std::vector<Vec3>& places) {
     Vec3 low, high;
     low.fill(std::numeric_limits<double>::max());
@@ -99,7 +99,7 @@ SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held, const
     while (count_of(plan.size) > maximum) {
         int finest = -1;
         for (int a = 0; a < 3; ++a) {
-            if (plan.size[a] <= kFewest) continue;
+            if (plan.size[a] <= kMinVoxels) continue;
             const auto edge = [&](int b) { return geometry.spacing[b] * plan.step[b]; };
             if (finest < 0 || edge(a) < edge(finest)) finest = a;
         }

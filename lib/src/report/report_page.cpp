@@ -24,8 +24,7 @@ using detail::pack;
 
 Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
 
-// A browser computes in single precision: where the first mesh has an origin of its own, the whole page is relative to
-// it.
+// Browsers compute in single precision: if the first mesh has an origin of its own, the whole page is relative to it.
 Vec3 origin_of(const ReportPage& page) { return page.structures.front().mesh->origin; }
 
 std::string packed_marks(const std::vector<Vec3>& marks, const Vec3& origin, std::int64_t maximum) {
@@ -172,7 +171,7 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
         summary.slices_size = plan.size;
         summary.slices_step = plan.step;
     } catch (const Error& error) {
-        if (error.code() != Errc::InvalidOptions) throw;  // more chunks than the memory holds
+        if (error.code() != Errc::InvalidOptions) throw;  // more chunks than memory allows
         run.warn(std::string("the report page has no slices: ") + error.what());
     }
     return data;

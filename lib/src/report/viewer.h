@@ -3,8 +3,8 @@
 
 namespace covol::detail {
 
-/// The page without title and data, {{title}} and {{data}} in their places: lib/src/report/viewer.html, which
-/// tools/viewer makes; the build embeds it.
+/// The page with {{title}} and {{data}} in place of title and data: lib/src/report/viewer.html, made by tools/viewer
+/// and embedded by the build.
 [[nodiscard]] std::string_view viewer();
 
 }  // namespace covol::detail

@@ -50,7 +50,7 @@ const SchemeKernels& kernels() {
     return chosen;
 }
 
-// Plane by plane, then row by row, then voxel by voxel: what is copied may have been copied before.
+// Plane by plane, then row by row, then voxel by voxel: what is copied may itself be a copy.
 void mirror_outside(float* values, const int lo[3], const int hi[3]) {
     for (int i = -1; i <= 8; ++i)
         if (const int from = std::clamp(i, lo[0], hi[0]); from != i)
@@ -81,7 +81,7 @@ void close_faces(Fraction* c, const int lo[3], const int hi[3]) {
             if (at[axis] == lo[axis]) closed += std::exchange(c[fraction_at(2 * axis, n)], Fraction{0});
             if (at[axis] == hi[axis]) closed += std::exchange(c[fraction_at(2 * axis + 1, n)], Fraction{0});
         }
-        // c = a/(1+S): without the closed share x of S it becomes a/(1+S-x) = c / (1 - closed).
+        // c = a/(1+S): without the closed fraction x of S it becomes a/(1+S-x) = c / (1 - closed).
         const double scale = outside                  ? 0.0
                              : closed < kFractionUnit ? 1.0 / (1.0 - double(closed) / kFractionUnit)
                                                       : 1.0;

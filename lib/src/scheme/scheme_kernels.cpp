@@ -71,7 +71,7 @@ inline FaceSums face_sums(Lanes p, Lanes q, Lanes z00, Lanes z10, Lanes z01, Lan
     return sums;
 }
 
-/// What the faces of a leaf add up to.
+/// Sums over the faces of a leaf.
 struct Faces {
     alignas(64) float weight_i[9 * 64];     // face (i,j,k) between voxels i-1 and i
     alignas(64) float weight_j[8 * 9 * 8];  // (i,j,k), between j-1 and j
@@ -120,7 +120,7 @@ void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask
             add(norm, sums.norm);
             for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
         }
-        // The ninth faces of eight rows make one more bundle; its lanes run along j.
+        // The ninth faces of eight rows form one more bundle, whose lanes run along j.
         const float* q = voxel(i, 0) + 8;
         const float* z = vertex(i, 0) + 8;
         const auto lanes = [](const float* first) { return load_strided(first, kRow); };
@@ -143,16 +143,16 @@ struct Star {
         q[kMinusJ] = load(row - kJ), q[kPlusJ] = load(row + kJ);
         q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
     }
-    /// q - p, or 0 where either is unknown
+    /// q - p, or 0 if either is unknown
     [[nodiscard]] Lanes difference(int face) const { return ((q[face] >= 0.0F) & (p >= 0.0F)) ? q[face] - p : Lanes{}; }
 };
 
 // velocity[f] = v_pq / h², Eqs. (17), (20).
-inline void add_point_pull(const Star& phi, float theta, Lanes velocity[6]) {
+inline void add_point_attraction(const Star& phi, float theta, Lanes velocity[6]) {
     for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
 }
 
-inline void add_image_pull(const Star& g, Lanes rho, float epsilon2, Lanes velocity[6]) {
+inline void add_image_attraction(const Star& g, Lanes rho, float epsilon2, Lanes velocity[6]) {
     Lanes difference[6];
     Lanes norm2 = Lanes{};
     for (int f = 0; f < 6; ++f) {
@@ -163,16 +163,16 @@ inline void add_image_pull(const Star& g, Lanes rho, float epsilon2, Lanes veloc
     for (int f = 0; f < 6; ++f) velocity[f] -= scale * difference[f];
 }
 
-/// 1 where the bit of the lane is set, else 0.
+/// 1 if the bit of the lane is set, else 0.
 inline Lanes lanes_of(unsigned bits) {
     constexpr LaneBits kBit = {1, 2, 4, 8, 16, 32, 64, 128};
     return ((LaneBits{} + int(bits)) & kBit) != 0 ? broadcast(1.0F) : Lanes{};
 }
 
-/// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets
-/// one unit less on each face.
+/// a * scale, rounded in the same way for all faces, which preserves symmetry. A row whose sum is rounded up to 1 or
+/// more gets one unit less on each face.
 inline void store_fractions(const Lanes a[6], Lanes scale, Fraction* c) {
-    // Unsigned: shares of what is not finite, which nobody uses, may overflow.
+    // Unsigned: fractions of values that are not finite may overflow, but are never used.
     UnsignedLanes fraction[6], total = UnsignedLanes{};
     for (int f = 0; f < 6; ++f) {
         fraction[f] = UnsignedLanes(__builtin_convertvector(a[f] * scale + 0.5F, LaneBits));
@@ -197,10 +197,11 @@ RowFacts assemble(const float* u, const float* phi, const float* g, const float*
             const int row = (i * 8 + j) * 8;
             const unsigned on = static_cast<unsigned>(active[i] >> (8 * j)) & 0xffU;
             Lanes a[6] = {};  // the velocities, then -a_pq >= 0
-            if (phi != nullptr) add_point_pull(Star(phi, i, j), constants.theta, a);
+            if (phi != nullptr) add_point_attraction(Star(phi, i, j), constants.theta, a);
             if (g != nullptr)
-                add_image_pull(Star(g, i, j), constants.rho * (rho != nullptr ? load(rho + row) : broadcast(1.0F)),
-                               constants.edge_epsilon2, a);
+                add_image_attraction(Star(g, i, j),
+                                     constants.rho * (rho != nullptr ? load(rho + row) : broadcast(1.0F)),
+                                     constants.edge_epsilon2, a);
             const float* weight[6] = {faces.weight_i + (i * 8 + j) * 8,    faces.weight_i + ((i + 1) * 8 + j) * 8,
                                       faces.weight_j + (i * 9 + j) * 8,    faces.weight_j + (i * 9 + j + 1) * 8,
                                       faces.weight_k + (i * 8 + j) * kRow, faces.weight_k + (i * 8 + j) * kRow + 1};
@@ -243,8 +244,8 @@ struct RowStar {
     }
 };
 
-// SOR in four colours: rows with i + j even, then odd, and within a row even k, then odd. It has red-black's rate, and
-// what a row gets from other rows is summed once for both of its halves.
+// SOR in four colours: rows with i + j even, then odd, and within a row even k, then odd. It converges like red-black
+// SOR, and the contributions of other rows to a row are summed once for both of its halves.
 template <typename Equation>
 inline double relax_rows(const LeafStar& u, RowMask rows, float omega, int inner, Equation equation) {
     const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
@@ -308,7 +309,7 @@ void mean_gradient(const float* u, float* out) {
     for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
-/// Where the front comes from along one axis: from the value v at the distance 1/q.
+/// The arrival of the front along one axis: from the value v at the distance 1/q.
 struct Arrival {
     Lanes v, q;
 };
@@ -320,13 +321,13 @@ inline void order(Arrival& a, Arrival& b) {
     a = first;
 }
 
-/// 0 where x is not above it.
+/// The square root of x; 0 if x is not positive.
 inline Lanes root_of(Lanes x) {
     const Lanes safe = max(x, Lanes{} + kTiny);
     return safe * inverse_sqrt(safe);
 }
 
-/// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v lies below it.
+/// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v is below it.
 inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     order(a, b), order(b, c), order(a, b);
     const Lanes one = broadcast(1.0F);
@@ -339,14 +340,14 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
         x = x > next.v ? both : x;
     };
     add_axis(b);
-    // Where the second axis does not count the third does not either.
+    // If the second axis does not count, the third does not either.
     const Lanes limit = x;
     add_axis(c);
     x = limit > c.v ? x : limit;
     return x;
 }
 
-/// The same where no edge is cut: q = 1.
+/// The same if no edge is cut: q = 1.
 inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
     const Lanes lower = min(a, b), upper = max(a, b), first = min(lower, c);
     const Lanes second = max(lower, min(upper, c)) - first, third = max(upper, c) - first;
@@ -357,7 +358,7 @@ inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
     return first + (limit > third ? three : limit);
 }
 
-// A neighbour that is higher by less gets nothing: by less than its square.
+// A neighbour that is higher by less than this is not updated: it would decrease by less than the square of this.
 constexpr float kDownwind = 0.02F;  // voxels
 
 RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
@@ -380,11 +381,11 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
             const Arrival ai = along(cut_i, min_i), aj = along(cut_j, min_j);
             const Lanes before = load(row), below = broadcast(row[-1]), above = broadcast(row[8]);
             Lanes now = before;
-            // Along k until nothing falls any more.
+            // Along k until nothing decreases any more.
             for (bool falls = true; falls;) {
                 const Lanes min_k = min(shifted_up(now, below), shifted_down(now, above));
                 const Arrival ak = along(cut_k, min_k);
-                // Nothing comes from where the values are no lower.
+                // No value decreases unless a neighbour is lower.
                 if (!any(now > min(ai.v, min(aj.v, ak.v)))) break;
                 const Lanes to = is_cut ? arrive(ai, aj, ak) : arrive(min_i, min_j, min_k);
                 const LaneBits fall = now - to > tolerance;
@@ -408,7 +409,7 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
 
 inline Lanes absolute(Lanes x) { return max(x, -x); }
 
-/// visit(axis, q) for a row's neighbours.
+/// Calls visit(axis, q) for a row's neighbours.
 template <typename Visit>
 inline void for_neighbours(const float* row, Visit visit) {
     visit(0, load(row - kI)), visit(0, load(row + kI));

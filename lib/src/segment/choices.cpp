@@ -14,9 +14,9 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr double kMaxReach = 1 << 22;  // voxels from a lattice's origin, with room around
+constexpr double kMaxReach = 1 << 22;  // voxels from a lattice's origin, with some margin
 
-/// What there is decides which terms of Eq. (3) can act.
+/// Sets the weights of terms of Eq. (3) to zero if the input that they need is missing.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
     EvolveOptions evolve = problem.options.evolve;
     if (!has_points && evolve.theta > 0) {
@@ -30,7 +30,7 @@ EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remar
     return evolve;
 }
 
-// One wild point makes a domain that no lattice holds.
+// A single outlier can make the domain larger than any lattice can hold.
 void check_extent(const std::vector<Vec3>& points, double h) {
     if (points.size() < 8 || std::sqrt(3.0) * longest_side(bounding_box(points)) < kMaxReach * h) return;
     Vec3 middle{};
@@ -51,7 +51,7 @@ void check_extent(const std::vector<Vec3>& points, double h) {
                                         " times as far as 99 % of them: leave it out, if it is a mistake");
 }
 
-// Points without an image that enclose something tell inside from outside themselves.
+// Points without an image are a cloud if they enclose something, so that they determine inside and outside themselves.
 bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
     if (is_any<CloudStart>(o.start)) {
@@ -64,14 +64,14 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
             cloud::fill_a_solid(points, measure_spacing(points).median, problem.run));
 }
 
-// Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
+// Tagging needs marks whose spacing is much smaller than the thickness of the body everywhere; the guess does not.
 StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points, Remarks& remarks) {
     const SegmentOptions& o = problem.options;
     if (is_any<GuessStart>(o.start)) return StartMethod::Guess;
     if (is_any<TagStart>(o.start) || !problem.is_guided() || o.contours || o.tag_distance ||
         points.size() > kAutomatic.max_guess_marks)
         return StartMethod::Tagged;
-    // A layer: tagging tells what it needs.
+    // The points form a layer: the error of tagging states what it requires.
     if (problem.image == nullptr && !can_enclose(points)) return StartMethod::Tagged;
     remarks.choose("start", "guess",
                    std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.max_guess_marks),
@@ -87,7 +87,7 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
     return kept;
 }
 
-// A thick layer of points, or several beside each other, has its surface in the middle.
+// A thick layer of points, or several adjacent layers, are replaced by the surface in their middle.
 std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
     const double radius = kAutomatic.scan_radius_voxels * h, thickness = measure_layer_thickness(points, radius, run);
     if (!(thickness > kAutomatic.noisy_fraction * h)) return points;
@@ -112,18 +112,19 @@ double choose_attraction_range(const EvolveOptions& evolve, bool tags, double h,
     return voxels * h;
 }
 
-/// With lengths, times and weights of a flow.
+/// Adds the lengths, times and weights of a flow.
 Choices with_flow(const Problem& problem, Choices c) {
     const RunContext& run = problem.run;
     Remarks& remarks = c.report.remarks;
     const bool tags = c.start == StartMethod::Tagged, guesses = c.start == StartMethod::Guess;
-    const double delta_voxels = tags || guesses ? kAutomatic.tag_delta_voxels : 1.0;  // there it is close to its end
+    const double delta_voxels = tags || guesses ? kAutomatic.tag_delta_voxels : 1.0;  // these start close to the result
     if (!c.evolve.delta) c.evolve.delta = delta_voxels * c.h;
-    const bool rests = (guesses || c.start == StartMethod::Cloud) && problem.is_guided() && uses_points(c.evolve);
-    if (rests || c.start == StartMethod::Corrected) return c;  // nothing flows; a later frame may
+    const bool is_final_start =
+        (guesses || c.start == StartMethod::Cloud) && problem.is_guided() && uses_points(c.evolve);
+    if (is_final_start || c.start == StartMethod::Corrected) return c;  // no flow follows; a later frame may need delta
     if (!problem.options.evolve.delta)
         remarks.choose("delta", number(*c.evolve.delta), number(delta_voxels) + " voxels", run);
-    c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels have time steps of their own
+    c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels set their own time steps
     if (!c.evolve.tau)
         remarks.choose("tau", number(c.h), "1 voxel at unit speed; longer while the surface moves slowly", run);
     if (!c.edge.sigma && uses_image(c.evolve)) {
@@ -141,7 +142,8 @@ Choices with_flow(const Problem& problem, Choices c) {
     return c;
 }
 
-/// Of the indicator's surface, nearly: a plane of any direction passes 1.5 cells per cell of its area on the mean.
+/// Estimates the area of the indicator's surface: a plane crosses 1.5 cells per cell of its area, averaged over
+/// directions.
 double area_of(const Indicator& indicator) {
     double squares = 0;
     indicator.crossed([&](const WorldBox& box) {
@@ -187,13 +189,13 @@ Resolved resolve(const Problem& problem) {
         const Timed timed(c.report.seconds.tag);
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
-        // The indicator is all that there is to see of a cloud that encloses nothing, or fills a solid.
+        // If a cloud encloses nothing, or fills a solid, its surface is that of the indicator alone.
         const double h = c.cloud->has_quadrics ? 0 : kAutomatic.view_voxel * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
             remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);
         }
-        // What closes the surface of a scan may be far larger than what the points lie on.
+        // The surface that closes a scan may be much larger than the part that the points lie on.
         const double area =
             area_of(c.cloud->orientation.screened ? *c.cloud->orientation.screened : *c.cloud->orientation.indicator);
         const double minimum = std::sqrt(area / (kAutomatic.max_facets * double(c.cloud->points.size())));
@@ -206,7 +208,7 @@ Resolved resolve(const Problem& problem) {
         }
     }
     points = merged(points, c.h, run);
-    // Points of walls within the body are told of as such, and lie on no surface.
+    // Points of walls within the body are reported as such; they do not lie on the surface.
     const bool are_enclosed = c.cloud && c.cloud->enclosed > 0;
     c.measured_marks = options.contours ? problem.given : are_enclosed ? c.cloud->points : points;
     if (c.start == StartMethod::Tagged) c.start = guess_or_tag(problem, points, remarks);
@@ -232,7 +234,7 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     const auto finer = [&](double spacing, double enough) {
         const double times = std::sqrt(double(distinct.size()) / enough);
-        // Points on curves lie closer together than they tell of a surface as large as they are.
+        // If points lie on curves, their spacing is too small for the extent of the surface.
         const WorldBox box = bounding_box(distinct);
         double area = 0;
         for (int a = 0; a < 3; ++a)
@@ -253,11 +255,12 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
         return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
     }
     const double spacing = measure_spacing(distinct).median;
-    // A guess is known between its points, noise or not: it has as many voxels as one of the most points.
+    // A guess is well defined between its points, whatever the noise: its surface gets as many voxels as that of the
+    // maximum number of points.
     if (!tagged) return finer(spacing, double(kAutomatic.max_guess_marks));
     const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
-    // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
-    // them.
+    // With few points and voxels as large as their spacing, the surface would be so few voxels wide that curvature
+    // would outweigh the points.
     if (scan.voxel_size <= spacing) return finer(spacing, kAutomatic.few_points);
     return {scan.voxel_size, "points lie " + number(scan.thickness) +
                                  " from their local plane on the mean, noise wider than their median distance " +

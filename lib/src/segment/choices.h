@@ -1,5 +1,5 @@
 #pragma once
-// The values that are left to us.
+// Automatic choices: the values that the caller leaves open.
 #include <optional>
 #include <vector>
 
@@ -8,31 +8,31 @@
 
 namespace covol::pipeline {
 
-/// How the level set starts: what SegmentOptions::start and the input come to.
+/// How the level set starts, resolved from SegmentOptions::start and the input.
 enum class StartMethod {
     Corrected,  ///< another tool's result, corrected by marks
-    Seeds,      ///< seeds inside are all that is given
+    Seeds,      ///< only seeds inside are given
     Guess,      ///< the surface through few marks
-    Cloud,      ///< the surface behind a cloud
-    Tagged,     ///< the points, tagged, or the body between contours
+    Cloud,      ///< the surface of a cloud
+    Tagged,     ///< tagged points, or the body between contours
     Named       ///< the sphere, box, mesh, mask or level set of the options
 };
 
 [[nodiscard]] inline bool uses_points(const EvolveOptions& flow) { return flow.theta > 0; }
 [[nodiscard]] inline bool uses_image(const EvolveOptions& flow) { return flow.rho > 0; }
 
-/// What the problem leaves open, chosen; each step has what it needs of it in world units.
+/// The automatic choices for a problem, in world units, as the steps need them.
 struct Choices {
     double h = 0;  ///< voxel size
     StartMethod start = StartMethod::Tagged;
-    EvolveOptions evolve;  ///< of the flow, if the start does not know better; terms that cannot act have the weight 0
+    EvolveOptions evolve;  ///< of the flow, unless the start sets its own; terms that cannot act have weight 0
     EdgeOptions edge;
-    std::optional<CloudOrientation> cloud;  ///< of a cloud
-    std::vector<Vec3> measured_marks;       ///< that the fit is measured at
+    std::optional<CloudOrientation> cloud;  ///< only for a cloud
+    std::vector<Vec3> measured_marks;       ///< marks at which the fit is measured
     StepReport report;
 };
 
-/// Marks as they were, and marks as they are used: without duplicates, and without the noise of scans.
+/// The choices, and the marks as used: without duplicates and without the noise of scans.
 struct Resolved {
     Choices choices;
     MarkSets marks;

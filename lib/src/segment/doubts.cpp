@@ -14,9 +14,9 @@
 namespace covol::pipeline {
 namespace {
 
-/// Places all over the outermost voxels of the image, world units.
+/// Positions distributed over the outermost voxels of the image, world units.
 std::vector<Vec3> places_on_border(const ImageGeometry& geometry) {
-    constexpr int kPlaces = 24;  // along an edge
+    constexpr int kPlaces = 24;  // along each edge
     std::vector<Vec3> places;
     for (int axis = 0; axis < 3; ++axis)
         for (const bool upper : {false, true})

@@ -1,4 +1,4 @@
-// What SegmentOptions says about itself.
+// Queries on SegmentOptions.
 #include "covol/pipeline.h"
 
 namespace covol {

@@ -1,4 +1,4 @@
-// segment(): the steps in their order. Each is a function of values, in a module beside this file or in start/.
+// segment(): the sequence of steps. Each is a function of values, in a module of this folder or its subfolders.
 #include "covol/pipeline.h"
 
 #include <openvdb/openvdb.h>
@@ -20,7 +20,7 @@ SegmentResult run_steps(const Problem& problem, Reached* reached) {
     const Choices& choices = resolved.choices;
     StepReport before = choices.report;
     if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
-    StartSurface start = make_start(problem, choices, std::move(resolved.marks));  // distance and band
+    StartSurface start = make_start(problem, choices, std::move(resolved.marks));  // includes distance and band
     const EdgeChoice edge = choose_edge_feature(problem, choices);
     before.add(edge.report);
     if (reached != nullptr) *reached = {start.u->deepCopy(), start.u, start.distance, nullptr};

@@ -1,5 +1,5 @@
 #pragma once
-// What segment() is asked.
+// The input of segment().
 #include <vector>
 
 #include "covol/clip.h"
@@ -9,14 +9,14 @@ namespace covol::pipeline {
 
 /// Marks by what they are used for; world units.
 struct MarkSets {
-    std::vector<Vec3> attracting;  ///< all that pull the surface, those between the slices of contours, too
-    std::vector<Vec3> trusted;     ///< those of them that are no guess between slices
+    std::vector<Vec3> attracting;  ///< all that attract, including those interpolated between slices of contours
+    std::vector<Vec3> trusted;     ///< those of them that are not interpolated
 };
 
-/// The input of one structure, as it is given. What it refers to has to outlive it.
+/// The input of one structure, as given. The objects that it refers to must outlive it.
 struct Problem {
-    /// @param image  null: there is none
-    /// @throws Error InvalidOptions, InvalidInput: what no step can work with.
+    /// @param image  null if there is none
+    /// @throws Error InvalidOptions, InvalidInput: input that no step can process.
     Problem(const Image* image, const std::vector<Vec3>& points, const SegmentOptions& options, const RunContext& run);
 
     const Image* image;
@@ -24,28 +24,29 @@ struct Problem {
     const RunContext& run;
     std::vector<Vec3> given;  ///< the caller's points, and the marks of contours
 
-    /// The caller's points, and those that contours are densified by.
+    /// The caller's points, and those that are interpolated between contours.
     [[nodiscard]] MarkSets marks() const;
     [[nodiscard]] bool is_guided() const { return options.model == Model::Guided; }
-    /// Whether places are named that are inside, or outside.
+    /// Whether positions inside or outside are given.
     [[nodiscard]] bool has_seeds() const {
         return !options.exterior_seeds.empty() || !options.inside.empty() || !options.outside.empty();
     }
-    /// Between closed contours, or null.
+    /// The body between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {
         return options.contours ? options.contours->solid.get() : nullptr;
     }
-    /// The region of interest, else the image's box, else that of the points with `margin` around it, or with that of
-    /// the options, in voxels of one lattice: where voxels lie depends on h and on the image or the stated origin
-    /// alone, so that runs on parts of an image or a cloud give grids with one transform.
+    /// The region of interest, or else the image's box, or else the box of the points with `margin` (or the margin of
+    /// the options) around it, as voxels of one lattice. The positions of voxels depend only on h and on the image or
+    /// the given origin, so that runs on parts of an image or a cloud give grids with the same transform.
     [[nodiscard]] Domain domain(double h, const std::vector<Vec3>& points, double margin) const;
-    /// The same with this margin, whatever the options say.
+    /// The same with this margin, regardless of the options.
     [[nodiscard]] Domain domain_with_margin(double h, const std::vector<Vec3>& points, double margin) const;
-    /// `fine`, on the lattice of larger voxels; it, too, is the same for all parts.
+    /// `fine` on the lattice of larger voxels, which is also the same for all parts.
     [[nodiscard]] Domain coarsened(const Domain& fine, double h) const;
-    /// Where a solid ends whatever the marks say: the image's box, turned as the image is, and the region of interest.
+    /// The limits of a solid regardless of the marks: the image's box, rotated like the image, and the region of
+    /// interest.
     [[nodiscard]] Clip clip() const;
-    /// Whether the image's axes are none of the world's: its domain holds places outside of it.
+    /// Whether the image's axes differ from those of the world, so that its domain contains positions outside of it.
     [[nodiscard]] bool is_turned() const;
 
 private:

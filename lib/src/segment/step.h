@@ -1,5 +1,5 @@
 #pragma once
-// What every step of segment() tells beside its result.
+// What every step of segment() returns beside its result.
 #include <chrono>
 #include <map>
 #include <string>
@@ -13,14 +13,14 @@ namespace covol::pipeline {
 
 using detail::number;
 
-/// The automatic choices of a step, and its warnings. They are for people: no step reads them.
+/// The automatic choices and warnings of a step. They are for users only: no step reads them.
 class Remarks {
 public:
     /// Records an automatic choice, and logs it.
     void choose(const std::string& what, const std::string& value, const std::string& reason, const RunContext& run);
     /// Records a warning, and logs it.
     void warn(const std::string& line, const RunContext& run);
-    /// Those of a step that came later; of two values for one choice the later stays.
+    /// Adds those of a later step; of two values for one choice the later one is kept.
     void add(const Remarks& later);
     void move_to(SegmentReport& report) &&;
 
@@ -29,7 +29,7 @@ private:
     std::vector<std::string> warnings_;
 };
 
-/// What every step returns beside its result.
+/// Returned by every step beside its result.
 struct StepReport {
     Remarks remarks;
     SegmentReport::Seconds seconds;
@@ -37,7 +37,7 @@ struct StepReport {
     void add(const StepReport& later);
 };
 
-/// Adds the wall-clock time of its life to `seconds`.
+/// Adds the wall-clock time of its lifetime to `seconds`.
 class Timed {
 public:
     explicit Timed(double& seconds) : seconds_(seconds), begin_(std::chrono::steady_clock::now()) {}

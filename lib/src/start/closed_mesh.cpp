@@ -13,7 +13,7 @@ namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// For each vertex of a rim, where the edges go that would close it. At each vertex as many begin as end.
+/// The directed edges that would close each rim, by their first vertex. At each vertex as many begin as end.
 std::map<std::uint32_t, std::vector<std::uint32_t>> missing_edges(const TriangleMesh& mesh) {
     std::vector<std::pair<Edge, int>> edges;
     edges.reserve(3 * mesh.triangles.size());
@@ -44,7 +44,7 @@ double area_of(const TriangleMesh& mesh, std::size_t first) {
     return area;
 }
 
-/// A fan from the rim's centre.
+/// Adds a fan of triangles from the rim's centre.
 void add_cap(const std::vector<std::uint32_t>& rim, TriangleMesh& mesh) {
     Vec3 centre{};
     for (const std::uint32_t v : rim)
@@ -62,7 +62,7 @@ ClosedMesh close_holes(const TriangleMesh& mesh) {
     const std::size_t given = mesh.triangles.size();
     for (auto& [start, next] : missing)
         while (!next.empty()) {
-            // Back at a vertex that was passed, a rim is closed.
+            // A rim is closed once the path returns to one of its vertices.
             std::vector<std::uint32_t> path{start};
             std::map<std::uint32_t, std::size_t> place{{start, 0}};
             do {

@@ -3,11 +3,11 @@
 
 namespace covol::detail {
 
-/// What it took to close a mesh.
+/// The result of closing a mesh.
 struct ClosedMesh {
-    TriangleMesh mesh;        ///< each edge is passed as often one way as the other: it has an inside
-    int holes = 0;            ///< that were closed; 0: it was closed
-    double cap_fraction = 0;  ///< area of what closes them / area of the mesh
+    TriangleMesh mesh;        ///< each edge occurs equally often in both directions, so that there is an inside
+    int holes = 0;            ///< number that was closed; 0 if the mesh was closed
+    double cap_fraction = 0;  ///< area of the caps / area of the mesh
 };
 
 /// Closes each hole by triangles between its rim and the rim's centre.

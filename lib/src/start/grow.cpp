@@ -21,7 +21,7 @@ using openvdb::Coord;
 constexpr std::size_t kMaxVoxels = 24u << 20;
 
 struct Spread {
-    double middle = 0, width = 0;  // median, and the standard deviation that the median deviation tells of
+    double middle = 0, width = 0;  // median, and the standard deviation estimated from the median absolute deviation
 };
 
 Spread spread_of(std::vector<float> values) {
@@ -49,7 +49,7 @@ public:
     [[nodiscard]] std::size_t stride(int axis) const {
         return axis == 2 ? 1 : axis == 1 ? std::size_t(size_[2]) : std::size_t(size_[2]) * std::size_t(size_[1]);
     }
-    /// visit(neighbour, axis) through the six faces.
+    /// visit(neighbour, axis) for the neighbours across the six faces.
     template <typename Visit>
     void for_each_neighbour(std::size_t n, const Visit& visit) const {
         const Coord c = at(n) - min_;
@@ -88,15 +88,15 @@ void Box::blur(std::vector<float>& values, double sigma) const {
     }
 }
 
-/// The front over one box around the start.
+/// The front in a box around the start.
 class Front {
 public:
-    /// @param sigma  that the image was smoothed with, voxels
+    /// @param sigma  of the Gaussian with which the image was smoothed, voxels
     Front(const Box& box, const std::vector<float>& image, const std::vector<float>& level, double voxel, double sigma)
-        : box_(box), image_(image), level_(level), voxel_(voxel), alike_(1 + 4 * M_PI * sigma * sigma) {}
+        : box_(box), image_(image), level_(level), voxel_(voxel), correlated_faces_(1 + 4 * M_PI * sigma * sigma) {}
 
-    /// Empty where the start can be grown from, else why not.
-    std::string look() {
+    /// Empty if the start can be grown, else the reason against it.
+    std::string check_start() {
         std::vector<float> inside, shell, all;
         const std::size_t skip = 1 + image_.size() / 200'000;
         for (std::size_t n = 0; n < image_.size(); n += skip) all.push_back(image_[n]);
@@ -157,14 +157,14 @@ public:
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }
 
-    /// 1 in the best front, with what it has left out in small cavities filled.
+    /// 1 in the region of the best front, with small cavities filled.
     [[nodiscard]] std::vector<float> region() const {
         std::vector<float> in(image_.size(), 0.0F);
         for (std::size_t n = 0; n < best_count_; ++n) in[order_[n]] = 1;
         fill_cavities(in);
         return in;
     }
-    /// The best front comes to the box's end where that is not the domain's.
+    /// Whether the best front reaches the box's end where that is not the domain's.
     [[nodiscard]] bool needs_more(const Domain& domain) const {
         for (std::size_t n = 0; n < best_count_; ++n) {
             const Coord at = box_.at(order_[n]);
@@ -177,11 +177,12 @@ public:
     }
 
 private:
-    /// The mean change across the front, less what noise makes of a mean over so many faces.
+    /// The mean change across the front, minus the error of a mean over that many faces that noise causes.
     [[nodiscard]] double edge() const {
         if (faces_ <= 0) return 0;
         const auto count = double(faces_);
-        return std::max(std::abs(change_) / count - kGrow.errors * inside_.width / std::sqrt(count / alike_), 0.0);
+        return std::max(std::abs(change_) / count - kGrow.errors * inside_.width / std::sqrt(count / correlated_faces_),
+                        0.0);
     }
 
     void take(std::size_t n) {
@@ -189,7 +190,7 @@ private:
         order_.push_back(std::uint32_t(n));
         box_.for_each_neighbour(n, [&](std::size_t other, int) {
             const double step = double(image_[n]) - double(image_[other]);
-            // Seen from within: a face between two voxels of the region is none.
+            // The changes at a face between two voxels of the region cancel, and the face is not counted.
             change_ += step;
             faces_ += taken_[other] ? -1 : 1;
         });
@@ -259,19 +260,19 @@ private:
 
     const Box& box_;
     const std::vector<float>&image_, &level_;
-    double voxel_, alike_;  // alike_: faces of a front that share one error
+    double voxel_, correlated_faces_;  // alike_: number of faces of a front that have a common error
     Spread inside_;
     std::vector<float> arrival_;
     std::vector<char> taken_;
     std::vector<std::uint32_t> order_;
     std::priority_queue<Waiting> waiting_;
-    double change_ = 0, start_edge_ = 0, best_edge_ = 0;  // change: over the front's faces, from within to beyond
+    double change_ = 0, start_edge_ = 0, best_edge_ = 0;  // change: sum over the front's faces, from inside to outside
     std::int64_t faces_ = 0;
     std::size_t start_count_ = 0, best_count_ = 0;
 };
 
 FloatGridPtr level_set_of(const Box& box, std::vector<float> region, const Domain& domain, const RunContext& run) {
-    box.blur(region, 0.7);  // a voxel's corners are no surface
+    box.blur(region, 0.7);  // smooths the steps of the voxels
     FloatGridPtr grid = make_grid(domain, 0.5F, "region");
     auto accessor = grid->getAccessor();
     for (std::size_t n = 0; n < region.size(); ++n)
@@ -301,7 +302,7 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
         for (std::size_t n = 0; n < level.size(); ++n) level[n] = accessor.getValue(box.at(n));
         run.check();
         Front front(box, values, level, domain.voxel_size, sigma / domain.voxel_size);
-        if (std::string why = front.look(); !why.empty()) return {nullptr, why};
+        if (std::string why = front.check_start(); !why.empty()) return {nullptr, why};
         front.march(run);
         if (front.needs_more(domain)) continue;
         if (!front.is_clear()) return {nullptr, "no position of the front has a clear edge"};

@@ -1,44 +1,44 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder: docs/heuristics.md shows the effect of halving and doubling each.
 #include <cstddef>
 
 #include "base/heuristic.h"
 
 namespace covol {
 
-/// Growing to the image's edges: grow.cpp. Malladi, Sethian and Vemuri, Shape modeling with front propagation, IEEE
-/// Trans. Pattern Anal. Mach. Intell. 17(2), 1995, has the front; where it stops is ours.
+/// Growing to the image's edges: grow.cpp. The front is that of Malladi, Sethian and Vemuri, Shape modeling with front
+/// propagation, IEEE Trans. Pattern Anal. Mach. Intell. 17(2), 1995; the stopping criterion is not from there.
 struct GrowHeuristics {
-    /// [voxels] Around the start that are looked at first.
+    /// [voxels] Minimum margin around the start that is searched first.
     double min_pad = heuristic("grow.min_pad", 12);
-    /// [of the image's range] Differences below it say nothing.
+    /// [of the image's range] Differences below it are ignored.
     double min_spread = heuristic("grow.min_spread", 0.01);
-    /// [spreads of the start's surface] A voxel inside that differs more is not like it.
+    /// [spreads of the start's surface] A voxel inside that differs more is not similar to it.
     double unlike = heuristic("grow.unlike", 4);
-    /// [share of the inside] More of them, and the start holds something already.
+    /// [fraction of the inside] With more such voxels the start contains an object already.
     double unlike_fraction = heuristic("grow.unlike_fraction", 0.03);
-    /// [spreads] A difference at which the front's speed is a half.
+    /// [spreads] Difference at which the front's speed is halved.
     double speed_spreads = heuristic("grow.speed_spreads", 2);
-    /// [of the speed where nothing differs] The front's, at least.
+    /// [of the speed without differences] Minimum speed of the front.
     double min_speed = heuristic("grow.min_speed", 1e-4);
-    /// [of the best front's edge] A start with as much lies at an edge.
+    /// [of the best front's edge] A start whose edge is at least as strong lies at an edge already.
     double at_hand = heuristic("grow.at_hand", 0.5);
-    /// [spreads] A mean change across the front that noise does not make.
+    /// [spreads] Minimum mean change across the front that is not caused by noise.
     double clear = heuristic("grow.clear", 0.3);
-    /// [standard errors] Of a front's mean change, the same.
+    /// [standard errors] Subtracted from a front's mean change, for noise.
     double errors = heuristic("grow.errors", 4);
-    /// [of the best front's edge] Less, and the front has left the edge.
+    /// [of the best front's edge] Once the front's edge is weaker, the front has left the best edge.
     double passed = heuristic("grow.passed", 0.5);
-    /// [ratio] Of its volume, by which it has, too.
+    /// [ratio] Of the front's volume to that of the best front, required in addition.
     double passed_growth = heuristic("grow.passed_growth", 2);
-    /// [volumes of the region] What the front has gone around and left out.
+    /// [volumes of the region] Maximum of a cavity that the front has left out and that is filled.
     double small_cavity = heuristic("grow.small_cavity", 0.01);
 };
 COVOL_HEURISTICS GrowHeuristics kGrow{};
 
 /// A start from seeds: start_from_seeds.cpp.
 struct SeedsHeuristics {
-    /// [seeds] Whose links are searched one by one: time.
+    /// [seeds] Maximum whose connections are searched exactly, to limit the time.
     std::size_t max_joined = heuristic("seeds.max_joined", 2000);
 };
 COVOL_HEURISTICS SeedsHeuristics kSeeds{};

@@ -1,5 +1,5 @@
 #pragma once
-// A level set on another lattice, read on a domain's.
+// Reads a level set of another lattice on the lattice of a domain.
 #include <openvdb/openvdb.h>
 
 #include <array>
@@ -21,9 +21,9 @@ public:
     openvdb::Vec3d operator()(int i, int j, int k) const {
         return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
     }
-    /// From a voxel to the source's where the lattices coincide.
+    /// The shift from a voxel to that of the source, if the lattices coincide.
     [[nodiscard]] std::optional<openvdb::Coord> shift() const;
-    /// The source's voxels that interpolation at the voxels lo..hi asks for.
+    /// The source's voxels that interpolation at the voxels lo..hi reads.
     [[nodiscard]] openvdb::CoordBBox box(const openvdb::Coord& lo, const openvdb::Coord& hi) const;
 
 private:
@@ -31,11 +31,11 @@ private:
     std::array<openvdb::Vec3d, 3> along_;
 };
 
-/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would
-/// take longer than what they may save.
+/// False if all values in the box have the same sign. For boxes larger than a leaf with its next layer the test would
+/// take longer than it may save; it returns true.
 [[nodiscard]] bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box);
 
-/// The grid's values where the lattices coincide, else trilinear ones. Both arguments are kept by reference.
+/// The grid's values if the lattices coincide, otherwise trilinear ones. Both arguments are kept by reference.
 [[nodiscard]] Sampler sampler_of(const FloatGrid& grid, const ToSource& to_source);
 
 }  // namespace covol::detail

@@ -18,7 +18,7 @@ CoordBBox first_layer(int axis) {
     return layer;
 }
 
-/// visit(voxel's offset in its leaf) of a box in it, as a sampler goes.
+/// visit(offset of a voxel in its leaf) for a box in the leaf, in a sampler's order.
 template <typename Visit>
 void for_each_in(const CoordBBox& box, const Visit& visit) {
     for (int i = box.min().x(); i <= box.max().x(); ++i)
@@ -34,7 +34,7 @@ public:
     WithNext(const SampledLeaves& sampled, const Coord& origin) {
         for (int n = 0; n < 8; ++n) leaves_[n] = sampled.leaves_.at(at(origin, n)).values->data();
     }
-    /// The leaf, and the seven that the next layer is in.
+    /// The origins of the leaf and of the seven leaves that contain the next layer.
     static Coord at(const Coord& origin, int n) {
         return origin.offsetBy((n >> 2) * kLeafDim, (n >> 1 & 1) * kLeafDim, (n & 1) * kLeafDim);
     }
@@ -50,7 +50,7 @@ public:
                     if (is_negative(i, j, k) != first) return true;
         return false;
     }
-    /// The faces, as in kFaceSlots, that the surface passes.
+    /// The faces, as in kFaceSlots, that the surface crosses.
     [[nodiscard]] std::array<bool, kFaces> mixed_faces() const {
         std::array<bool, kFaces> mixed{};
         for (int face = 0; face < kFaces; ++face) {
@@ -89,9 +89,9 @@ void SampledLeaves::sample(const Coord& origin, Entry& entry) const {
     entry.known |= entry.requested;
 }
 
-void SampledLeaves::request(const std::vector<Wish>& wishes) {
+void SampledLeaves::request(const std::vector<Request>& requests) {
     std::vector<std::pair<const Coord, Entry>*> due;
-    for (const Wish& wish : wishes) {
+    for (const Request& wish : requests) {
         const auto entry = leaves_.try_emplace(wish.origin).first;
         const bool is_due = entry->second.requested != entry->second.known;
         entry->second.requested |= wish.parts;
@@ -106,10 +106,10 @@ void SampledLeaves::request(const std::vector<Wish>& wishes) {
 }
 
 void SampledLeaves::request_with_next(const std::vector<Coord>& leaves) {
-    std::vector<Wish> wishes;
+    std::vector<Request> requests;
     for (const Coord& o : leaves)
-        for (int n = 0; n < 8; ++n) wishes.push_back({WithNext::at(o, n), n == 0 ? kWholeLeaf : kFirstLayers});
-    request(wishes);
+        for (int n = 0; n < 8; ++n) requests.push_back({WithNext::at(o, n), n == 0 ? kWholeLeaf : kFirstLayers});
+    request(requests);
 }
 
 std::vector<Coord> SampledLeaves::crossed_by(const std::vector<Coord>& leaves) {
@@ -126,7 +126,7 @@ std::vector<Coord> SampledLeaves::crossed_by(const std::vector<Coord>& leaves) {
 std::vector<Coord> SampledLeaves::crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
                                                const RunContext& run) {
     const CoordBBox box = box_of(domain);
-    std::map<Coord, bool> crosses;  // of the leaves that were visited
+    std::map<Coord, bool> crosses;  // the leaves visited so far
     std::vector<Coord> front;
     const auto visit = [&](const Coord& o) {
         if (any_on(mask_in_box(o, box)) && crosses.try_emplace(o, false).second) front.push_back(o);
@@ -170,14 +170,14 @@ bool SampledLeaves::Entry::has_one_sign() const {
     return is_any_negative != is_any_positive;
 }
 
-// What a distance reads lies in crossed leaves and in the first layers behind them: were a voxel next to the surface,
-// or one that its slope is taken from, in another leaf, that leaf would be crossed.
+// All values that a distance reads lie in crossed leaves and in the first layers behind them: if a voxel next to the
+// surface, or one that its slope is computed from, lay in another leaf, that leaf would be crossed.
 Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
-    std::vector<Wish> wishes;
+    std::vector<Request> requests;
     for (const Coord& o : beside)
-        if (leaves_.find(o) == leaves_.end()) wishes.push_back({o, kOneLayer});
-    request(wishes);
-    std::vector<Wish> others;  // that another part of the surface passes
+        if (leaves_.find(o) == leaves_.end()) requests.push_back({o, kOneLayer});
+    request(requests);
+    std::vector<Request> others;  // those that another part of the surface crosses
     for (const Coord& o : beside)
         if (const Entry& entry = leaves_.at(o); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
             others.push_back({o, kWholeLeaf});
@@ -189,7 +189,7 @@ Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
             std::copy(known.begin(), known.end(), values);
             return;
         }
-        // The first voxel lies in each first layer.
+        // The first voxel is part of each first layer, and therefore known.
         std::fill_n(values, kLeafSize, known[0] < 0 ? -1.0F : 1.0F);
         for (int axis = 0; axis < 3; ++axis)
             if ((entry.known & 1U << axis) != 0)

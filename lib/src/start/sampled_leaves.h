@@ -15,21 +15,22 @@ namespace covol::detail {
 using LeafParts = unsigned;
 inline constexpr LeafParts kOneLayer = 0b0001, kFirstLayers = 0b0111, kWholeLeaf = 0b1000;
 
-/// A field's values on leaves, for which it is asked once, and in no more parts of a leaf than are needed: of most
-/// leaves beside a surface that is a layer.
+/// A field's values on leaves. Each value is sampled once, and only the required parts of a leaf: for most leaves
+/// beside a surface a single layer.
 class SampledLeaves {
 public:
     /// @param sample  kept by reference
     explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
 
-    /// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
+    /// Those of the leaves with an edge between voxels, including edges to the next leaf, that the zero level set
+    /// crosses.
     [[nodiscard]] std::vector<Coord> crossed_by(const std::vector<Coord>& leaves);
-    /// As crossed_by(), found from leaf to leaf, from those with a seed on, or where the surface does not pass the
-    /// seed's leaf, from the 26 around it. Sorted.
+    /// The same, searched from leaf to leaf: from the leaves that contain a seed, or, if the surface does not cross
+    /// that leaf, from the 26 around it. Sorted.
     [[nodiscard]] std::vector<Coord> crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
                                                   const RunContext& run);
-    /// A leaf at a time: each value that a distance to the surface reads, and the sign everywhere.
-    /// @param beside  the leaves that were found to be crossed, and those around them
+    /// Samples one leaf at a time: all values that a distance to the surface reads, and the correct sign elsewhere.
+    /// @param beside  the crossed leaves, and those around them
     [[nodiscard]] Sampler sampler(const std::vector<Coord>& beside);
 
 private:
@@ -39,12 +40,12 @@ private:
         std::unique_ptr<Values> values;
         [[nodiscard]] bool has_one_sign() const;
     };
-    struct Wish {
+    struct Request {
         Coord origin;
         LeafParts parts;
     };
     class WithNext;
-    void request(const std::vector<Wish>& wishes);
+    void request(const std::vector<Request>& requests);
     void sample(const Coord& origin, Entry& entry) const;
     void request_with_next(const std::vector<Coord>& leaves);
 

@@ -34,7 +34,7 @@ using detail::Sampler;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
 
-/// Origins of the leaves that meet both the domain and the world box.
+/// Origins of the leaves that intersect both the domain and the world box.
 std::vector<Coord> leaves_in(const Domain& domain, const WorldBox& box) {
     const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
     Coord lo, hi;
@@ -49,7 +49,7 @@ std::vector<Coord> leaves_in(const Domain& domain, const WorldBox& box) {
     return origins;
 }
 
-/// Those of the leaves for which `keep` holds, in their order.
+/// The leaves for which `keep` is true, in the same order.
 std::vector<Coord> filter(const std::vector<Coord>& leaves, const std::function<bool(const Coord&)>& keep) {
     std::vector<char> kept(leaves.size());
     tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { kept[n] = keep(leaves[n]); });
@@ -80,7 +80,7 @@ FloatGridPtr start_from_distance(const Domain& domain, const WorldBox& box, cons
     return detail::make_start(band, u, domain, where);
 }
 
-/// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
+/// The leaves with an edge between voxels, including edges to the next leaf, that the zero level set crosses.
 std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& sample) {
     return filter(leaves, [&](const Coord& o) {
         std::array<float, 9 * 9 * 9> values;
@@ -90,7 +90,7 @@ std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& s
 }
 
 /// A start from a field whose zero level set is the surface.
-/// @param beside  the leaves that it passes and those around them
+/// @param beside  the leaves that it crosses, and those around them
 FloatGridPtr start_on(const Domain& domain, const std::vector<Coord>& beside, const Sampler& sample, const char* where,
                       const RunContext& run) {
     run.check();
@@ -108,7 +108,7 @@ FloatGridPtr start_on(const Domain& domain, const std::vector<Coord>& beside, co
     return detail::make_start(band, u, domain, where);
 }
 
-/// @param crossed  the leaves that the surface passes, sorted
+/// @param crossed  the leaves that the surface crosses, sorted
 FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, const Sampler& sample,
                               const char* where, const RunContext& run) {
     return start_on(domain, detail::dilate_leaves(crossed, 1, domain), sample, where, run);
@@ -121,7 +121,7 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
 
 using detail::to_text;
 
-/// 1 where the mask is above 0: labels must not be interpolated.
+/// 1 if the mask is above 0, because labels must not be interpolated.
 Image binarised(const Image& mask) {
     const Index3 n = mask.geometry().size;
     const std::size_t count = std::size_t{1} * n[0] * n[1] * n[2];
@@ -193,7 +193,7 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j)
                     for (int k = lo.z(); k <= hi.z(); ++k, ++n)
-                        // The image repeats its border beyond its end; the mask ends there.
+                        // The image repeats its border values beyond its end, but the mask ends there.
                         values[n] = values[n] > 0 &&
                                             contains(geometry, domain.index_to_world({double(i), double(j), double(k)}))
                                         ? 0.5F - values[n]
@@ -205,7 +205,7 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
 }
 
 FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run) {
-    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, from the middle of a leaf and its next layer to a corner
+    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, half of the diagonal of a leaf with its next layer
     FloatGridPtr result;
     with_threads(run, [&] {
         const std::vector<Coord> near = filter(leaves_in(domain, solid.box()), [&](const Coord& o) {
@@ -231,7 +231,8 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
     with_threads(run, [&] {
         const double h = domain.voxel_size;
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
-            // A row takes as long as eight values: along the last axis, but of a layer across that along the other.
+            // A row takes as long as eight values: rows follow the last axis, or the middle one in a layer across the
+            // last.
             const bool is_layer = lo.z() == hi.z();
             const int count = is_layer ? hi.y() - lo.y() + 1 : hi.z() - lo.z() + 1;
             const Vec3 step = is_layer ? Vec3{0, h, 0} : Vec3{0, 0, h};
@@ -251,7 +252,7 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
 FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {
-        // Leaves of the domain that meet a leaf of the level set.
+        // Leaves of the domain that intersect a leaf of the level set.
         std::vector<Coord> candidates;
         for (auto leaf = level_set.tree().cbeginLeaf(); leaf; ++leaf) {
             const openvdb::CoordBBox voxels(leaf->origin().offsetBy(-1), leaf->origin().offsetBy(kLeafDim));
@@ -278,7 +279,7 @@ FloatGridPtr detail::carried_beyond(const FloatGrid& start, const Domain& domain
                                     const RunContext& run) {
     constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, as above
     const double h = domain.voxel_size;
-    // A start that ends where the image does is itself again a voxel and a half within.
+    // A start that ends at the image's end is valid from a voxel and a half inside of it.
     Clip within = image;
     for (HalfSpace& plane : within) plane.offset -= 1.5 * h;
     FloatGridPtr result;

@@ -17,10 +17,10 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Half of the longest link of the shortest tree that joins the seeds (Prim).
+/// Half of the longest edge of the minimum spanning tree of the seeds (Prim).
 double joining_radius(const std::vector<Vec3>& seeds) {
     if (seeds.size() > kSeeds.max_joined) {
-        double widest = 0;  // dense paint: neighbours are close, patches may stay apart
+        double widest = 0;  // dense paint: neighbours are close, patches may remain separate
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));
         return std::sqrt(widest) / 2;
@@ -63,7 +63,7 @@ FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& ins
     FloatGridPtr field;
     with_threads(run, [&] {
         const detail::KdTree in(inside), out(outside);
-        // A voxel and a half is the least that voxels can hold.
+        // A voxel and a half is the smallest radius that voxels can represent.
         const double reach =
             std::max({usual_half_gap(outside, in, kHalfWidthVoxels * h), joining_radius(inside) + h, 1.5 * h});
         field = make_grid(domain, float(kHalfWidthVoxels * h), "seeds");

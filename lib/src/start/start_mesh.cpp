@@ -1,4 +1,4 @@
-// The start from a mesh, on its own for OpenVDB's MeshToVolume.h, which takes long to compile.
+// The start from a mesh, in a separate file because OpenVDB's MeshToVolume.h takes long to compile.
 #include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
 
@@ -17,9 +17,9 @@
 namespace covol {
 namespace {
 
-/// @return in the domain's index space
+/// @return the distance in the domain's index space
 FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
-    for (int a = 0; a < 3; ++a) domain.origin[a] -= mesh.origin[a];  // vertices are relative to that
+    for (int a = 0; a < 3; ++a) domain.origin[a] -= mesh.origin[a];  // vertices are relative to the mesh's origin
     std::vector<openvdb::Vec3s> points(mesh.vertices.size());
     std::vector<openvdb::Vec3I> triangles(mesh.triangles.size());
     for (std::size_t n = 0; n < points.size(); ++n)
@@ -35,15 +35,15 @@ FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
     }
 }
 
-/// OpenVDB takes for outside what can be reached from there: it fills cavities. Voxels are inside where the mesh winds
-/// around them.
+/// OpenVDB treats as outside only what is connected to the exterior, and so fills cavities. Here voxels are inside if
+/// the mesh's winding number is not 0.
 void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh& mesh, const RunContext& run) {
     const openvdb::CoordBBox box = distance.evalActiveVoxelBoundingBox();
     ImageGeometry lattice;
     lattice.spacing.fill(domain.voxel_size);
     lattice.origin = domain.origin;
     for (int a = 0; a < 3; ++a) {
-        // Whole leaves.
+        // Extend to whole leaves.
         const int first = box.min()[a] & ~7, last = box.max()[a] | 7;
         lattice.size[a] = last - first + 1;
         lattice.origin[a] += first * domain.voxel_size;
@@ -75,7 +75,7 @@ void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh
     }
 }
 
-/// The mesh with its holes closed, which a warning tells. @throws Error InvalidInput where it is hardly closed at all.
+/// The mesh with its holes closed, with a warning. @throws Error InvalidInput if the caps exceed half of its area.
 TriangleMesh closed_or_refused(const TriangleMesh& mesh, const RunContext& run) {
     constexpr double kMaxCaps = 0.5;
     detail::ClosedMesh closed = detail::close_holes(mesh);

@@ -22,13 +22,13 @@
 namespace covol {
 namespace {
 
-constexpr double kRightTo = 0.25;        // voxels of the image
-constexpr double kWeakLine = 0.93;       // 1 - g where the image is 1.2 times as bright as the band's median
-constexpr double kLargeOverlap = 0.02;   // of the smaller structure
-constexpr double kMinCorrelation = 0.5;  // of brightness along a surface, from frame to frame
-constexpr int kBesideBand = 5;           // voxels beside the surface's band that tell how steep slopes are here
+constexpr double kAccuracyVoxels = 0.25;  // voxels of the image
+constexpr double kWeakLine = 0.93;        // 1 - g if the image is 1.2 times as bright as the band's median
+constexpr double kLargeOverlap = 0.02;    // of the smaller structure
+constexpr double kMinCorrelation = 0.5;   // of intensity along a surface, from frame to frame
+constexpr int kBesideBand = 5;  // voxels beside the surface's band, from which the usual slopes are determined
 
-/// Where edges are looked up for a surface that was found without them.
+/// The region in which edges are computed for a surface that was found without them.
 FloatGridPtr around(const FloatGrid& surface) {
     FloatGridPtr topology = surface.deepCopy();
     openvdb::tools::dilateActiveValues(topology->tree(), kBesideBand, openvdb::tools::NN_FACE,
@@ -38,16 +38,17 @@ FloatGridPtr around(const FloatGrid& surface) {
     return topology;
 }
 
-/// How far from a mark the surface that bends least is right to a fourth of a voxel of the image: at a distance d it is
-/// off by kGuide.fraction_of_sagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area.
+/// The distance from a mark up to which the surface of minimum bending energy is accurate to a fourth of a voxel of the
+/// image: at a distance d its error is kGuide.fraction_of_sagitta d^2 / (2 R), R the radius of a ball with the body's
+/// ratio of volume to area.
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
     const double voxel = image.geometry().smallest_spacing();
-    return std::max(std::sqrt(2 * radius * kRightTo * voxel / kGuide.fraction_of_sagitta), voxel);
+    return std::max(std::sqrt(2 * radius * kAccuracyVoxels * voxel / kGuide.fraction_of_sagitta), voxel);
 }
 
-/// What belongs to the surface: as segment() measures it.
+/// Updates all measurements of the surface, as in segment().
 void measure_again(StructureResult& structure, const std::optional<Image>& image, const RunContext& run) {
     SegmentReport& report = structure.result.report;
     const SegmentOptions& options = report.resolved;
@@ -71,7 +72,7 @@ void measure_again(StructureResult& structure, const std::optional<Image>& image
                                          : detail::distances_to(mesh, structure.marks);
     });
     report.fit = detail::statistics_of(distances);
-    // Marks that two structures claim are off one of them, as they have to be: that is no warning.
+    // Marks that two structures claim must lie off one of them, which needs no warning.
     for (const std::string& line :
          pipeline::compare_with_marks(report, surface, image ? &*image : nullptr, structure.marks, distances))
         run.info("beside the other structures " + line);
@@ -92,7 +93,7 @@ void separate_all(StructuresResult& all, const std::optional<Image>& image, cons
     }
     all.overlaps = std::move(separated.report.overlaps);
     for (const StructureOverlap& overlap : all.overlaps) {
-        if (overlap.inner) continue;  // one within the other: that is no mistake
+        if (overlap.inner) continue;  // one inside the other, which is no mistake
         const StructureResult &a = all.structures[overlap.a], &b = all.structures[overlap.b];
         const double smaller = std::min(a.result.report.surface.volume, b.result.report.surface.volume);
         if (overlap.volume < kLargeOverlap * smaller) continue;
@@ -205,10 +206,10 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     const double range = used.evolve.attraction_range.value_or(0);
     options.reach = range > 0 ? range : reach_of_marks(result, image);
     options.suggestions = suggestions;
-    // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
+    // Intensity is rarely 0, unlike slopes, so that g falls below 1/2 even without a line.
     if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
     FloatGridPtr g = result.edge;
-    if (!g) {  // edges that moved nothing were not looked for
+    if (!g) {  // edges that did not act were not computed
         EdgeOptions edge = used.edge;
         if (!edge.sigma) edge.sigma = image.geometry().smallest_spacing();
         g = detect_edges(image, *around(*result.surface), edge, run).grid;

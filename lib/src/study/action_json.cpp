@@ -19,7 +19,7 @@ constexpr int kMaxWhole = 1 << 30;
 
 using detail::refuse;
 
-/// Fields of one object; says which one is wrong.
+/// The fields of one object, with messages that name the wrong one.
 class Fields {
 public:
     explicit Fields(const json& object) : object_(object) {
@@ -47,7 +47,7 @@ public:
         if (!value.is_boolean()) refuse(std::string("'") + name + "': expected true or false");
         return value.get<bool>();
     }
-    /// From 0 to `most`.
+    /// From 0 to `maximum`.
     [[nodiscard]] int whole(const char* name, int maximum) const {
         const json& value = at(name);
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t(maximum))
@@ -74,7 +74,7 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kMaxId = std::uint64_t(1) << 53;  // what a browser counts exactly
+    static constexpr std::uint64_t kMaxId = std::uint64_t(1) << 53;  // integers that a browser represents exactly
 
     static double number_of(const json& value, const char* name) {
         if (!value.is_number() || !std::isfinite(value.get<double>()))
@@ -114,7 +114,7 @@ void write_outline(const StudyOutline& outline, json& j) {
     j["world"] = outline.world;
 }
 
-/// An action's word, how it is read, and how it is written; one for each alternative of StudyAction, in its order.
+/// An action's name, and how it is read and written; one for each alternative of StudyAction, in its order.
 template <typename Action>
 struct Form;
 
@@ -383,7 +383,7 @@ void require_key(const std::string& key) {
 namespace detail {
 
 json parse_object(std::string_view text) {
-    // Deep nesting would use up the stack of whoever destroys it.
+    // Deep nesting would overflow the stack when the object is destroyed.
     constexpr int kDeepest = 8;
     bool is_deep = false;
     json object = json::parse(
@@ -414,7 +414,7 @@ KeyedAction parse_study_action(std::string_view text) {
 }
 
 std::string to_json(const KeyedAction& keyed) {
-    require_key(keyed.key);  // what is written has to be read again
+    require_key(keyed.key);  // so that the written text can be read again
     json object;
     if (!keyed.key.empty()) object["key"] = keyed.key;
     std::visit(

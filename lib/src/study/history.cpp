@@ -34,10 +34,10 @@ std::shared_ptr<const StudyStructure> StudyHistory::find(StudyId structure) cons
     return found != state_.end() ? *found : nullptr;
 }
 
-/// Makes the changes of an action; checks all before anything changes.
+/// Computes the changes of an action; checks everything before anything changes.
 struct StudyHistory::Planning {
     const StudyHistory& history;
-    StudyId next;  ///< the number that the next new thing gets
+    StudyId next;  ///< the number of the next new object
 
     [[nodiscard]] std::size_t place_of(StudyId structure) const {
         const StudyState& all = history.state_;
@@ -74,7 +74,7 @@ struct StudyHistory::Planning {
         structure.outlines.push_back(outline);
         structure.outlines.back().id = next++;
     }
-    /// `edit` is given a copy.
+    /// `edit` receives a copy.
     template <typename Edit>
     [[nodiscard]] Change edited(StudyId structure, bool may_be_locked, const Edit& edit) const {
         const std::size_t place = place_of(structure);

@@ -15,19 +15,19 @@ namespace {
 using detail::refuse;
 
 constexpr double kMaxVoxels = double(1 << 28);  // of the box around a structure's paint
-constexpr double kMaxVisits = double(1 << 30);  // of voxels by a stroke: some seconds
-constexpr int kMargin = 10;  // voxels around the paint: outlines are smoothed over 8, and there it has not ended
+constexpr double kMaxVisits = double(1 << 30);  // visits of voxels for one stroke: some seconds
+constexpr int kMargin = 10;  // voxels around the paint: more than the 8 over which outlines are smoothed
 
-/// A piece of a stroke's line.
+/// A segment of a stroke's line.
 struct Piece {
     Vec3 from, to;  // world
 };
 
-/// Lengths along an image's axes, whose angles may differ from right ones.
+/// Lengths along an image's axes, which need not be orthogonal.
 class Lengths {
 public:
     explicit Lengths(const ImageGeometry& image) {
-        constexpr double kRounding = 1e-3;  // of a file's direction
+        constexpr double kRounding = 1e-3;  // tolerance for rounded directions in files
         const Matrix3& d = image.direction;
         Eigen::Matrix3d cosines;
         for (std::size_t a = 0; a < 3; ++a)
@@ -39,7 +39,7 @@ public:
         const Eigen::Matrix3d inverse = cosines.inverse();
         for (std::size_t a = 0; a < 3; ++a) reach[a] = std::sqrt(inverse(Eigen::Index(a), Eigen::Index(a)));
     }
-    /// The scalar product of two vectors that are given along the axes.
+    /// The scalar product of two vectors given along the axes.
     [[nodiscard]] double dot(const Vec3& u, const Vec3& v) const {
         double sum = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
         for (std::size_t n = 0; n < 3; ++n) {
@@ -49,7 +49,7 @@ public:
         return sum;
     }
 
-    Vec3 reach{1, 1, 1};  ///< how far a ball of radius 1 goes along each axis
+    Vec3 reach{1, 1, 1};  ///< extent of a ball of radius 1 along each axis
 
 private:
     Vec3 off_{};  // cosines between the two other axes
@@ -57,7 +57,7 @@ private:
 
 double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
-/// The voxels that a piece may reach, in the image; empty where max < min.
+/// The voxels that a piece may reach, in the image; empty if max < min.
 VoxelBox box_around(const Piece& piece, const StudyStroke& stroke, const ImageGeometry& image) {
     VoxelBox box;
     const Vec3 reach_of_one = Lengths(image).reach;
@@ -89,7 +89,7 @@ VoxelBox nowhere() {
     return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
 }
 
-/// Pieces of at most twice the radius: the box around a long one is mostly empty.
+/// Pieces of at most twice the radius, because the box around a long one is mostly empty.
 template <typename Take>
 void each_piece(const StudyStroke& stroke, const Take& take) {
     if (stroke.world.size() == 1) take(Piece{stroke.world[0], stroke.world[0]});
@@ -116,7 +116,7 @@ VoxelBox box_around(const StudyStructure& structure, const ImageGeometry& image)
     return all;
 }
 
-/// One that stays on a slice is measured along that slice.
+/// Distances of a stroke on one slice are measured within that slice.
 void draw(const StudyStroke& stroke, const ImageGeometry& image, const VoxelBox& box, std::vector<std::uint8_t>& out) {
     const Index3 size = box.size();
     const Lengths lengths(image);
@@ -126,7 +126,7 @@ void draw(const StudyStroke& stroke, const ImageGeometry& image, const VoxelBox&
             reached.min[n] = std::max(reached.min[n], box.min[n]);
             reached.max[n] = std::min(reached.max[n], box.max[n]);
         }
-        // In lengths along the image's axes.
+        // Convert to lengths along the image's axes.
         Vec3 a = image.world_to_index(piece.from), b = image.world_to_index(piece.to), along{};
         for (std::size_t n = 0; n < 3; ++n) {
             if (stroke.axis && std::size_t(*stroke.axis) == n) a[n] = b[n] = stroke.at;
@@ -162,7 +162,7 @@ void require_paintable(const StudyStructure& structure, const ImageGeometry& ima
     double length = 0;
     for (std::size_t n = 1; n < stroke.world.size(); ++n) length += distance(stroke.world[n - 1], stroke.world[n]);
     double visits = 0;
-    // Before its pieces are made: of a very thin brush there would be very many.
+    // Checked before its pieces are made, of which a very thin brush would have too many.
     if (length / stroke.radius > kMaxVisits / 16) refuse("a stroke is too long for so thin a brush");
     each_piece(stroke, [&](const Piece& piece) { visits += 1 + voxels_in(box_around(piece, stroke, image)); });
     if (visits > kMaxVisits) refuse("a stroke covers too many voxels: take a smaller brush, or a shorter stroke");

@@ -3,7 +3,8 @@
 
 namespace covol::detail {
 
-/// @throws Error InvalidInput: the newest stroke is no stroke, or with it the paint would take too much memory or time.
+/// @throws Error InvalidInput if the newest stroke is invalid, or if with it the paint would take too much memory or
+/// time.
 void require_paintable(const StudyStructure& structure, const ImageGeometry& image);
 
 }  // namespace covol::detail

@@ -5,7 +5,7 @@
 
 namespace covol::detail {
 
-/// An action that cannot be done, or a text that is none. @throws Error InvalidInput.
+/// Reports an action that cannot be applied, or an invalid text. @throws Error InvalidInput.
 [[noreturn]] inline void refuse(const std::string& why) { throw Error(Errc::InvalidInput, "study: " + why); }
 
 }  // namespace covol::detail

@@ -71,7 +71,7 @@ StudyImage parse_header(std::string_view line, const fs::path& path) {
     }
 }
 
-/// Up to what single precision keeps of it in a file.
+/// Compares up to single precision, as files may store it.
 bool is_same(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
     const double slack = 1e-3 * b.smallest_spacing();
@@ -97,7 +97,7 @@ std::string read_text(const fs::path& path) {
     return text;
 }
 
-/// The lines that are whole, each without its end.
+/// The complete lines, each without its end.
 std::vector<std::string_view> whole_lines(std::string_view text) {
     std::vector<std::string_view> lines;
     for (std::size_t end; (end = text.find('\n')) != std::string_view::npos; text.remove_prefix(end + 1))
@@ -118,11 +118,11 @@ void each_action(const std::vector<std::string_view>& lines, const fs::path& pat
 
 }  // namespace
 
-/// Lines that are appended, each flushed.
+/// A file to which lines are appended, each flushed.
 struct Study::Journal {
     fs::path path;
     Descriptor file;
-    off_t end = 0;  ///< of what is confirmed
+    off_t end = 0;  ///< of the confirmed content
 
     explicit Journal(fs::path p) : path(std::move(p)), file(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK) {
         struct stat entry {};
@@ -132,7 +132,7 @@ struct Study::Journal {
         if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
             fail(Errc::Io, path, "another program has this study open");
     }
-    /// Nothing behind `bytes` counts.
+    /// Discards everything after the first `bytes` bytes.
     void cut(off_t bytes) {
         if (::ftruncate(file.get(), bytes) != 0) fail(Errc::Io, path, "it cannot be written (" + error_text() + ")");
         end = bytes;
@@ -148,7 +148,7 @@ struct Study::Journal {
         }
         if (done < text.size() || ::fdatasync(file.get()) != 0) {
             const std::string why = error_text();
-            [[maybe_unused]] const int left = ::ftruncate(file.get(), end);  // it is cut off when it is opened again
+            [[maybe_unused]] const int left = ::ftruncate(file.get(), end);  // else it is cut when opened again
             fail(Errc::Io, path, "it cannot be written (" + why + "); the last action was not kept");
         }
         end += off_t(text.size());
@@ -165,7 +165,8 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
     const std::string text = read_text(path);
     const std::vector<std::string_view> lines = whole_lines(text);
     if (lines.empty()) {
-        // A first line that was cut off holds no action; another file of this name is not the study's to begin anew.
+        // A truncated first line contains no action, and the journal may begin anew; any other content is not a journal
+        // and must not be overwritten.
         constexpr std::string_view kBegin = "{\"covol_study\":";
         if (!kBegin.starts_with(std::string_view(text).substr(0, kBegin.size())))
             fail(Errc::InvalidInput, path, "expected the journal of a study; its first line is none");

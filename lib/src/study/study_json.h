@@ -4,7 +4,7 @@
 
 namespace covol::detail {
 
-/// One object that is not nested deeply; the text may come from anywhere. @throws Error InvalidInput.
+/// Parses one object without deep nesting; the text may be untrusted. @throws Error InvalidInput.
 [[nodiscard]] nlohmann::json parse_object(std::string_view text);
 
 }  // namespace covol::detail

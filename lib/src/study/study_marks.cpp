@@ -1,4 +1,4 @@
-// What segment_structures() takes of a study's structures.
+// Converts a study's structures to the input of segment_structures().
 #include <set>
 #include <utility>
 
@@ -21,7 +21,7 @@ void add_study_paint(Marks& marks, const StudyStructure& structure, const ImageG
     if (!paint) return;
     PaintedImage painted = make_painted(*paint);
     painted.name = marks.name;
-    painted.is_shared = false;  // each structure is solved for itself
+    painted.is_shared = false;  // each structure is solved separately
     const int label = painted.labels.front().label;
     marks.paint.push_back({std::make_shared<const PaintedImage>(std::move(painted)), label});
 }

@@ -23,22 +23,23 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kFewestMarks = 4;  // a surface through fewer is any surface
-constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a person should wait
+constexpr std::size_t kFewestMarks = 4;  // fewer do not determine a surface
+constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a user should wait
 
-/// Threads that find surfaces give way to those that answer a page, and to the browser on the same cores.
+/// Lowers the priority of threads that compute surfaces below that of threads that serve a page, and of the browser on
+/// the same cores.
 class LowerPriority : public tbb::task_scheduler_observer {
 public:
     explicit LowerPriority(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
     void on_scheduler_entry(bool /*is_worker*/) override {
-        constexpr int kNice = 5;  // a third of the time of others, where there is not enough for all
+        constexpr int kNice = 5;  // a third of the time of other threads if the cores do not suffice
         static thread_local const int done = ::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);
         (void)done;
     }
 };
 
-/// The threads of all solvers of this process. It is never destroyed: an observer that ends while a thread is still
-/// leaving its arena is not freed by TBB.
+/// The threads of all solvers of this process. It is never destroyed: TBB does not free an observer that ends while a
+/// thread is still leaving its arena.
 tbb::task_arena& low_priority_arena() {
     struct Observed {
         tbb::task_arena arena;
@@ -52,7 +53,7 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// Whether places lie in one plane, up to a thousandth of their extent: as clicks on one slice do.
+/// Whether positions lie in one plane, up to a thousandth of their extent, such as clicks on one slice.
 bool are_flat(const std::vector<Vec3>& places) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const Vec3& p : places) mean += Eigen::Vector3d(p[0], p[1], p[2]) / double(places.size());
@@ -76,9 +77,9 @@ bool is_on_one_slice(const std::vector<StudyStroke>& strokes) {
     return first != nullptr;
 }
 
-/// What is missing before there can be a surface, in words; empty: nothing.
+/// Describes what is missing for a surface; empty if nothing is.
 std::string missing(const StudyStructure& structure) {
-    // What a guess or paint alone gives, whoever segments it knows best.
+    // Outlines or a guess are sufficient, or the segmentation reports what is missing.
     if (!structure.outlines.empty() || structure.guess) return {};
     if (!structure.strokes.empty())
         return structure.marks.empty() && is_on_one_slice(structure.strokes)
@@ -94,8 +95,8 @@ std::string missing(const StudyStructure& structure) {
            (more == 1 ? " mark more and there is a surface" : " marks more and there is a surface");
 }
 
-/// About how many voxels of edge h the surface takes: as many as the one before, else as a body that fills the box of
-/// the marks.
+/// Estimated number of voxels of edge h in the band: as for the previous surface, else as for a body that fills the box
+/// of the marks.
 double voxels_of_band(const StudyStructure& structure, const SegmentResult* before, double h) {
     if (before != nullptr) {
         const double own = before->report.domain.voxel_size;
@@ -106,7 +107,7 @@ double voxels_of_band(const StudyStructure& structure, const SegmentResult* befo
         if (mark.kind == MarkKind::Surface) places.push_back(mark.world);
     for (const StudyOutline& outline : structure.outlines)
         places.insert(places.end(), outline.world.begin(), outline.world.end());
-    if (places.empty()) return 0;  // a guess or paint alone
+    if (places.empty()) return 0;  // only a guess or paint
     const WorldBox box = bounding_box(places);
     double area = 0;
     for (std::size_t a = 0; a < 3; ++a)
@@ -120,7 +121,7 @@ struct StudySolver::State {
     struct Job {
         std::shared_ptr<const StudyStructure> structure;
         std::uint64_t sequence = 0;
-        bool is_known = false;  ///< its surface: confirm()
+        bool is_known = false;  ///< whether its surface is known: confirm()
     };
 
     State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,
@@ -129,7 +130,7 @@ struct StudySolver::State {
         run.cancel = &cancel;
         set_options(std::move(o));
     }
-    /// @pre locked, or nothing runs
+    /// @pre locked, or no solver is running
     void set_options(SegmentOptions o) {
         options = std::move(o);
         if (options.voxel_size) return;
@@ -152,12 +153,12 @@ struct StudySolver::State {
             const bool is_done = low_priority_arena().execute([&] { return solve(job, how); });
             lock.lock();
             running = 0;
-            if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it made way for another one
+            if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // interrupted
             changed.notify_all();
         }
     }
 
-    /// False: cancelled.
+    /// False if cancelled.
     bool solve(const Job& job, const SegmentOptions& refined) {
         StudyResult result;
         result.structure = job.structure->id;
@@ -203,7 +204,7 @@ struct StudySolver::State {
             }
             SegmentOptions first = refined;
             first.evolve.rho = 0;
-            first.without_mesh = first.without_fields = true;  // good triangles take as long as the surface itself
+            first.without_mesh = first.without_fields = true;  // a good mesh takes as long as the surface
             Marks moved = marks;
             const auto before = newest(result.structure);
             if (before) {
@@ -214,7 +215,7 @@ struct StudySolver::State {
             try {
                 find(first, moved, StudyResult::Stage::First);
             } catch (const Error& error) {
-                if (error.code() == Errc::Cancelled) throw;  // else the image may know better
+                if (error.code() == Errc::Cancelled) throw;  // the image may still help
             }
             find(refined, marks, StudyResult::Stage::Refined);
         } catch (const Error& error) {

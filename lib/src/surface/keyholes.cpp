@@ -31,14 +31,14 @@ bool encloses(const Curve& curve, const PlanePoint& p) {
     return inside;
 }
 
-/// A hole that is not joined yet, and its shortest way to what is.
+/// A hole that is not connected yet, with its shortest distance to the connected curves.
 struct Waiting {
     Curve curve;
     double square = std::numeric_limits<double>::max();
     std::size_t own = 0;
     PlanePoint other{};
 
-    void look_at(const Curve& joined) {
+    void update_nearest(const Curve& joined) {
         for (std::size_t n = 0; n < curve.size(); ++n)
             for (const PlanePoint& p : joined) {
                 const double x = p[0] - curve[n][0], y = p[1] - curve[n][1];
@@ -50,9 +50,9 @@ struct Waiting {
     }
 };
 
-/// The nearest one first: its channel can meet no other hole, which would be nearer.
+/// Connects the nearest hole first: no other hole can lie in its channel, because it would be nearer.
 Curve with_holes(Curve part, std::vector<Waiting> holes) {
-    for (Waiting& hole : holes) hole.look_at(part);
+    for (Waiting& hole : holes) hole.update_nearest(part);
     while (!holes.empty()) {
         const auto next = std::min_element(holes.begin(), holes.end(),
                                            [](const Waiting& a, const Waiting& b) { return a.square < b.square; });
@@ -62,7 +62,7 @@ Curve with_holes(Curve part, std::vector<Waiting> holes) {
         for (std::size_t n = 0; n <= hole.curve.size(); ++n)
             way.push_back(hole.curve[(hole.own + n) % hole.curve.size()]);
         part.insert(std::find(part.begin(), part.end(), hole.other), way.begin(), way.end());
-        for (Waiting& other : holes) other.look_at(hole.curve);
+        for (Waiting& other : holes) other.update_nearest(hole.curve);
     }
     return part;
 }
@@ -74,7 +74,7 @@ std::vector<Curve> join_holes(std::vector<Curve> curves) {
     for (Curve& curve : curves) (area_of(curve) > 0 ? parts : holes).push_back(std::move(curve));
     std::vector<std::vector<Waiting>> holes_of(parts.size());
     for (Curve& hole : holes) {
-        // The smallest part around it.
+        // The smallest part that contains it.
         std::size_t best = parts.size();
         for (std::size_t n = 0; n < parts.size(); ++n)
             if (encloses(parts[n], hole.front()) && (best == parts.size() || area_of(parts[n]) < area_of(parts[best])))

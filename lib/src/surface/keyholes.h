@@ -2,14 +2,14 @@
 #include <array>
 #include <vector>
 
-// Parts of a plane with holes as single curves.
+// Conversion of plane regions with holes to single curves.
 namespace covol::detail {
 
 using PlanePoint = std::array<double, 2>;
 
-/// Joins each hole to the part that it lies in, by a channel of no width between their nearest points.
-/// @param curves  closed, none of which crosses another; with the inside on their left, so that parts have a positive
-///                area and holes a negative one
+/// Connects each hole to the part that contains it, by a channel of zero width between their nearest points.
+/// @param curves  closed, without intersections, and with the inside on their left, so that parts have a positive area
+/// and holes a negative one
 /// @returns the parts in their order
 std::vector<std::vector<PlanePoint>> join_holes(std::vector<std::vector<PlanePoint>> curves);
 

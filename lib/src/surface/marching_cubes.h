@@ -21,24 +21,25 @@
 #include "grid/cube_cases.h"
 #include "grid/leaf_band.h"
 
-// Marching cubes (Lorensen and Cline 1987) over the leaves of a sparse grid, with the loops of grid/cube_cases.h.
-// Signs are 64-bit words, a slice of a leaf each, so that cut edges and cut cubes are found 64 at a time.
+// Marching cubes (Lorensen and Cline 1987) over the leaves of a sparse grid, with the loops of grid/cube_cases.h. The
+// signs of each slice of a leaf are a 64-bit word, so that cut edges and cut cubes are found 64 at a time.
 namespace covol::detail {
 
-// Vertices keep this share of a voxel's edge away from its ends: no degenerate triangle, no needle.
+// Minimum distance of vertices from the ends of a voxel's edge, as a fraction of the edge: prevents degenerate
+// triangles and needles.
 inline constexpr double kEdgeMargin = 0.01;
-// The same where two faces of a clip meet: the edge between them is as narrow a chamfer as that.
+// The same if two faces of a clip meet: their common edge becomes a chamfer of this width.
 inline constexpr double kChamfer = 0.5 * kEdgeMargin;
 
-/// A leaf of the grid, or 8^3 voxels of a tile that has the surface on its rim.
+/// A leaf of the grid, or 8^3 voxels of a tile that are adjacent to the surface.
 struct Block {
     Coord origin;
     const float* values = nullptr;  ///< null: `tile` everywhere
     float tile = 0;
     LeafMask inside{};
     std::array<std::uint32_t, 8> next{};   ///< block at origin + 8 (dx,dy,dz), slot 4 dx + 2 dy + dz
-    std::array<LeafMask, 3> cut{};         ///< voxels whose edge along each axis the surface cuts
-    std::array<std::uint16_t, 24> rank{};  ///< cut edges before word w of axis a, slot 8 a + w
+    std::array<LeafMask, 3> cut{};         ///< voxels whose edge along each axis is cut by the surface
+    std::array<std::uint16_t, 24> rank{};  ///< number of cut edges before word w of axis a, slot 8 a + w
     std::uint32_t vertex_count = 0, triangle_count = 0;
     std::uint64_t first_vertex = 0, first_triangle = 0;
 
@@ -54,17 +55,17 @@ inline std::uint64_t shift_z(std::uint64_t word, std::uint64_t next) {
     return (word >> 1 & ~(kColumnZ0 << 7)) | (next & kColumnZ0) << 7;
 }
 
-/// Some triangles of a mesh in pieces.
+/// A part of a mesh.
 struct MeshPiece {
-    std::uint64_t first = 0;                              ///< the number of the first position
-    std::vector<std::array<float, 3>> positions;          ///< of vertices that the triangles refer to, or later ones do
-    std::vector<std::array<std::uint32_t, 3>> triangles;  ///< by numbers in the whole mesh
-    std::uint64_t done = 0;                               ///< no later triangle refers to a vertex before this one
+    std::uint64_t first = 0;                              ///< number of the first position
+    std::vector<std::array<float, 3>> positions;          ///< of vertices used by these triangles or later ones
+    std::vector<std::array<std::uint32_t, 3>> triangles;  ///< with vertex numbers of the whole mesh
+    std::uint64_t done = 0;  ///< vertices below this number are not used by later triangles
 };
 
 class MarchingCubes {
 public:
-    /// @param clip  where the grid has layers that stand for the faces of a cut.
+    /// @param clip  which layers of the grid represent the faces of a cut.
     MarchingCubes(const FloatGrid& grid, const LatticeClip& clip, double isovalue, const RunContext& run)
         : grid_(grid), clip_(clip), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
         origin_ = choose_mesh_origin(domain_.world_box(), domain_.voxel_size);
@@ -78,7 +79,7 @@ public:
 
     [[nodiscard]] const Vec3& origin() const { return origin_; }
 
-    /// All of it.
+    /// The whole mesh.
     TriangleMesh extract() {
         prepare();
         TriangleMesh mesh;
@@ -99,8 +100,9 @@ public:
     }
 
     /// The same vertices and triangles in the same order, in pieces. A triangle of a block has vertices of this block
-    /// and of those behind it in the order of their origins, in the next layer along x at most: only these are held.
-    /// @param begin  called with the number of vertices and of triangles. Positions are relative to origin().
+    /// and of those after it in the order of their origins, at most in the next layer along x: only these are held in
+    /// memory.
+    /// @param begin  called with the numbers of vertices and triangles. Positions are relative to origin().
     /// @param take   called with each piece
     template <typename Begin, typename Take>
     void stream(const Begin& begin, const Take& take) {
@@ -139,7 +141,7 @@ public:
     }
 
 private:
-    /// The positions of vertices from a number on.
+    /// The positions of vertices, starting from a given number.
     struct Positions {
         const std::array<float, 3>* data;
         std::uint64_t first;
@@ -166,7 +168,7 @@ private:
                 block.inside[n / 64] = word;
             }
         });
-        // In a proper level set no tile is needed; in any other input the surface stays closed because of this.
+        // A proper level set needs no tiles; they keep the surface closed for any other input.
         std::vector<Coord> needed = opposite_tiles();
         for (std::size_t checked = 0;;) {
             const std::size_t end = blocks_.size();
@@ -185,7 +187,7 @@ private:
         tbb::parallel_sort(blocks_.begin(), blocks_.end(),
                            [](const Block& a, const Block& b) { return a.origin < b.origin; });
         block_count_ = blocks_.size();
-        // Two more stand for all the space that is not near the surface.
+        // Two more blocks represent all space outside and inside that is not near the surface.
         blocks_.resize(block_count_ + 2);
         blocks_.back().inside.fill(~std::uint64_t(0));
         if (blocks_.size() > std::numeric_limits<std::uint32_t>::max())
@@ -225,7 +227,8 @@ private:
         return found;
     }
 
-    /// Appends the origins of tile blocks next to blocks [begin, end) where the signs on the two sides differ.
+    /// Appends the origins of missing tile blocks next to blocks [begin, end) with a different sign across the common
+    /// side.
     void append_missing_neighbours(std::size_t begin, std::size_t end, std::vector<Coord>& needed) const {
         tbb::enumerable_thread_specific<std::vector<Coord>> found;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 64), [&](const auto& range) {
@@ -242,7 +245,7 @@ private:
         for (const auto& some : found) needed.insert(needed.end(), some.begin(), some.end());
     }
 
-    /// Whether a voxel on the side of a block that faces `step` has another sign than `inside`.
+    /// Whether a voxel on the side of a block in the direction `step` has another sign than `inside`.
     static bool rim_differs(const LeafMask& mask, const Coord& step, bool inside) {
         std::uint64_t facing = ~std::uint64_t(0);
         if (step.y() != 0) facing &= step.y() < 0 ? 0xff : std::uint64_t(0xff) << 56;
@@ -274,7 +277,7 @@ private:
         return std::uint32_t(block_count_ + (is_inside(accessor.getValue(origin)) ? 1 : 0));
     }
 
-    /// Corner signs of the cubes whose lowest corners are slice x of the block.
+    /// Corner signs of the cubes whose lowest corners are in slice x of the block.
     [[nodiscard]] CornerWords corners(const Block& block, int x) const {
         CornerWords words;
         for (int dx = 0; dx < 2; ++dx) {
@@ -354,7 +357,7 @@ private:
                         "grid '" + grid_.getName() + "': a value next to the surface is not finite");
     }
 
-    /// Meshes hold single-precision coordinates: a voxel has to be many of their steps wide.
+    /// Meshes have single-precision coordinates: a voxel must be much wider than their resolution.
     void check_precision(const Block& block) const {
         const Vec3 p =
             domain_.index_to_world({double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
@@ -385,18 +388,18 @@ private:
         std::array<float, 3> position{};
         const Coord voxel = block.origin.offsetBy(local[0], local[1], local[2]);
         const double from = clip_.position(axis, voxel[axis]), to = clip_.position(axis, voxel[axis] + 1);
-        const bool on_cap = from == to;  // beyond a face
+        const bool on_cap = from == to;  // the edge is beyond a face
         for (int c = 0; c < 3; ++c)
             position[c] = to_world(c, clip_.position(c, voxel[c]) + (on_cap && c != axis ? chamfer(c, voxel[c]) : 0.0));
         if (on_cap) return position;
         const float next = to_world(axis, to);
         const float exact = to_world(axis, from + (to - from) * std::clamp(t, kEdgeMargin, 1 - kEdgeMargin));
-        // Strictly inside its edge after rounding, too.
+        // Strictly inside its edge even after rounding.
         position[axis] = std::clamp(exact, std::nextafter(position[axis], next), std::nextafter(next, position[axis]));
         return position;
     }
 
-    /// How far a cap's vertex keeps from another face that it lies on, index space.
+    /// Distance of a cap's vertex from another face on which it lies, index space.
     [[nodiscard]] double chamfer(int axis, int layer) const {
         if (!clip_.on_face(axis, layer)) return 0;
         const bool upper = clip_.position(axis, layer) == clip_.high[axis];

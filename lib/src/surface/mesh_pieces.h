@@ -9,7 +9,8 @@ namespace covol::detail {
 
 struct MeshPiece;
 
-/// measure_surface(), and on the way every piece of the mesh; of `mesh` all but the measures are known by then.
+/// measure_surface() that also passes every piece of the mesh to `take`; all fields of `mesh` except the measures are
+/// set by then.
 StreamedMesh measure_pieces(const FloatGrid& surface, double isovalue, const RunContext& run,
                             const std::function<void(const StreamedMesh& mesh, const MeshPiece& piece)>& take);
 

@@ -23,11 +23,11 @@ using detail::DisjointSets;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The connected parts of the active voxels of one sign, through faces.
+/// The connected parts of the active voxels of one sign, connected through faces.
 class ActivePieces {
 public:
     struct Piece {
-        std::size_t first, last;  // parts
+        std::size_t first, last;  // indices of parts
         std::int64_t voxels;
     };
 
@@ -44,7 +44,7 @@ public:
             for_each_part(mask, [&](const LeafMask& part) { masks[n].push_back(part); });
         });
         std::unordered_map<const Leaf*, std::size_t> numbers;
-        std::vector<std::size_t> first;  // of each leaf's parts
+        std::vector<std::size_t> first;  // index of each leaf's first part
         for (std::size_t n = 0; n < leaves.size(); ++n) {
             numbers.emplace(leaves[n], n);
             first.push_back(parts_.size());
@@ -92,19 +92,19 @@ private:
         Leaf* leaf;
         std::uint32_t piece;
     };
-    /// A voxel of `lower` has its next along the axis in `upper`, of the next leaf.
+    /// Whether a voxel of `lower` has its next neighbour along the axis in `upper`, a mask of the next leaf.
     static bool meet(const LeafMask& lower, const LeafMask& upper, int axis) {
         constexpr LeafMask kNone{};
-        LeafMask both = looking_at(kNone, upper, axis, 1);
+        LeafMask both = beside_marked(kNone, upper, axis, 1);
         for (int word = 0; word < 8; ++word) both[word] &= lower[word];
         return any_on(both);
     }
 
-    std::vector<Part> parts_;  // by piece
+    std::vector<Part> parts_;  // sorted by piece
     std::vector<Piece> pieces_;
 };
 
-/// The regions of equal sign, 6-connected, of all that lies between the leaves too.
+/// The 6-connected regions of equal sign, including the space between the leaves.
 class Regions {
 public:
     using Label = std::uint32_t;
@@ -123,8 +123,8 @@ public:
                 ++surface_[parents_[labels_[n][value.pos()]]];
     }
 
-    /// Of one sign, those that fewer than `least` points rest on, without the largest and what lies around everything,
-    /// get the other sign. @return how many
+    /// Changes the sign of those regions of one sign that have fewer than `minimum` points on them, except the largest
+    /// and the surrounding space. @return how many
     std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t minimum) {
         std::vector<Label> roots;
         for (Label n = 0; n < parents_.size(); ++n)
@@ -132,28 +132,28 @@ public:
         if (roots.size() < 2) return 0;
         const Label main =
             *std::max_element(roots.begin(), roots.end(), [&](Label x, Label y) { return surface_[x] < surface_[y]; });
-        const std::vector<std::size_t> resting = resting_points(points);
-        std::vector<char> goes(parents_.size(), 0);
+        const std::vector<std::size_t> point_counts = count_points(points);
+        std::vector<char> is_removed(parents_.size(), 0);
         std::size_t count = 0;
         for (const Label n : roots) {
-            if (n == main || parents_[kAround] == n || resting[n] >= minimum) continue;
-            goes[n] = 1;
+            if (n == main || parents_[kAround] == n || point_counts[n] >= minimum) continue;
+            is_removed[n] = 1;
             ++count;
         }
-        if (count > 0) change_sign(goes, inside);
+        if (count > 0) change_sign(is_removed, inside);
         return count;
     }
 
 private:
     static constexpr int kDim = 8, kVoxels = 512;
     static constexpr Label kAround = 0, kNone = std::numeric_limits<Label>::max();
-    /// Blocks of 8^3 along k without a leaf, from the first to before the last.
+    /// A range of blocks of 8^3 along k without leaves, from begin to before end.
     struct Gap {
         int begin, end;
         Label label;
     };
     struct Row {
-        std::size_t first, last;  // leaves
+        std::size_t first, last;  // indices of leaves
         std::vector<Gap> gaps;
     };
     using RowKey = std::pair<int, int>;
@@ -172,11 +172,11 @@ private:
         parents_[std::max(x, y)] = std::min(x, y);
     }
 
-    /// Regions within each leaf, numbered by their first voxels.
+    /// Finds the regions within each leaf, numbered by their first voxels.
     void label_leaves() {
         new_label(false);  // kAround
         labels_.resize(leaves_.size());
-        std::vector<std::vector<bool>> inside(leaves_.size());  // of each local label
+        std::vector<std::vector<bool>> inside(leaves_.size());  // for each local label
         tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
             const LeafMask negative = negative_mask(leaves_[n]->buffer().data());
             labels_[n].fill(kNone);
@@ -203,7 +203,7 @@ private:
         });
     }
 
-    /// What lies between the leaves of a row of blocks has one sign.
+    /// Finds the gaps between the leaves of each row of blocks; each gap has one sign.
     void find_gaps() {
         if (leaves_.empty()) return;
         int low[3], high[3];
@@ -273,7 +273,7 @@ private:
     void unite_equal(Label x, Label y) {
         if (is_inside_[x] == is_inside_[y]) unite(x, y);
     }
-    /// visit(voxel) for those of a leaf's lower or upper face.
+    /// visit(voxel, voxel across) for each voxel on a leaf's lower or upper face.
     template <typename Visit>
     static void for_face(int axis, bool upper, Visit visit) {
         const int stride = axis == 0 ? 64 : axis == 1 ? 8 : 1, u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
@@ -307,8 +307,8 @@ private:
         }
     }
 
-    /// Points on each region, within a voxel.
-    [[nodiscard]] std::vector<std::size_t> resting_points(const std::vector<Vec3>& points) const {
+    /// The number of points within a voxel of each region.
+    [[nodiscard]] std::vector<std::size_t> count_points(const std::vector<Vec3>& points) const {
         std::vector<std::size_t> all(parents_.size(), 0);
         std::unordered_map<const Leaf*, std::size_t> numbers;
         for (std::size_t n = 0; n < leaves_.size(); ++n) numbers.emplace(leaves_[n], n);
@@ -341,26 +341,26 @@ private:
         return all;
     }
 
-    void change_sign(const std::vector<char>& goes, bool inside) {
+    void change_sign(const std::vector<char>& is_removed, bool inside) {
         const auto limit = float(0.5 * level_set_.voxelSize()[0]), now = inside ? limit : -limit;
         for (std::size_t n = 0; n < leaves_.size(); ++n)
             for (int v = 0; v < kVoxels; ++v)
-                if (goes[parents_[labels_[n][std::size_t(v)]]]) leaves_[n]->setValueOnly(openvdb::Index(v), now);
+                if (is_removed[parents_[labels_[n][std::size_t(v)]]]) leaves_[n]->setValueOnly(openvdb::Index(v), now);
         for (const auto& [key, row] : rows_)
             for (const Gap& gap : row.gaps)
-                if (goes[parents_[gap.label]])
+                if (is_removed[parents_[gap.label]])
                     for (int k = gap.begin; k < gap.end; ++k)
                         level_set_.tree().addTile(1, {kDim * key.first, kDim * key.second, kDim * k},
                                                   inside ? level_set_.background() : -level_set_.background(), false);
     }
 
     FloatGrid& level_set_;
-    std::vector<Leaf*> leaves_;  // by origin
+    std::vector<Leaf*> leaves_;  // sorted by origin
     std::vector<std::array<Label, kVoxels>> labels_;
     std::map<RowKey, Row> rows_;
     std::vector<Label> parents_;
     std::vector<char> is_inside_;
-    std::vector<std::size_t> surface_;  // active voxels of each
+    std::vector<std::size_t> surface_;  // number of active voxels of each region
 };
 
 }  // namespace
@@ -392,7 +392,7 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
 std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t minimum) {
     Regions regions(level_set);
     const std::size_t pieces = regions.drop(true, points, minimum);
-    // A cavity in a piece that goes is one no more.
+    // A removed piece no longer has cavities, so the regions are computed again.
     return pieces == 0 ? regions.drop(false, points, minimum)
                        : pieces + Regions(level_set).drop(false, points, minimum);
 }

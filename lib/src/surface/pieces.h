@@ -5,13 +5,14 @@
 
 namespace covol::detail {
 
-/// Takes those small pieces and cavities of a solid away that no mark is near: where offsets differ across a fold they
-/// tear some off.
+/// Removes small pieces and cavities of a solid that are not near a mark: differences of offsets across a fold tear
+/// some off.
 /// @param level_set  active in a band; negative inside
 void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks);
 
-/// Takes pieces and cavities away, the largest of each excepted, whose surface fewer than `least` points lie on (within
-/// a voxel). Values where something went are of the right sign, but no distances. @return how many went
+/// Removes pieces and cavities, except the largest of each, that have fewer than `minimum` points on their surface
+/// (within a voxel). Values where something was removed have the right sign but are no distances. @return how many were
+/// removed
 std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t minimum);
 
 }  // namespace covol::detail

@@ -13,10 +13,10 @@ namespace {
 using openvdb::Coord;
 using Accessor = FloatGrid::ConstAccessor;
 
-/// A distance changes by less than sqrt(3) voxels within a cell: beyond this many its sign is sure.
+/// A distance changes by less than sqrt(3) voxels within a cell: above this value, in voxels, its sign is certain.
 constexpr float kCertain = 1.8F;
 
-/// Edge of the largest cube, aligned to its size, that has one value around a voxel without a leaf.
+/// Edge of the largest cube, aligned to its size, that has a single value around a voxel without a leaf.
 int tile_size(Accessor& accessor, const Coord& voxel) {
     using Tree = FloatGrid::TreeType;
     using Upper = Tree::RootNodeType::ChildNodeType;
@@ -29,13 +29,13 @@ int tile_size(Accessor& accessor, const Coord& voxel) {
     }
 }
 
-/// Asks, voxel by voxel along a row of an image, whether a level set is negative there.
+/// Determines, voxel by voxel along a row of an image, whether a level set is negative.
 class RowSampler {
 public:
     explicit RowSampler(const FloatGrid& grid)
         : accessor_(grid.getConstAccessor()), certain_(kCertain * static_cast<float>(grid.voxelSize()[0])) {}
 
-    /// Sets out[n - first] to the label for the positions from + n * step (index space), first <= n < end, that are
+    /// Sets out[n - first] to the label for those positions from + n * step (index space), first <= n < end, that are
     /// inside.
     void fill(const openvdb::Vec3d& from, const openvdb::Vec3d& step, int first, int end, std::uint8_t label,
               std::uint8_t* out) {
@@ -60,12 +60,12 @@ public:
     }
 
 private:
-    /// How many positions from `at` on lie in the tile of this size around `base`, at least 1.
+    /// The number of positions from `at` on that lie in the tile of this size around `base`, at least 1.
     static int steps_inside_tile(const openvdb::Vec3d& at, const Coord& base, const openvdb::Vec3d& step, int size) {
         double steps = std::numeric_limits<std::int32_t>::max();
         for (int a = 0; a < 3; ++a) {
             const int low = base[a] & ~(size - 1);
-            // A margin keeps rounding from taking a position of the next tile along.
+            // A margin prevents rounding from including a position of the next tile.
             if (step[a] > 1e-12) steps = std::min(steps, (low + size - 1e-6 - at[a]) / step[a]);
             if (step[a] < -1e-12) steps = std::min(steps, (low + 1e-6 - at[a]) / step[a]);
         }
@@ -91,7 +91,7 @@ private:
     float certain_;
 };
 
-/// Every corner of the lattice's box, half a voxel beyond the last centres, lies in the clip.
+/// Whether the centres of all the lattice's voxels lie in the clip.
 bool lies_within(const ImageGeometry& geometry, const Clip& clip) {
     for (int corner = 0; corner < 8; ++corner) {
         Vec3 index;
@@ -147,7 +147,8 @@ std::optional<bool> Rasterizer::uniform(const VoxelBox& box) const {
     Accessor accessor = grid().getConstAccessor();
     const float certain = kCertain * static_cast<float>(grid().voxelSize()[0]);
     std::optional<bool> inside;
-    // A tile's edge is a multiple of a leaf's: steps of a leaf meet all, and along z whole tiles are passed.
+    // Tiles begin at multiples of a leaf's edge: steps of one leaf visit all of them, and along z whole tiles are
+    // skipped.
     Coord at;
     for (at[0] = low[0]; at[0] <= high[0]; at[0] = (at[0] & ~(kLeafDim - 1)) + kLeafDim)
         for (at[1] = low[1]; at[1] <= high[1]; at[1] = (at[1] & ~(kLeafDim - 1)) + kLeafDim)

@@ -11,17 +11,18 @@
 
 namespace covol::detail {
 
-/// Which voxels of an image have their centres in a solid; a box at a time, by any number of threads.
+/// Determines which voxels of an image have their centres in a solid, box by box, from any number of threads.
 class Rasterizer {
 public:
     /// @param surface  a level set; kept by reference
     Rasterizer(const FloatGrid& surface, const ImageGeometry& geometry);
 
-    /// Sets the voxels of `box` that are inside to `label` and leaves the others as they are.
+    /// Sets the voxels of `box` that are inside to `label` and leaves the others unchanged.
     /// @param out  i fastest
     void fill(const VoxelBox& box, std::uint8_t label, std::uint8_t* out) const;
 
-    /// Whether all voxels of the box are inside, or all outside, where the tree's tiles say so; none: look at each.
+    /// Whether all voxels of the box are inside, or all outside, if the tree's tiles show it; none: each must be
+    /// checked.
     [[nodiscard]] std::optional<bool> uniform(const VoxelBox& box) const;
 
 private:
@@ -32,7 +33,7 @@ private:
     const ImageGeometry geometry_;
     const Domain domain_;
     const std::optional<Uncut> whole_;
-    const Clip clip_;  // to be looked at beside the grid
+    const Clip clip_;  // to be checked in addition to the grid
     const bool all_within_;
 };
 

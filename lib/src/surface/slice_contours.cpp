@@ -1,4 +1,4 @@
-// Where surfaces meet the slices of an image.
+// Intersections of surfaces with the slices of an image.
 #include "covol/slice_contours.h"
 
 #include <openvdb/openvdb.h>
@@ -16,16 +16,16 @@ namespace {
 
 using detail::PlanePoint;
 
-/// How far a surface reaches, in voxels of an image.
+/// The extent of a surface, in voxels of an image.
 struct Reach {
     Vec3 low, high;
 };
 
-/// Samples of a level set in a slice: nodes on a finer lattice than its voxels, and a rim around them.
+/// Samples of a level set in a slice, on a finer lattice than its voxels, with a rim of nodes around them.
 class SliceNodes {
 public:
     /// @param reach  of the surface, in voxels of the image
-    /// @param parts  of a voxel's edge along i and j, each from node to node
+    /// @param parts  number of node intervals per voxel edge along i and j
     SliceNodes(const FloatGrid& surface, const ImageGeometry& geometry, int k, const Reach& reach,
                const std::array<int, 2>& parts)
         : parts_(parts), accessor_(surface.getConstAccessor()) {
@@ -36,7 +36,7 @@ public:
         };
         first_ = place(0, 0);
         along_ = {(place(1, 0) - first_) / parts[0], (place(0, 1) - first_) / parts[1]};
-        // Nodes within half a voxel before the first centre and behind the last, as far as the surface reaches, and
+        // Nodes within half a voxel before the first centre and after the last one, as far as the surface extends, and
         // the rim around them.
         for (std::size_t a = 0; a < 2; ++a) {
             const int half = (parts[a] - 1) / 2, last = (geometry.size[a] - 1) * parts[a] + half;
@@ -53,7 +53,7 @@ public:
     [[nodiscard]] int width() const { return count_[0]; }
     [[nodiscard]] int height() const { return count_[1]; }
     [[nodiscard]] float value(int x, int y) const { return values_[at(x, y)]; }
-    /// A place between nodes, in voxels of the image.
+    /// A position between nodes, in voxels of the image.
     [[nodiscard]] PlanePoint in_voxels(double x, double y) const {
         return {(x + low_[0]) / parts_[0], (y + low_[1]) / parts_[1]};
     }
@@ -75,8 +75,8 @@ private:
         }
         return static_cast<float>(sum);
     }
-    /// What reaches the rim ends half a voxel beyond the last centre: where the rim lies there, on it, else in the
-    /// middle between it and the nodes beside it.
+    /// Closes a surface that reaches the rim, half a voxel beyond the last centre: on the rim if that is there,
+    /// otherwise halfway between it and the adjacent nodes.
     void close_rim() {
         const auto close = [&](int x, int y) {
             float& value = values_[at(x, y)];
@@ -103,7 +103,7 @@ private:
     std::vector<float> values_;
 };
 
-/// Marching squares. Edges between nodes have numbers: 2 n from node n along x, 2 n + 1 along y.
+/// Marching squares. Edges between nodes are numbered: 2 n from node n along x, 2 n + 1 along y.
 class Squares {
 public:
     explicit Squares(const SliceNodes& nodes) : nodes_(nodes) {
@@ -143,14 +143,14 @@ private:
         return upward ? nodes_.in_voxels(x, y + t) : nodes_.in_voxels(x + t, y);
     }
     void add_cell(int x, int y) {
-        // Corners and edges anticlockwise; edge n leads from corner n to the next.
+        // Corners and edges are anticlockwise; edge n leads from corner n to the next.
         const float corner[4] = {nodes_.value(x, y), nodes_.value(x + 1, y), nodes_.value(x + 1, y + 1),
                                  nodes_.value(x, y + 1)};
         const std::size_t edge[4] = {2 * node(x, y), 2 * node(x + 1, y) + 1, 2 * node(x, y + 1), 2 * node(x, y) + 1};
-        // Of two inside corners that lie across, the middle tells whether they are joined.
+        // The mean of the corners decides whether two diagonally opposite inside corners are joined.
         const bool joined = (double(corner[0]) + corner[1] + corner[2] + corner[3]) < 0;
         for (int n = 0; n < 4; ++n) {
-            // A curve enters where, anticlockwise, the inside ends, and leaves where it begins.
+            // Going anticlockwise, a curve enters where the inside ends and leaves where it begins.
             if (!(corner[n] < 0) || corner[(n + 1) % 4] < 0) continue;
             int out = n;
             if (joined) {
@@ -165,7 +165,7 @@ private:
     }
 
     const SliceNodes& nodes_;
-    std::vector<std::size_t> next_;  ///< of each edge, the one to which the curve goes on
+    std::vector<std::size_t> next_;  ///< for each edge, the one to which the curve continues
 };
 
 Reach reach_of(const FloatGrid& surface, const ImageGeometry& geometry) {
@@ -195,7 +195,7 @@ std::vector<SliceContour> outline_slices(const FloatGrid& surface, const ImageGe
     const double h = surface.voxelSize()[0];
     std::array<int, 2> parts{};
     for (std::size_t a = 0; a < 2; ++a)
-        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // equal but for rounding: one
+        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // 1 if equal up to rounding
     with_threads(run, [&] {
         tbb::parallel_for(0, geometry.size[2], [&](int k) {
             if (run.cancelled() || !(k >= reach.low[2] && k <= reach.high[2])) return;

@@ -1,4 +1,4 @@
-// Meshes from the tree to the file, a layer of leaves at a time.
+// Streams meshes from the tree to a file, one layer of leaves at a time.
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ namespace {
 
 using meshing::Triangle;
 
-/// measure() of triangles that come one by one.
+/// measure() for triangles that arrive one by one.
 class Totals {
 public:
     explicit Totals(std::uint64_t vertices) : vertices_(vertices), pieces_(vertices) {}
@@ -35,7 +35,7 @@ public:
         parts_.resize(piece.triangles.size());
         tbb::parallel_for(std::size_t(0), parts_.size(),
                           [&](std::size_t n) { parts_[n] = add(piece, piece.triangles[n]); });
-        // One by one, as measure() does.
+        // In sequence, like measure().
         for (const Part& part : parts_) {
             sum_.volume += part.volume;
             sum_.area += part.area;
@@ -76,7 +76,7 @@ private:
         return part;
     }
 
-    /// A number for an edge: sums of such numbers, with signs for the direction, are 0 by chance once in 2^64.
+    /// A hash of an edge: the sum of such numbers, with signs for the direction, vanishes by chance once in 2^64.
     /// https://prng.di.unimi.it/splitmix64.c
     static std::uint64_t mixed(std::uint64_t low, std::uint64_t high) {
         std::uint64_t z = (low << 32 | high) + 0x9e3779b97f4a7c15;
@@ -88,11 +88,11 @@ private:
     std::uint64_t vertices_, triangles_ = 0;
     Vec3 origin_{};
     Part sum_;
-    std::vector<Part> parts_;  // of the triangles of a piece
+    std::vector<Part> parts_;  // for the triangles of a piece
     detail::DisjointSets pieces_;
 };
 
-/// Takes pieces of the mesh, writes their triangles and those of their vertices that are done.
+/// Takes pieces of the mesh and writes their triangles and those of their vertices that are complete.
 class Writer {
 public:
     Writer(const std::string& temporary, const std::string& path, const StreamedMesh& mesh,
@@ -132,13 +132,13 @@ public:
 private:
     const WriteMeshOptions& options_;
     std::unique_ptr<mesh_io::MeshStream> file_;
-    // from the piece's first vertex on
+    // Both start at the piece's first vertex.
     std::vector<std::array<float, 3>> placed_;
     std::vector<Vec3> sums_;
 };
 
-/// The mesh of a level set in pieces, and its measures.
-/// @param begin  takes the numbers of vertices and triangles, before the first piece
+/// Computes the mesh of a level set in pieces, and its measures.
+/// @param begin  called with the numbers of vertices and triangles, before the first piece
 StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext& run,
                     const std::function<void(const StreamedMesh&)>& begin,
                     const std::function<void(const StreamedMesh&, const detail::MeshPiece&)>& take) {

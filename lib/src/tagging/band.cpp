@@ -1,5 +1,6 @@
-// Tagging: what a flood from outside cannot reach through {d > D} is inside ("3D image segmentation supported by a
-// point cloud", section 3). The flood takes blocks without a leaf as a whole and works on 512-bit masks in the leaves.
+// Tagging: the region that a flood from outside cannot reach through {d > D} is inside ("3D image segmentation
+// supported by a point cloud", section 3). The flood processes blocks without a leaf as a whole, and leaves by 512-bit
+// masks.
 #include "covol/band.h"
 
 #include <tbb/parallel_for.h>
@@ -24,7 +25,7 @@ using detail::Tagging;
 using detail::Tube;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
-/// A core appears where the last gap around it closes: one that appears just above D leaks at D.
+/// A core appears at the D that closes the last gap around it: if one appears just above D, the body leaks at D.
 void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, const std::vector<Coord>& seeds,
                     const RunContext& run, BandReport& report) {
     const double h = tube.domain.voxel_size, tag_distance = tagging.distance;
@@ -34,7 +35,7 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
     if (tagging.has_core(h)) {
         report.leaks = closes_at(tag_distance + h);
     } else {
-        // A thin body whose core a smaller D still finds is closed; without one there are only walls.
+        // If a smaller D still gives a core, the body is thin and closed; otherwise there are only walls.
         const auto has_core_at = [&](double fraction) {
             return detail::tag(tube, float(fraction * tag_distance), seeds).has_core(h);
         };
@@ -74,8 +75,8 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     return voxels;
 }
 
-/// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface; inside it has to be measured,
-/// since there the other side of a wall, and the cores, have the same d.
+/// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface. Inside it has to be computed,
+/// because the opposite side of a wall, and the cores, have the same d.
 LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, const LeafArray<float>& level,
                                 const RunContext& run) {
     LeafArray<float> u = detail::signed_distance(tube.band, level, tube.inside_domain, tube.box, kWidth, run);
@@ -90,7 +91,7 @@ LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, const 
 BandResult make(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
     const Tube tube(distance);
     const double h = tube.domain.voxel_size, tag_distance = options.tag_distance;
-    // The tube's own values were rounded to float: allow for that.
+    // Tolerance for the rounding of the tube's values to float.
     if (double(distance.background()) < (tag_distance + kHalfWidthVoxels * h) * (1 - 1e-6)) {
         std::ostringstream s;
         s << "expected a distance tube of at least D + 3 h = " << tag_distance + kHalfWidthVoxels * h << ", got "

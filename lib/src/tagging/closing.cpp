@@ -1,4 +1,4 @@
-// Morphological closing of a tagged body: the exterior, grown back by the tag distance.
+// Morphological closing of a tagged body: the exterior, dilated by the tag distance.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -22,7 +22,7 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The voxels of a level set's leaf, or of the tile in its place, below zero.
+/// The voxels below zero of a level set's leaf, or of the tile in its place.
 detail::LeafMask inside_of(const FloatGrid& level_set, const detail::Coord& origin) {
     if (const Leaf* leaf = level_set.tree().probeConstLeaf(origin)) return detail::negative_mask(leaf->buffer().data());
     detail::LeafMask mask;
@@ -30,14 +30,14 @@ detail::LeafMask inside_of(const FloatGrid& level_set, const detail::Coord& orig
     return mask;
 }
 
-/// Inside the body D - d, which is the signed distance to its closing, d that to its surface; outside of it anything
-/// positive will do. No lower than -reach, no higher than reach. Null where no voxel is deeper than D.
+/// Inside the body D - d, the signed distance to its closing, where d is that to the body's surface; outside of it an
+/// arbitrary positive value. Clamped to [-reach, reach]. Null if no voxel is deeper than D.
 /// @param surface  points of the body's surface, index space
 FloatGridPtr grown_exterior(const FloatGrid& body, const std::vector<Vec3>& surface, const Domain& domain, float D,
                             float reach, const RunContext& run) {
     const detail::CoordBBox box = detail::box_of(domain);
     const auto h = float(domain.voxel_size);
-    // What is nearest to a voxel inside is seen from there through the inside.
+    // The line from a voxel inside to its nearest point lies inside, so that only leaves with inside voxels are needed.
     const detail::NearestField field =
         detail::nearest_points(surface, box, double(D + reach) / h, "distance", run,
                                [&](const detail::Coord& origin) { return detail::any_on(inside_of(body, origin)); });

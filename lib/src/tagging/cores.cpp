@@ -21,23 +21,23 @@ namespace {
 
 using detail::DisjointSets;
 
-constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of what lies beyond the tube
-constexpr float kNowhere = -kBeyond;                               ///< d of what lies outside the domain
+constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of the region beyond the tube
+constexpr float kOutsideDomain = -kBeyond;                         ///< d outside the domain
 constexpr std::int32_t kExterior = 0;                              ///< the first component
 
-/// Two components meet where d falls below this.
+/// Two components merge once the threshold of d falls below this.
 struct Saddle {
     float d;
     std::int32_t first, second;  ///< components; second may be kSeed
 };
-constexpr std::int32_t kSeed = -1;  ///< a seed in the first: from there on it is exterior
+constexpr std::int32_t kSeed = -1;  ///< the first component contains a seed: below this d it is exterior
 
-/// Components under merging, from their peaks' d on.
+/// Components that are merged as d decreases, beginning at their peaks.
 class Merging {
 public:
     static constexpr std::int32_t kNone = -1;
 
-    std::vector<std::int32_t> core_of;  ///< by component: the core that it was part of when that met the exterior
+    std::vector<std::int32_t> core_of;  ///< by component: its core when that merged with the exterior
     std::vector<float> saddles, peaks;  ///< by core
 
     explicit Merging(const std::vector<float>& d) : core_of(d.size(), kNone), parts_(d.size()) {
@@ -61,7 +61,7 @@ public:
 private:
     struct Part {
         std::int32_t parent;
-        std::int32_t next, last;  // of the parts of one component, of a root on
+        std::int32_t next, last;  // linked list of the parts of a component, beginning at its root
         float peak;
         bool exterior = false;
     };
@@ -92,7 +92,7 @@ public:
           tube_(band_.size()),
           beyond_(band_.size()),
           radius_(radius) {
-        d_.fill_block(band_.size() + 1, kNowhere);
+        d_.fill_block(band_.size() + 1, kOutsideDomain);
         import_values(distance, band_, d_);
         for (const Vec3& seed : seeds) {
             const Vec3 at = domain_.world_to_index(seed);
@@ -115,7 +115,7 @@ public:
     }
 
 private:
-    // Labels: a voxel to go on to, uphill; ~a component; or kOutside of the domain.
+    // Labels: the next voxel uphill; ~a component; or kOutside of the domain.
     static constexpr std::int32_t kOutside = std::numeric_limits<std::int32_t>::max();
     static constexpr std::int32_t kNothing = std::numeric_limits<std::int32_t>::max();  // in beyond_
     static constexpr int kShift[3] = {6, 3, 0};
@@ -174,11 +174,12 @@ private:
     const CoordBBox box_, inner_;
     const LeafBand band_;
     const LeafColumns columns_;
-    LeafArray<float> d_;  // then a block of a run, and one of what lies outside the domain
+    LeafArray<float> d_;  // followed by a block for runs, and one for the outside of the domain
     LeafArray<std::int32_t> label_;
     std::vector<LeafMask> inside_, tube_;              // of the domain
     std::vector<std::array<std::int32_t, 6>> beyond_;  // by leaf and face: a leaf, ~piece of a run, or kNothing
-    DisjointSets joined_{0};                           // of what lies beyond the tube: exterior, runs, parts of leaves
+    DisjointSets joined_{0};                           // components of the region beyond the tube: exterior, runs,
+                                                       // parts of leaves
     std::vector<Coord> seeds_;
     double radius_;
 };
@@ -188,7 +189,7 @@ void CoreFinder::link() {
         inside_[leaf] = mask_in_box(band_.origin(leaf), box_);
         for (int word = 0; word < 8; ++word) tube_[leaf][word] = inside_[leaf][word] & band_.active(leaf)[word];
         for (int at = 0; at < kLeafSize; ++at)
-            if (!is_in_tube(leaf, at)) d_.leaf(leaf)[at] = is_on(inside_[leaf], at) ? kBeyond : kNowhere;
+            if (!is_in_tube(leaf, at)) d_.leaf(leaf)[at] = is_on(inside_[leaf], at) ? kBeyond : kOutsideDomain;
         beyond_[leaf].fill(kNothing);
         columns_.for_each_neighbour(columns_.piece_of_leaf(leaf), [&](std::int32_t other, int di, int dj, int dk) {
             const std::int32_t there = columns_.pieces()[other].leaf;
@@ -223,7 +224,7 @@ void CoreFinder::count_voxels(Cores& result) const {
     result.tube_voxels = std::accumulate(result.histogram.begin(), result.histogram.end(), std::int64_t(0));
 }
 
-/// Numbers what lies beyond the tube: its components through faces.
+/// Numbers the connected components, by faces, of the region beyond the tube.
 void CoreFinder::join_beyond() {
     const auto& pieces = columns_.pieces();
     std::vector<std::int32_t> first(band_.size() + 1, 0);  // component of a leaf's first part
@@ -275,7 +276,7 @@ void CoreFinder::join_beyond() {
     });
 }
 
-/// Each voxel of the tube gets its highest neighbour, or itself where that is the highest; of equal ones the first.
+/// Assigns to each voxel of the tube its highest neighbour, or itself if it is the highest; the first of equal ones.
 void CoreFinder::climb() {
     for_leaves([&](std::size_t leaf) {
         Heights heights;
@@ -302,7 +303,7 @@ void CoreFinder::climb() {
     });
 }
 
-/// Makes the peaks components, and labels all voxels with theirs. @return d of all components' peaks
+/// Makes the peaks components, and labels all voxels with these. @return d of all components' peaks
 std::vector<float> CoreFinder::number_peaks() {
     std::vector<std::int32_t> first(band_.size() + 1, 0);
     for_leaves([&](std::size_t leaf) {
@@ -331,12 +332,12 @@ std::vector<float> CoreFinder::number_peaks() {
     return peaks;
 }
 
-/// By falling d.
+/// Sorted by decreasing d.
 std::vector<Saddle> CoreFinder::saddles() {
     tbb::enumerable_thread_specific<std::vector<Saddle>> found;
     for_leaves([&](std::size_t leaf) {
         std::vector<Saddle>& here = found.local();
-        // The same two meet in many places: the highest one counts.
+        // The same two components may be adjacent at many voxels, of which the highest is used.
         std::array<Saddle, 64> last;
         last.fill({0.0F, kSeed, kSeed});
         const auto offer = [&](float d, std::int32_t a, std::int32_t b) {
@@ -354,7 +355,7 @@ std::vector<Saddle> CoreFinder::saddles() {
             if (!is_on(inside_[leaf], at)) continue;
             const std::int32_t own = ~label_.leaf(leaf)[at];
             const float d = d_.leaf(leaf)[at];
-            // Beyond the domain's end lies the exterior: a voxel there is a gap like any other.
+            // Beyond the domain's end is the exterior, so that a voxel there is a gap like any other.
             if (!inner_.isInside(voxel(leaf, at))) offer(d, own, kExterior);
             for (int face = 0; face < 6; ++face) {
                 const Neighbour n = neighbour(leaf, at, face);
@@ -407,7 +408,7 @@ void CoreFinder::measure(const Merging& merging, Cores& result) {
         };
         for (int at = 0; at < kLeafSize; ++at) {
             const float* here = heights.at(at);
-            if (*here == kNowhere) continue;
+            if (*here == kOutsideDomain) continue;
             const std::int32_t core = merging.core_of[~label_.leaf(leaf)[at]];
             if (core == Merging::kNone || !(*here > saddle[core])) continue;
             if (core != last) flush(core);
@@ -415,7 +416,7 @@ void CoreFinder::measure(const Merging& merging, Cores& result) {
             for (const int step : Heights::kStep) sum_faces += !(here[step] > saddle[core]);
         }
         flush(Merging::kNone);
-        // A run's faces to a leaf show where no voxel of the core is.
+        // The faces between a run and a leaf belong to the core's surface where the leaf's voxels are not in the core.
         for (int face = 0; face < 6; ++face) {
             const std::int32_t other = beyond_[leaf][face];
             const std::int32_t core = other < 0 ? merging.core_of[run_component(~other)] : Merging::kNone;
@@ -435,7 +436,7 @@ void CoreFinder::measure(const Merging& merging, Cores& result) {
     }
     const double h = domain_.voxel_size;
     for (std::size_t n = 0; n < saddle.size(); ++n)
-        // A voxel surface has 3/2 of a smooth surface's area, on average over directions.
+        // The area of voxel faces is 3/2 of that of a smooth surface, on average over directions.
         if (voxels[n] > 0)
             result.cores.push_back({saddle[n] / h, std::min(double(merging.peaks[n]), radius_) / h, double(voxels[n]),
                                     double(faces[n]) * 2.0 / 3.0});

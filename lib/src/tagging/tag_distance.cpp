@@ -18,7 +18,7 @@ namespace {
 using detail::Core;
 using detail::Cores;
 
-/// The grid to analyse on: the points' box, as far as it lies in the domain, and two voxels around it.
+/// The domain of the analysis: the points' box with a margin of two voxels, within the given domain.
 Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, double voxel_size) {
     WorldBox box = bounding_box(points, 2 * voxel_size);
     const WorldBox limit = domain.world_box();
@@ -30,21 +30,21 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
     return make_domain(box, voxel_size);
 }
 
-/// Distance at which the main cores are closed, voxels; 0 when nothing but pockets is enclosed.
-struct Verdict {
+/// The distance at which the main cores are closed, voxels; 0 if only pockets are enclosed.
+struct MainCores {
     double saddle = 0;
     double peak = 0;  ///< of the most important core
     int cores = 0;
 };
 
-Verdict judge(const Cores& analysis) {
-    Verdict verdict;
+MainCores judge(const Cores& analysis) {
+    MainCores verdict;
     const auto cloud_area = [&](double saddle) {
         const double thickness = std::max(saddle, 1.0);
         return analysis.cloud_volume(thickness) / (2 * thickness);
     };
     const auto is_significant = [&](const Core& c) {
-        // Below half a voxel the grid itself closes the gap.
+        // Gaps below half a voxel are closed by the grid itself.
         const double ratio = c.peak / std::max(c.saddle, 0.5);
         return c.peak >= 1.0 && (ratio >= kTagDistance.clear_ratio ||
                                  (ratio >= kTagDistance.significant_ratio &&
@@ -62,7 +62,7 @@ Verdict judge(const Cores& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    return area < kTagDistance.structure_fraction * cloud_area(verdict.saddle) ? Verdict{} : verdict;
+    return area < kTagDistance.structure_fraction * cloud_area(verdict.saddle) ? MainCores{} : verdict;
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         if (tube.grid->tree().leafCount() == 0) break;
         Cores analysis;
         with_threads(run, [&] { analysis = detail::find_cores(*tube.grid, radius, exterior_seeds); });
-        const Verdict verdict = judge(analysis);
+        const MainCores verdict = judge(analysis);
         if (verdict.cores > 0) {
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
             choice.encloses = true;

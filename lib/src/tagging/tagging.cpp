@@ -63,7 +63,7 @@ Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seed
             result.enclosed += __builtin_popcountll(tube.inside_domain[leaf][word] & ~exterior);
             result.core += __builtin_popcountll(result.open[leaf][word] & ~exterior);
         }
-    // A run that the flood did not reach does not touch the domain's boundary, so all of its voxels count.
+    // A run that the flood did not reach does not touch the domain's boundary, so that all of its voxels count.
     const auto& pieces = tube.columns.pieces();
     for (std::size_t n = 0; n < pieces.size(); ++n) {
         if (pieces[n].leaf >= 0 || result.exterior.pieces[n]) continue;

@@ -6,7 +6,7 @@
 
 namespace covol::detail {
 
-/// The tube of a distance grid as flat arrays, to be tagged for any number of D.
+/// The tube of a distance grid as flat arrays, for tagging at any number of D.
 struct Tube {
     /// @pre the grid has at least one leaf.
     explicit Tube(const FloatGrid& distance);
@@ -22,7 +22,7 @@ struct Tube {
     std::vector<LeafMask> inside_domain;
 };
 
-/// What is outside at one D, and what is enclosed.
+/// The exterior at one D, and the enclosed region.
 struct Tagging {
     float distance = 0;          ///< D
     std::vector<LeafMask> open;  ///< d > D, in the domain
@@ -30,17 +30,18 @@ struct Tagging {
     std::int64_t enclosed = 0;  ///< voxels that the flood did not reach
     std::int64_t core = 0;      ///< those of them with d > D
 
-    /// The core, taken as one ball, is a structure and not a pocket in a wall of thickness D.
+    /// Whether the core, treated as one ball, is a structure and not a pocket in a wall of thickness D.
     [[nodiscard]] bool has_core(double voxel_size) const;
 };
 
 /// Floods {d > D} from the domain's boundary and the seeds.
 [[nodiscard]] Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seeds);
 
-/// Whether a core of `larger`, a structure and no pocket, is still exterior in `smaller`: a gap has closed in between.
+/// Whether a core of `larger`, a structure and not a pocket, is still exterior in `smaller`: a gap closes in between.
 [[nodiscard]] bool closes_a_core(const Tube& tube, const Tagging& smaller, const Tagging& larger);
 
-/// In voxels; negative where the flood did not come. Beside the tagged surface d - D says where it lies.
+/// In voxels; negative where the flood did not arrive. Beside the tagged surface it is d - D, which locates the
+/// surface.
 [[nodiscard]] LeafArray<float> signed_level(const Tube& tube, const Tagging& tagging);
 
 }  // namespace covol::detail

@@ -1,4 +1,4 @@
-"""Marks that a person may put on a structure whose truth is known.
+"""Marks as a person may set them on a structure whose truth is known.
 
 Positions are voxels of the image, x y z. Every mark is off by up to half a voxel along each axis.
 """
@@ -9,24 +9,24 @@ import numpy as np
 import truth
 
 IMPRECISION = 0.5                                  # voxels
-BETWEEN_MARKS = 4                                  # voxels, along a drawn contour
-CURVE_COUNTS = (10, 15, 20, 25, 30, 40, 50, 60, 80)  # of marks on the annotator's curve
+BETWEEN_MARKS = 4                                  # voxels, along a contour
+CURVE_COUNTS = (10, 15, 20, 25, 30, 40, 50, 60, 80)  # numbers of marks on the annotator's curve
 
 
 def generator(*what):
-    """Random numbers that depend on what they are for and on nothing else."""
+    """A random generator that depends only on its purpose."""
     return np.random.default_rng([zlib.crc32(str(w).encode()) for w in what])
 
 
 def imprecise(structure, exact, rng):
-    """Moved by up to IMPRECISION along each axis, and kept within the outermost voxel centres."""
+    """Positions moved by up to IMPRECISION along each axis, and kept within the outermost voxel centres."""
     return np.clip(exact + rng.uniform(-IMPRECISION, IMPRECISION, exact.shape), 0, structure.sizes - 1)
 
 
 # ---- draws ---------------------------------------------------------------------------------------------------------
 
 def draw_by_area(structure, count, rng):
-    """Marks anywhere on the truth's surface but on the image's end faces, by area, imprecise."""
+    """Random marks, uniform by area, on the truth's surface except the image's end faces; imprecise."""
     vertices, triangles = structure.surface
     corners = vertices[triangles]
     corners = corners[truth.off_end_faces(structure, corners.reshape(-1, 3)).reshape(-1, 3).all(1)]
@@ -39,18 +39,18 @@ def draw_by_area(structure, count, rng):
 
 
 def draw_on_outlines(structure, count, rng):
-    """Marks spread evenly over the truth's outlines in three orthogonal planes through its middle, imprecise."""
+    """Marks spread evenly over the truth's outlines in three orthogonal planes through its middle; imprecise."""
     middle = [int(np.median(a)) for a in np.nonzero(structure.truth)][::-1]
-    shares = [count // 3 + (a < count % 3) for a in range(3)]
+    fractions = [count // 3 + (a < count % 3) for a in range(3)]
     exact = []
-    for axis, share in zip((2, 1, 0), shares):
-        exact.append(truth.Lines(structure, structure.outlines(axis, middle[axis])).even(share, rng.random()))
+    for axis, fraction in zip((2, 1, 0), fractions):
+        exact.append(truth.Lines(structure, structure.outlines(axis, middle[axis])).even(fraction, rng.random()))
     return imprecise(structure, np.concatenate(exact), rng)
 
 
-def draw_contours(structure, axis, which, every, rng, least=8):
-    """[(slice, marks in order), ...]: marks on closed contours of the truth, about `every` voxels apart, at least `least` of
-    them on each; imprecise within the slice. Bits shorter than four voxels are left out, as a person does."""
+def draw_contours(structure, axis, which, every, rng, minimum=8):
+    """[(slice, marks in order), ...]: marks on closed contours of the truth, about `every` voxels apart, at least `minimum` of them
+    on each; imprecise within the slice. Parts shorter than four voxels are skipped, as by a person."""
     contours = []
     for k in which:
         for line in structure.outlines(axis, k):
@@ -58,7 +58,7 @@ def draw_contours(structure, axis, which, every, rng, least=8):
             way = np.r_[0, np.cumsum(length)]
             if way[-1] < 4 * structure.h:
                 continue
-            count = max(least, round(way[-1] / (every * structure.h)))
+            count = max(minimum, round(way[-1] / (every * structure.h)))
             turns = (np.arange(count) + rng.random()) / count * way[-1]
             exact = np.stack([np.interp(turns, way, line[:, a]) for a in range(3)], 1)
             marks = np.clip(exact + rng.uniform(-IMPRECISION, IMPRECISION, exact.shape), -0.5, structure.sizes - 0.5)
@@ -67,16 +67,16 @@ def draw_contours(structure, axis, which, every, rng, least=8):
     return contours
 
 
-# ---- what is measured ----------------------------------------------------------------------------------------------
+# ---- marks of the measurements -----------------------------------------------------------------------------------
 
 def marks_of(structure, count, draw):
-    """By area; twenty of them spread over outlines."""
+    """Random by area; if there are only twenty, spread over outlines."""
     rng = generator(structure.name, count, draw)
     return (draw_on_outlines if count == 20 else draw_by_area)(structure, count, rng)
 
 
 def contours_of(structure, step, draw):
-    """On every step-th slice; the first one differs between the draws."""
+    """On every step-th slice; the first slice differs between the draws."""
     rng = generator(structure.name, "contours", step, draw)
     first, last = structure.slices(structure.contour_axis)
     first += draw % step if (last - first) // step > 1 else 0
@@ -88,21 +88,21 @@ def first_marks(structure, draw):
 
 
 def random_marks(structure, draw):
-    """As many as are ever needed; fewer are the first of them."""
+    """All marks that are ever needed; smaller numbers take the first of them."""
     first = first_marks(structure, draw)
     more = draw_by_area(structure, CURVE_COUNTS[-1] - len(first), generator(structure.name, "curve", draw, "random"))
     return np.concatenate([first, more])
 
 
 class Annotator:
-    """Marks the truth where covol says."""
+    """Marks the truth at covol's suggestions."""
 
     def __init__(self, structure, marks, rng):
         self.structure, self.marks, self.rng = structure, marks, rng
-        self.elsewhere = 0  # marks that covol named no place for
+        self.elsewhere = 0  # number of marks for which covol suggested no position
 
     def mark(self, count, suggestions):
-        """Sets so many marks more. @param suggestions  of covol's report, the most useful first"""
+        """Sets `count` more marks. @param suggestions  of covol's report, the most useful first"""
         exact = []
         for n in range(count):
             place = self._near(suggestions[n % len(suggestions)], exact, again=n >= len(suggestions)) if suggestions else None
@@ -115,7 +115,7 @@ class Annotator:
             self.marks = np.concatenate([self.marks, imprecise(self.structure, np.array(exact), self.rng)])
 
     def _near(self, suggestion, exact, again):
-        """A position on the outlines of the named slice; of the nearest slice with any, where the truth has none there."""
+        """A position on the truth's outlines in the suggested slice, or in the nearest slice that has any."""
         first, last = self.structure.slices(2)
         lines = truth.Lines(self.structure, self.structure.outlines(2, int(np.clip(suggestion["slice"], first, last))))
         if lines.total == 0:
@@ -132,7 +132,7 @@ class Annotator:
 
 
 def few_contours(structure, count, draw):
-    """About so many marks on contours in evenly spread slices, about eight on each."""
+    """About `count` marks on contours in evenly spread slices, about eight on each."""
     first, last = structure.slices(structure.contour_axis)
     slices = max(2, round(count / 8))
     which = first + (last - first) * (np.arange(slices) + 0.5) / slices
@@ -140,4 +140,4 @@ def few_contours(structure, count, draw):
     which = np.unique(np.round(which).astype(int))
     length = [sum(np.linalg.norm(np.diff(line, axis=0) * structure.spacing, axis=1).sum()
                   for line in structure.outlines(structure.contour_axis, k)) for k in which]
-    return draw_contours(structure, structure.contour_axis, which, sum(length) / count / structure.h, rng, least=4)
+    return draw_contours(structure, structure.contour_axis, which, sum(length) / count / structure.h, rng, minimum=4)

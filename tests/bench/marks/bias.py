@@ -1,11 +1,12 @@
-"""Does covol shrink what is marked exactly? Sphere, ellipsoid and torus with 50, 300 and 3,000 exact points, without an image.
+"""Does covol shrink bodies whose marks are exact? Sphere, ellipsoid and torus with 50, 300 and 3,000 exact points, without an
+image.
 
     /usr/bin/python3 tests/bench/marks/bias.py [--covol BINARY] [--quick] [--check]
 
-The points lie apart as a person's do (each far from those before) on the shape itself; the image is blank and does not count
-(--rho 0). Voxels are cubes, or five times as long in z. Told are the mean signed distance of covol's mesh from the shape in
-voxels of the smallest spacing (over the area; negative: inside) and the enclosed volume over the true one; median of the draws
-and the one that is farthest off. Accepted: a mean of at most 0.02 voxel (0.05 with 50 points), and a volume within 0.5 %.
+The points are spread as a person's are (each far from those before) and lie exactly on the shape; the image is blank and has no
+influence (--rho 0). Voxels are cubes, or five times as long in z. Reported are the mean signed distance of covol's mesh from the
+shape in voxels of the smallest spacing (over the area; negative: inside) and the enclosed volume over the true one; the median of
+the draws and the worst one. Accepted: a mean of at most 0.02 voxel (0.05 with 50 points), and a volume within 0.5 %.
 """
 import sys
 
@@ -22,7 +23,7 @@ SHAPES = {"sphere": lambda c: bodies.sphere(15, c), "ellipsoid": lambda c: bodie
 
 
 def shape_in_image(shape, spacing, rng):
-    """A body anywhere between the voxels, and the sizes of an image with room around it."""
+    """A body at a random position relative to the voxels, and the size of an image with a margin around it."""
     around = 6 + 2 * spacing
     extent = SHAPES[shape](np.zeros(3)).extent
     sizes = np.ceil(2 * (extent + around) / spacing).astype(int)
@@ -53,7 +54,7 @@ def farthest(values, centre):
 
 
 def summary(rows):
-    told = []
+    reported = []
     groups = {}
     for row in rows:
         groups.setdefault((row["shape"], row["spacing"], row["points"]), []).append(row)
@@ -65,11 +66,11 @@ def summary(rows):
             one |= {"mean_median": float(np.median(means)), "mean_farthest": farthest(means, 0),
                     "rms_median": float(np.median([m["rms"] for m in done])), "volume_median": float(np.median(volumes)),
                     "volume_farthest": farthest(volumes, 1), "seconds_median": float(np.median([m["seconds"] for m in done]))}
-        most = MEAN_OF_FEW if count == min(COUNTS) else MEAN
-        one["accepted"] = "yes" if done and not one["failures"] and abs(one["mean_farthest"]) <= most and \
+        maximum = MEAN_OF_FEW if count == min(COUNTS) else MEAN
+        one["accepted"] = "yes" if done and not one["failures"] and abs(one["mean_farthest"]) <= maximum and \
             abs(one["volume_farthest"] - 1) <= VOLUME else "no"
-        told.append(one)
-    return told
+        reported.append(one)
+    return reported
 
 
 def main():
@@ -84,8 +85,8 @@ def main():
                     what = {"shape": shape, "spacing": name, "points": count, "draw": draw}
                     rows.append(what | bench.once(what.values(), lambda: run(bench, shape, spacing, count, draw), version))
     bench.write("bias_draws", rows)
-    told = summary(rows)
-    bench.write("bias", told)
+    reported = summary(rows)
+    bench.write("bias", reported)
     shown = ("shape", "spacing", "points", "mean_median", "mean_farthest", "rms_median", "volume_median", "volume_farthest",
              "failures", "accepted")
 
@@ -94,11 +95,11 @@ def main():
             return str(value)
         return f"{100 * (value - 1):+.2f} %" if key.startswith("volume") else f"{value:+.4f}"
 
-    good = sum(t["accepted"] == "yes" for t in told)
+    good = sum(t["accepted"] == "yes" for t in reported)
     bench.write_text("# Exact points: mean signed distance in voxels (negative: inside), error of the volume",
-                     markdown([{key: cell(key, t.get(key, "")) for key in shown} for t in told]),
-                     f"{good} of {len(told)} accepted.")
-    return 1 if good < len(told) and bench.options.check else 0
+                     markdown([{key: cell(key, t.get(key, "")) for key in shown} for t in reported]),
+                     f"{good} of {len(reported)} accepted.")
+    return 1 if good < len(reported) and bench.options.check else 0
 
 
 if __name__ == "__main__":

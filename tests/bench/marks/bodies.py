@@ -1,4 +1,4 @@
-"""Bodies with a closed form: points on them, signed distance to them, how much of them a box holds. World units, negative inside."""
+"""Bodies with a closed form: points on them, signed distance to them, their volume within a box. World units, negative inside."""
 import dataclasses
 
 import numpy as np
@@ -19,14 +19,14 @@ class Ellipsoid:
         return np.array(self.radii, float)
 
     def many_points(self, count, rng):
-        """By area: of the sphere's points, kept by how much the map to the ellipsoid stretches the area there."""
+        """Uniform by area: points of the sphere, accepted according to how much the map to the ellipsoid stretches the area there."""
         unit = rng.normal(size=(8 * count, 3))
         unit /= np.linalg.norm(unit, axis=1, keepdims=True)
         stretch = np.linalg.norm(unit / self.radii, axis=1)
         return self.centre + (unit * self.radii)[rng.random(len(unit)) < stretch / stretch.max()][:count]
 
     def distance(self, positions):
-        """Signed, exact: the root of Eberly's equation by bisection."""
+        """The exact signed distance: the root of Eberly's equation by bisection."""
         r = self.extent
         p = np.abs(positions - self.centre)
         low, high = np.full(len(p), -r.min() ** 2), np.linalg.norm(p * r, axis=1)
@@ -42,7 +42,7 @@ class Ellipsoid:
         return (((positions - self.centre) / self.radii) ** 2).sum(-1) < 1
 
     def volume_in(self, low, high, fine=2000):
-        """Of what lies in a box: exact along x, midpoints in y and z."""
+        """The volume within a box: exact along x, by midpoints in y and z."""
         low, high = (np.clip((np.asarray(v, float) - self.centre) / self.radii, -1, 1) for v in (low, high))
         steps = (high - low) / fine
         y, z = (low[a] + steps[a] * (np.arange(fine) + 0.5) for a in (1, 2))
@@ -83,7 +83,7 @@ def sphere(radius, centre):
 
 
 def even_points(body, count, rng, fill=12):
-    """Exact points that lie apart: each the farthest from those before among `fill` times as many that are drawn by area."""
+    """Exact points that are well spread: each is the one farthest from those before among `fill` times as many random points."""
     many = body.many_points(fill * count, rng)
     chosen = np.empty(count, int)
     chosen[0] = 0
@@ -97,7 +97,7 @@ def even_points(body, count, rng, fill=12):
 # ---- files -------------------------------------------------------------------------------------------------------
 
 def write_image(path, values, spacing):
-    """z y x, as Fiji writes it."""
+    """Writes an array z y x as Fiji does."""
     tifffile.imwrite(path, values, imagej=True, resolution=(1 / spacing[0], 1 / spacing[1]),
                      metadata={"spacing": float(spacing[2]), "unit": "um", "axes": "ZYX"})
 

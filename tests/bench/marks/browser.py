@@ -10,7 +10,7 @@ from mark_page_case import CHROMIUM, DRIVER, ActionChains, WebDriverWait, start_
 
 
 class Program:
-    """`covol mark`, with a study in a folder of its own unless one is given."""
+    """`covol mark`, with a study in a temporary folder unless one is given."""
 
     def __init__(self, covol, image, options=(), study=None):
         self.folder = tempfile.TemporaryDirectory()
@@ -20,7 +20,7 @@ class Program:
         self.url = self.process.stdout.readline().split()[1]
 
     def peak(self):
-        """Resident memory at its largest, MB."""
+        """Peak of resident memory, MB."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
@@ -52,7 +52,7 @@ class Browser:
         return ActionChains(self.driver, duration=0)
 
     def go(self, index):
-        """Slices through a voxel, shown."""
+        """Shows the slices through a voxel."""
         self.js("mark.state.set({slices: mark.space.voxelAt(arguments[0])})", index)
         self.wait("return mark.panels.every((p) => p.shownAt === p.at)")
 
@@ -62,19 +62,19 @@ class Browser:
         chain.w3c_actions.pointer_action.move_to_location(*map(round, spot))
         chain.click().perform()
 
-    def tell_memory(self, program):
+    def print_memory(self, program):
         own, whole = self.memory()
         print(f"memory: the program {program.peak():.0f} MB at most, the page's process {own:.0f} MB, the browser with all its processes {whole:.0f} MB")
 
     def memory(self):
-        """Resident memory of the page's own process and of all of the browser's, MB."""
+        """Resident memory of the page's own process, and of all processes of the browser, MB."""
         own, whole, pid = 0, 0, self.driver.service.process.pid
         children = {}
         for entry in pathlib.Path("/proc").glob("[0-9]*"):
             try:
                 parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
                 command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-                # Memory that processes share counts once.
+                # Memory that processes share is counted once.
                 used = sum(int(line.split()[1]) for line in (entry / "smaps_rollup").read_text().splitlines() if line.startswith("Pss:")) / 1024
             except (OSError, ValueError):
                 continue

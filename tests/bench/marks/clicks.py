@@ -1,9 +1,9 @@
-"""How long it takes from a click on the page of `covol mark` until the outline is on the screen, in headless Chromium.
+"""The time from a click on the page of `covol mark` until the outline is on the screen, in headless Chromium.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/clicks.py [--covol BINARY] [--only WORDS] [--picture PNG]
 
-All marks but some are set beforehand; each of the others is a click of the mouse, timed by the page's own clock from the
-event that the browser got to the frame after the one in which the new outline was drawn.
+All marks but some are set beforehand; each of the others is a click of the mouse, timed by the page's own clock from the browser's
+event to the frame after the one in which the new outline was drawn.
 """
 import argparse
 
@@ -14,13 +14,13 @@ import truth
 from browser import Browser, Program
 from live_client import Live, Page
 
-# structure, its marks, those of them that are clicked, and the limits: first and refined answer, seconds
+# structure, number of its marks, number of those that are clicked, and the limits for the first and the refined answer, seconds
 JOBS = (("embryo nucleus 2", 20, 14, 0.2, 0.5), ("hippocampus", 60, 20, 0.2, 0.5), ("ventricle", 60, 20, 0.3, 2.0),
         ("spleen", 60, 20, 0.3, 2.0), ("brain", 300, 10, 1.0, 5.0))
 
 
 def outline(browser, sequence, stage):
-    """When the outline of that state was on the screen, ms of the page's clock; None if another took its place."""
+    """When the outline for that state was on the screen, ms of the page's clock; None if a newer one replaced it before."""
     return browser.js("const t = mark.timing.outlines.find((o) => o.seq === arguments[0] && o.stage === arguments[1]); return t ? [t.pointer, t.shown] : null", sequence, stage)
 
 
@@ -44,7 +44,7 @@ def measure(covol, structure, count, clicked):
             index = [float(v) for v in mark]
             index[2] = float(round(index[2]))
             if browser.js("const p = mark.panels[2]; return p.input.markAt(p.spotOf(mark.space.toWorld(arguments[0])), 12) !== null", index):
-                continue  # it would be a drag of that one
+                continue  # a press there would drag that mark
             sequence = browser.js("return mark.study.seq") + 1
             browser.click(2, index)
             browser.wait("const r = mark.study.structures[0].result; return mark.study.seq === arguments[0] && r.seq === arguments[0] && r.stage === 'refined' && mark.timing.outlines.some((o) => o.seq === r.seq && o.stage === 'refined')", sequence)

@@ -1,4 +1,4 @@
-"""What the measurements of few marks share: running covol, results that resume, tables."""
+"""Common to the measurements with few marks: running covol, results that are kept between runs, tables."""
 import argparse
 import csv
 import dataclasses
@@ -24,15 +24,15 @@ sys.path.insert(0, str(HERE.parent))
 from tables import markdown, provenance  # noqa: E402  (of the folder above)
 
 
-BELOW_START = 0.003  # Dice that a result may lie below its start
+BELOW_START = 0.003  # tolerated decrease of Dice from the start to the result
 
 
 # ---- covol ---------------------------------------------------------------------------------------------------------
 
 @dataclasses.dataclass
 class Answer:
-    mask: np.ndarray | None  # none where covol failed
-    code: int                # exit code; -1: out of time
+    mask: np.ndarray | None  # None if covol failed
+    code: int                # exit code; -1: timeout
     seconds: float
     report: dict
 
@@ -49,7 +49,7 @@ class Covol:
 
     @functools.cached_property
     def version(self):
-        """Of the binary and of its own library, by content."""
+        """A hash of the program and of its own library."""
         digest = hashlib.sha256(self.binary.read_bytes())
         linked = subprocess.run(["ldd", self.binary], capture_output=True, text=True).stdout
         for line in linked.splitlines():
@@ -102,27 +102,27 @@ def write_contours(path, contours):
 # ---- tables --------------------------------------------------------------------------------------------------------
 
 def summary(rows, keys):
-    """One row for each value of the keys: median and worst over the draws. A failed draw has Dice 0."""
+    """One row for each combination of the keys: median and worst over the draws. A failed draw has Dice 0."""
     groups = {}
     for row in rows:
         groups.setdefault(tuple(row[k] for k in keys), []).append(row)
-    told = []
+    reported = []
     for values, members in groups.items():
         dice = np.array([m["dice"] for m in members])
         p95 = np.array([m["p95"] for m in members])
-        told.append(dict(zip(keys, values)) |
+        reported.append(dict(zip(keys, values)) |
                     {"draws": len(members), "dice_median": float(np.median(dice)), "dice_worst": float(dice.min()),
                      "p95_median": float(np.median(p95)), "p95_worst": float(p95.max()),
                      "failures": int(np.count_nonzero(dice == 0)),
                      "seconds_median": float(np.median([m.get("seconds", math.nan) for m in members]))})
-    return told
+    return reported
 
 
-def pivot(told, rows, columns, cell):
+def pivot(reported, rows, columns, cell):
     """A table with a row for each value of `rows` (names of keys) and a column for each value of the key `columns`."""
-    names = list(dict.fromkeys(t[columns] for t in told))
+    names = list(dict.fromkeys(t[columns] for t in reported))
     lines = {}
-    for t in told:
+    for t in reported:
         lines.setdefault(tuple(t[k] for k in rows), {})[t[columns]] = cell(t)
     return markdown([dict(zip(rows, key)) | {n: line.get(n, "") for n in names} for key, line in lines.items()])
 
@@ -133,7 +133,7 @@ def dice_cell(t):
 
 
 def below_start(rows):
-    """Lines for the runs that end below their own start by more than the tolerance."""
+    """Lines for the runs whose result is below their own start by more than the tolerance."""
     ends = [row for row in rows if "above_start" in row]
     worse = [row for row in ends if row["above_start"] < -BELOW_START]
     names = [key for key in ends[0] if key in ("structure", "marks", "every", "draw", "method")]
@@ -149,7 +149,7 @@ def p95_cell(t):
 # ---- a measurement's frame -----------------------------------------------------------------------------------------
 
 class Bench:
-    """The options that all measurements have, and results that were measured before."""
+    """The options common to all measurements, and the results of previous runs."""
 
     def __init__(self, name, description, draws, structures_needed=True, arguments=lambda parser: None):
         parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -177,7 +177,7 @@ class Bench:
                 key, value = json.loads(line)
                 self.known[key] = value
         self.truth_version = version_of(truth, annotator)
-        self.provenance = provenance()  # with the load before
+        self.provenance = provenance()  # with the load before the measurements
         self.begin = time.perf_counter()
         if structures_needed:
             self.structures = list(self._structures())
@@ -198,22 +198,22 @@ class Bench:
         return range(min(self.draws, 3) if structure.large else self.draws)
 
     def once(self, what, function, version=None):
-        """function(), a dictionary, unless it is known from before. @param what  names it; version: of what it depends on"""
+        """function(), which returns a dictionary, unless its result is already known. @param what  its name; version: of what it depends on"""
         key = json.dumps([*map(str, what), version or self.covol.version + self.truth_version])
         if key not in self.known:
             value = function()
             self.known[key] = value
             with open(self.kept, "a") as file:
                 file.write(json.dumps([key, value]) + "\n")
-            print(f"  {', '.join(map(str, what))}: " + tell(value), flush=True)
+            print(f"  {', '.join(map(str, what))}: " + one_line(value), flush=True)
         return dict(self.known[key])
 
     def start_and_end(self, what, one, structure, **given):
-        """Rows of covol with the marks alone and with the image: its own start (no step, and no say of the image), and its end.
-        @param what  names the marks; one: the columns of all rows; given: marks or contours"""
+        """Rows of covol with the marks alone and with the image: its own start (no steps and no image), and its result.
+        @param what name of the marks; one: the columns of all rows; given: marks or contours"""
         rows = []
         for name, options in (("covol, marks alone", ("--rho", 0)), ("covol, both", ())):
-            # Without a step the image would still move a guess: the start is what the marks alone give.
+            # Even without steps the image would move a guess: the start is the result of the marks alone.
             start = self.once((*what, "start"),
                               lambda: self.covol.segment(structure, "--rho", 0, "--max-steps", 0, **given).columns(structure))
             end = self.once((*what, name), lambda: self.covol.segment(structure, *options, **given).columns(structure))
@@ -241,14 +241,14 @@ class Bench:
         return f"{self.provenance}, binary {self.covol.version}{quick}"
 
 
-def tell(value):
-    """On one line; of results in results (a count's, a method's) the Dice."""
+def one_line(value):
+    """The results on one line; for nested results (of a count or a method) only the Dice."""
     text = {k: v.get("dice") if isinstance(v, dict) else v for k, v in value.items()}
     return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in text.items())
 
 
 def version_of(*modules):
-    """Of Python modules, by content: what their results depend on."""
+    """A hash of Python modules on which results depend."""
     digest = hashlib.sha256()
     for module in modules:
         digest.update(pathlib.Path(module.__file__).read_bytes())

@@ -3,8 +3,8 @@
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/contours.py [--covol BINARY] [--quick] [--check]
 
 Marks lie on the truth's outlines in slices across the structure's usual axis, four voxels apart and off by up to half a voxel
-within the slice. The draws differ in the marks and in the first marked slice, which is any of the step. "start" is covol's own,
-of the marks alone and without a step of the flow.
+within the slice. The draws differ in the marks and in the first marked slice. "start" is covol's own start, from the marks alone
+and without steps of the flow.
 """
 import sys
 
@@ -39,13 +39,13 @@ def main():
         "--check", action="store_true", help="exit code 1 when a run ends below its start by more than 0.003"))
     rows = measure(bench)
     bench.write("contours_draws", rows)
-    told = summary(rows, ("structure", "every", "method"))
-    bench.write("contours", told)
+    reported = summary(rows, ("structure", "every", "method"))
+    bench.write("contours", reported)
     keys = ("structure", "every")
     worse, starts = below_start(rows)
     bench.write_text("# Contours on every third and sixth slice: Dice, median / worst of the draws",
-                     pivot(told, keys, "method", dice_cell),
-                     "95 % distance between the surfaces in voxels, median / worst", pivot(told, keys, "method", p95_cell),
+                     pivot(reported, keys, "method", dice_cell),
+                     "95 % distance between the surfaces in voxels, median / worst", pivot(reported, keys, "method", p95_cell),
                      starts)
     return 1 if worse and bench.options.check else 0
 

@@ -1,8 +1,9 @@
-"""Masks of another program that are wrong on one side, corrected by marks there: how much better they become, and how many worse.
+"""Masks of another program that are wrong on one side, corrected by marks there: the improvement, and the number of masks that get
+worse.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/correction.py [--covol BINARY] [--quick] [--check]
 
-A mask is the truth without a quarter of it on one side of a plane, or without a fifth of it in a ball around a place of its
+A mask is the truth without a quarter of it on one side of a plane, or without a fifth of it in a ball around a point of its
 surface; marks lie on the part of the true surface that the mask misses. correction_draws.csv has each run.
 """
 import os
@@ -23,7 +24,7 @@ MORE = ("hippocampus", "left atrium", "ventricle, left", "caudate", "putamen", "
 # ---- mistakes: (structure, rng) -> mask -------------------------------------------------------------------------------
 
 def quarter(structure, rng):
-    """Without a quarter, beyond a plane."""
+    """Removes a quarter, beyond a plane."""
     normal = rng.normal(size=3)
     height = np.argwhere(structure.truth)[:, ::-1] * structure.spacing @ normal
     mask = structure.truth.copy()
@@ -32,7 +33,7 @@ def quarter(structure, rng):
 
 
 def bite(structure, rng):
-    """Without a fifth, in a ball."""
+    """Removes a fifth, within a ball."""
     places = np.argwhere(structure.truth)[:, ::-1] * structure.spacing
     vertices = structure.surface[0] * structure.spacing
     distance = np.linalg.norm(places - vertices[rng.integers(len(vertices))], axis=1)
@@ -42,7 +43,7 @@ def bite(structure, rng):
 
 
 def marks_where_wrong(structure, mask, count, rng):
-    """On the truth's surface, more than a voxel's longest edge from the mask."""
+    """Marks on the truth's surface that are farther from the mask than a voxel's longest edge."""
     many = annotator.draw_by_area(structure, 200 * count, rng)
     outside = ndimage.distance_transform_edt(~mask, sampling=structure.spacing[::-1])
     index = np.rint(many).astype(int)
@@ -54,8 +55,8 @@ def run(bench, structure, mask, marks):
     path = bench.covol.work / "guess.tif"
     tifffile.imwrite(path, mask.astype(np.uint8))
     answer = bench.covol.segment(structure, "--guess", path, marks=marks)
-    said = [w for w in answer.report.get("warnings", []) if "from the guess" in w]
-    return answer.columns(structure) | {"given": truth.dice(structure.truth, mask), "warned": len(said)}
+    output = [w for w in answer.report.get("warnings", []) if "from the guess" in w]
+    return answer.columns(structure) | {"given": truth.dice(structure.truth, mask), "warned": len(output)}
 
 
 def measure(bench):

@@ -4,18 +4,19 @@
 
 Each draw begins with ten marks on the truth's outlines in three planes. Then, up to eighty,
 
-  covol, own suggestions     a simulated annotator asks --suggest and marks the truth's outline in the slices that it names,
-                             where it is nearest to the places it names; where there are fewer places than marks to set, the
-                             next mark goes on the outline near a place, as far from all marks as it can be; where covol names
-                             nothing (or fails) the mark goes anywhere on the surface
-  covol, random suggestions  marks anywhere on the surface, by area
+  covol, own suggestions     a simulated annotator uses --suggest and marks the truth's outline in the slices that it names,
+                             at the points nearest to the suggestions; if there are fewer suggestions than marks to set, the
+                             next mark is set on the outline near a suggestion, as far from all marks as possible; if covol suggests
+                             nothing (or fails), at a random position on the surface
+  covol, random suggestions  random marks on the surface, uniform by area
   random walker, grow from seeds, variational alone
-                             the same marks as these (how seeds are made of marks: rivals.py)
-  shape-based                has contours instead: the same number of marks on outlines in evenly spread slices, about eight a
+                             the same random marks (rivals.py describes how seeds are made from marks)
+  shape-based                uses contours instead: the same number of marks on outlines in evenly spread slices, about eight per
                              contour (rivals.py)
 
-Every mark is off by up to half a voxel an axis. curve.csv has medians and worst of the draws, curve.png the medians, curve.md how
-many marks each needs until its median Dice is 0.95 and 0.9, and for how many minutes a person clicks at --seconds-per-mark.
+Every mark is off by up to half a voxel along each axis. curve.csv has the medians and the worst of the draws, curve.png the
+medians, curve.md the number of marks that each method needs for a median Dice of 0.95 and 0.9, and the minutes of clicking at
+--seconds-per-mark.
 """
 import math
 import sys
@@ -44,14 +45,14 @@ def with_suggestions(bench, structure, draw):
     """{count: columns}"""
     person = annotator.Annotator(structure, annotator.first_marks(structure, draw),
                                  annotator.generator(structure.name, "curve", draw, "own"))
-    told = {}
+    reported = {}
     for count, after in zip(COUNTS, (*COUNTS[1:], None)):
         wanted = after - count if after else 1
         answer = bench.covol.segment(structure, "--suggest", wanted, marks=person.marks)
-        told[count] = answer.columns(structure) | {"elsewhere": person.elsewhere}
+        reported[count] = answer.columns(structure) | {"elsewhere": person.elsewhere}
         if after:
             person.mark(wanted, answer.report.get("evidence", {}).get("suggestions", []) if answer.mask is not None else [])
-    return told
+    return reported
 
 
 def without_covol(structure, marks, draw):
@@ -86,28 +87,28 @@ def measure(bench):
     return rows
 
 
-# ---- what it tells -----------------------------------------------------------------------------------------------
+# ---- tables ------------------------------------------------------------------------------------------------------
 
-def marks_until(told, dice):
-    """{(structure, method): the least count from which on the median Dice stays there}; inf: never"""
-    least = {}
-    for t in sorted(told, key=lambda t: -t["marks"]):
+def marks_until(reported, dice):
+    """{(structure, method): the minimum count from which on the median Dice stays above the level}; inf: never"""
+    minimum = {}
+    for t in sorted(reported, key=lambda t: -t["marks"]):
         key = t["structure"], t["method"]
-        if t["dice_median"] >= dice and least.get(key, (math.inf, True))[1]:
-            least[key] = (t["marks"], True)
+        if t["dice_median"] >= dice and minimum.get(key, (math.inf, True))[1]:
+            minimum[key] = (t["marks"], True)
         else:
-            least[key] = (least.get(key, (math.inf,))[0], False)
-    return {key: count for key, (count, _) in least.items()}
+            minimum[key] = (minimum.get(key, (math.inf,))[0], False)
+    return {key: count for key, (count, _) in minimum.items()}
 
 
-def draw_plot(path, told, note):
-    names = list(dict.fromkeys(t["structure"] for t in told))
+def draw_plot(path, reported, note):
+    names = list(dict.fromkeys(t["structure"] for t in reported))
     columns = min(4, len(names))
     figure, axes = plt.subplots(math.ceil(len(names) / columns), columns, squeeze=False, sharex=True, sharey=True,
                                 figsize=(3 * columns, 2.6 * math.ceil(len(names) / columns) + 0.6))
     for ax, name in zip(axes.flat, names):
         for method, (color, line) in STYLE.items():
-            points = [(t["marks"], t["dice_median"]) for t in told if t["structure"] == name and t["method"] == method]
+            points = [(t["marks"], t["dice_median"]) for t in reported if t["structure"] == name and t["method"] == method]
             ax.plot(*zip(*points), line, color=color, markersize=3, linewidth=1, label=method)
         ax.axhline(ENOUGH[0], color="black", linewidth=0.5)
         ax.set_title(name, fontsize=9)
@@ -132,14 +133,14 @@ def main():
         "--seconds-per-mark", type=float, default=4, help="that a person takes to find a place and click [%(default)s]"))
     rows = measure(bench)
     bench.write("curve_draws", rows)
-    told = summary(rows, ("structure", "method", "marks"))
-    bench.write("curve", told)
-    draw_plot(bench.results / "curve.png", told, bench.head())
+    reported = summary(rows, ("structure", "method", "marks"))
+    bench.write("curve", reported)
+    draw_plot(bench.results / "curve.png", reported, bench.head())
     pace = bench.options.seconds_per_mark / 60
-    first = [t for t in told if t["marks"] == COUNTS[0]]
+    first = [t for t in reported if t["marks"] == COUNTS[0]]
     blocks = []
     for dice in ENOUGH:
-        needed = marks_until(told, dice)
+        needed = marks_until(reported, dice)
         words = {key: f"{count} ({count * pace:.1f} min)" if math.isfinite(count) else f"more than {COUNTS[-1]}"
                  for key, count in needed.items()}
         behind = [f"- {structure}: {method}" for (structure, method), count in needed.items() if count < needed[structure, OWN]]
@@ -151,7 +152,7 @@ def main():
     blocks.append(f"For {sum(row['elsewhere'] for row in ends)} of {len(ends) * (COUNTS[-1] - COUNTS[0])} marks covol named no place "
                   "(or failed), and they went anywhere.")
     for count in (10, 20, 40, 80):
-        blocks += [f"Dice with {count} marks, median", pivot([t for t in told if t["marks"] == count], ("structure",), "method",
+        blocks += [f"Dice with {count} marks, median", pivot([t for t in reported if t["marks"] == count], ("structure",), "method",
                                                              lambda t: f"{t['dice_median']:.3f}")]
     bench.write_text("# The annotator's curve", *blocks)
     return 0

@@ -1,14 +1,14 @@
-"""Bodies that the image's end cuts: how does covol end there?
+"""Bodies that are cut by the image's end: how does covol's result end there?
 
     /usr/bin/python3 tests/bench/marks/cut.py [--covol BINARY] [--quick] [--check]
 
-A sphere and an ellipsoid, bright in a noisy image, 20, 50 or 80 % of their height beyond its end: beyond its first slice, half
-of that beyond the first and half beyond the last slice, or (20 and 50 %) beyond two faces that meet. The image ends half a voxel
-beyond its outermost voxel centres. Exact marks lie on what is left of the surface, as dense as 150 on the whole; on the cut there
-are none, or some around the end slice's outline, or all over the end slice. Told are, over the draws,
+A sphere and an ellipsoid, bright in a noisy image, 20, 50 or 80 % of their height beyond its end: beyond its first slice, half of
+that beyond the first and half beyond the last slice, or (20 and 50 %) beyond two faces that meet. The image ends half a voxel
+beyond its outermost voxel centres. Exact marks lie on the part of the surface within the image, as dense as 150 on the whole; on
+the cut there are none, or some along the outline in the end slice, or some all over the end slice. Reported are, over the draws,
 
-  end slice   voxels of covol's mask in the end slices over the true ones, the end that is farthest off
-  volume      that of the mesh over that of the body within the image
+  end slice   voxels of covol's mask in the end slices over the true ones, for the worse end
+  volume      volume of the mesh over that of the body within the image
   collar      how far the mask reaches beyond the true end slice in that slice, voxels
   beyond      how far the mesh reaches beyond the image, voxels
   cap         how far the mesh lies from the image's end where the body is cut, voxels
@@ -27,7 +27,7 @@ from common import Bench, markdown, version_of, write_marks
 MARKS = 150  # on the whole body
 SPACINGS = {"1:1:1": np.array([1.0, 1, 1]), "1:1:5": np.array([1.0, 1, 5])}
 SHAPES = {"sphere": (15, 15, 15), "ellipsoid": (14, 11, 15)}
-CUTS = [(faces, share) for faces in ("one", "two ends", "corner") for share in (0.2, 0.5, 0.8) if (faces, share) != ("corner", 0.8)]
+CUTS = [(faces, fraction) for faces in ("one", "two ends", "corner") for fraction in (0.2, 0.5, 0.8) if (faces, fraction) != ("corner", 0.8)]
 ON_THE_CUT = ("none", "outline", "all over")
 OPTIONS = {"marks alone": ("--rho", 0), "both": ()}
 END_SLICE, VOLUME, FLAT = 0.03, 0.01, 0.1  # accepted
@@ -35,15 +35,15 @@ BRIGHT, DARK, NOISE = 180, 60, 15
 
 
 class Scene:
-    """A body, and the image that ends in it."""
+    """A body, and an image whose end cuts it."""
 
-    def __init__(self, shape, spacing, faces, share, rng):
+    def __init__(self, shape, spacing, faces, fraction, rng):
         self.spacing = spacing
         radii = np.array(SHAPES[shape], float)
         around = 6 + 2 * spacing
         sizes = np.ceil(2 * (radii + around) / spacing)
         centre = spacing * ((sizes - 1) / 2 + rng.uniform(-0.5, 0.5, 3))
-        beyond = 2 * radii * share + rng.uniform(-0.5, 0.5) * spacing  # of the height
+        beyond = 2 * radii * fraction + rng.uniform(-0.5, 0.5) * spacing  # of the height
         self.ends = {"one": [(2, 0)], "two ends": [(2, 0), (2, 1)], "corner": [(2, 0), (0, 0)]}[faces]  # axis, low or high
         if faces == "two ends":
             sizes[2] = max(3, round((2 * radii[2] - beyond[2]) / spacing[2]))
@@ -67,7 +67,7 @@ class Scene:
         return np.take(mask, -1 if high else 0, 2 - axis)
 
     def marks(self, on_the_cut, rng):
-        """World."""
+        """Transforms to world units."""
         whole = bodies.even_points(self.body, MARKS, rng)
         inside = ((whole >= 0) & (whole <= self.spacing * (self.sizes - 1))).all(1)
         marks = [whole[inside]]
@@ -86,7 +86,7 @@ class Scene:
         return np.concatenate(marks)
 
     def body_area(self):
-        """Thomsen's formula, within 1 %."""
+        """Area of an ellipsoid by Thomsen's formula, within 1 %."""
         a, b, c = self.body.extent**1.6
         return 4 * np.pi * ((a * b + a * c + b * c) / 3) ** (1 / 1.6)
 
@@ -126,9 +126,9 @@ class Scene:
                 "volume": bodies.enclosed(vertices, triangles) / self.body.volume_in(self.low, self.high)}
 
 
-def run(bench, shape, spacing, faces, share, on_the_cut, options, draw):
-    rng = np.random.default_rng([list(SHAPES).index(shape), int(spacing[2]), CUTS.index((faces, share)), draw])
-    scene = Scene(shape, spacing, faces, share, rng)
+def run(bench, shape, spacing, faces, fraction, on_the_cut, options, draw):
+    rng = np.random.default_rng([list(SHAPES).index(shape), int(spacing[2]), CUTS.index((faces, fraction)), draw])
+    scene = Scene(shape, spacing, faces, fraction, rng)
     image, mesh, mask = (bench.covol.work / name for name in ("cut.tif", "cut.ply", "cut_mask.tif"))
     scene.write_image(image, rng)
     marks = write_marks(bench.covol.work / "marks.csv", scene.marks(on_the_cut, rng))
@@ -140,7 +140,7 @@ def run(bench, shape, spacing, faces, share, on_the_cut, options, draw):
 
 
 def summary(rows, keys):
-    told, groups = [], {}
+    reported, groups = [], {}
     for row in rows:
         groups.setdefault(tuple(row[k] for k in keys), []).append(row)
     for values, members in groups.items():
@@ -151,8 +151,8 @@ def summary(rows, keys):
             one |= {key: float(np.max([m[key] for m in done])) for key in ("collar", "beyond", "cap")}
         one["accepted"] = "yes" if not one["failures"] and abs(one["end_slice"] - 1) <= END_SLICE and \
             abs(one["volume"] - 1) <= VOLUME and max(one["beyond"], one["cap"]) <= FLAT else "no"
-        told.append(one)
-    return told
+        reported.append(one)
+    return reported
 
 
 def cell(key, value):
@@ -168,24 +168,24 @@ def main():
     rows = []
     for shape in SHAPES:
         for name, spacing in list(SPACINGS.items())[:1 if bench.quick else None]:
-            for faces, share in CUTS:
+            for faces, fraction in CUTS:
                 for on_the_cut in ON_THE_CUT:
                     for how, options in OPTIONS.items():
                         for draw in range(bench.draws):
-                            what = {"shape": shape, "spacing": name, "faces": faces, "share": share, "marks_on_the_cut": on_the_cut,
+                            what = {"shape": shape, "spacing": name, "faces": faces, "share": fraction, "marks_on_the_cut": on_the_cut,
                                     "with": how, "draw": draw}
                             rows.append(what | bench.once(what.values(), lambda: run(
-                                bench, shape, spacing, faces, share, on_the_cut, options, draw), version))
+                                bench, shape, spacing, faces, fraction, on_the_cut, options, draw), version))
     bench.write("cut_draws", rows)
     keys = ("shape", "spacing", "faces", "share", "marks_on_the_cut", "with")
-    told = summary(rows, keys)
-    bench.write("cut", told)
+    reported = summary(rows, keys)
+    bench.write("cut", reported)
     shown = (*keys, "end_slice", "volume", "collar", "beyond", "cap", "failures", "accepted")
-    good = sum(t["accepted"] == "yes" for t in told)
+    good = sum(t["accepted"] == "yes" for t in reported)
     bench.write_text("# Bodies cut by the image's end: the draw that is farthest off",
-                     markdown([{key: cell(key, t.get(key, "")) for key in shown} for t in told]),
-                     f"{good} of {len(told)} accepted.")
-    return 1 if good < len(told) and bench.options.check else 0
+                     markdown([{key: cell(key, t.get(key, "")) for key in shown} for t in reported]),
+                     f"{good} of {len(reported)} accepted.")
+    return 1 if good < len(reported) and bench.options.check else 0
 
 
 if __name__ == "__main__":

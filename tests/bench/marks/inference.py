@@ -1,11 +1,12 @@
-"""Marks and image together, on thin, curved and branched structures as well as on blobs: Dice with the truth, and whether what a
-run expects of itself holds.
+"""Marks and image together, on thin, curved and branched structures as well as on blobs: Dice with the truth, and whether a run's
+own prediction of its quality is correct.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/inference.py [--covol BINARY] [--only WORDS] [--draws N]
 
-300 and 60 marks are drawn by area from the truth's surface, 20 are spread over its outlines in three planes; each is off by up
-to half a voxel an axis. inference_draws.csv has each run, inference.md the medians and worst ones, and three figures: in how many
-runs the truth lies in the interval that `expected_dice` states, how many results below 0.8 are warned of, and how many above 0.9.
+300 and 60 marks are random points of the truth's surface, uniform by area; 20 are spread over its outlines in three planes. Each
+is off by up to half a voxel along each axis. inference_draws.csv has each run, inference.md the medians and worst ones, and three
+figures: the number of runs whose true Dice lies in the interval that `expected_dice` states, and the numbers of results below 0.8,
+and above 0.9, that have a warning.
 """
 import os
 import sys
@@ -20,7 +21,7 @@ COUNTS = (20, 60, 300)
 BAD, GOOD = 0.8, 0.9
 WARNING = "the body is likely not found well"
 KEPT_ASIDE = {"caudate, right", "ventricle, left", "thalamus", "liver", "aorta", "worm nucleus 81", "hippocampus 2", "vertebra",
-              "mouse nucleus 395", "embryo nucleus 6", "hippocampus, posterior"}  # the method was not made on these
+              "mouse nucleus 395", "embryo nucleus 6", "hippocampus, posterior"}  # not used while the method was developed
 
 
 def run(bench, structure, marks, *options):
@@ -46,12 +47,12 @@ def measure(bench):
 
 
 def calibration(rows, name):
-    told = [r for r in rows if r.get("expected") is not None and r["code"] == 0]
-    if not told:
+    reported = [r for r in rows if r.get("expected") is not None and r["code"] == 0]
+    if not reported:
         return f"{name}: no run states what it expects."
-    inside = [r["low"] <= r["dice"] <= r["high"] for r in told]
-    bad, good = ([r["warned"] for r in told if keep(r["dice"])] for keep in (lambda d: d < BAD, lambda d: d > GOOD))
-    return (f"{name}: of {len(told)} runs {100 * np.mean(inside):.0f} % lie in their interval; {sum(bad)} of {len(bad)} below {BAD} "
+    inside = [r["low"] <= r["dice"] <= r["high"] for r in reported]
+    bad, good = ([r["warned"] for r in reported if keep(r["dice"])] for keep in (lambda d: d < BAD, lambda d: d > GOOD))
+    return (f"{name}: of {len(reported)} runs {100 * np.mean(inside):.0f} % lie in their interval; {sum(bad)} of {len(bad)} below {BAD} "
             f"are warned of, {sum(good)} of {len(good)} above {GOOD}.")
 
 
@@ -66,9 +67,9 @@ def main():
     both = [r for r in rows if r["method"] == "marks and image"]
     alone = {(r["structure"], r["marks"], r["draw"]): r["dice"] for r in rows if r["method"] == "marks alone"}
     worse = [r for r in both if r["dice"] < alone[r["structure"], r["marks"], r["draw"]] - 0.005]
-    told = [t | {"what": f"{t['marks']} marks, {t['method']}"} for t in summary(rows, ("structure", "marks", "method"))]
+    reported = [t | {"what": f"{t['marks']} marks, {t['method']}"} for t in summary(rows, ("structure", "marks", "method"))]
     aside = [r for r in both if r["structure"] in KEPT_ASIDE]
-    bench.write_text("# Marks and image: Dice, median / worst of the draws", pivot(told, ("structure",), "what", dice_cell),
+    bench.write_text("# Marks and image: Dice, median / worst of the draws", pivot(reported, ("structure",), "what", dice_cell),
                      f"The image makes {len(worse)} of {len(both)} runs worse than the marks alone by more than 0.005.",
                      calibration(both, "All structures"), calibration(aside, "Structures kept aside"))
     return 0

@@ -21,7 +21,7 @@ panel.onPicture = (axis) => { put?.(axis); requestAnimationFrame((now) => window
 
 
 def scroll(browser, axis, slices, pause=0.02):
-    """Different slices that were seen in a second while the wheel turns one slice every `pause` seconds."""
+    """Number of different slices displayed per second while the wheel turns one slice every `pause` seconds."""
     browser.driver.execute_script(COUNT, axis)
     box = browser.js("const b = mark.panels[arguments[0]].canvas.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]", axis)
     chain = browser.actions()
@@ -35,7 +35,7 @@ def scroll(browser, axis, slices, pause=0.02):
     end, last = browser.js("return performance.now()"), browser.js("return mark.panels[arguments[0]].at", axis)
     seen = browser.js("return window.seen")
     places = [place for n, (_, place, _) in enumerate(seen) if n == 0 or seen[n - 1][1] != place]
-    # Slices of a coarse level have the same picture.
+    # Slices within one voxel of a coarse level have the same picture.
     thick = browser.js("const p = mark.panels[arguments[0]]; return mark.slices.thickness(arguments[0], p.slice.step)", axis)
     seconds = (end - begin) / 1000
     gaps = [b[0] - a[0] for a, b in zip(seen, seen[1:])]
@@ -43,7 +43,7 @@ def scroll(browser, axis, slices, pause=0.02):
 
 
 def mark_ball(browser, count=30, timed=10):
-    """Clicks all around the ball of large_image.py; seconds from each of the last clicks to its first and its refined outline."""
+    """Clicks all around the ball of large_image.py. @return for the last clicks, seconds from the click to its first and its refined outline"""
     rng, first, refined = np.random.default_rng(3), [], []
     for n in range(count):
         direction = rng.normal(size=3)
@@ -52,7 +52,7 @@ def mark_ball(browser, count=30, timed=10):
         browser.go(index.tolist())
         browser.js("const p = mark.panels[2]; p.setView({zoom: 8, x: arguments[0][0], y: arguments[0][1]}); p.draw()", index.tolist())
         browser.wait("return mark.slices.underWay.size === 0")
-        sequence = browser.js("return mark.study.seq") + 1 + (n == 0)  # the first click makes the structure
+        sequence = browser.js("return mark.study.seq") + 1 + (n == 0)  # the first click also creates the structure
         browser.click(2, index.tolist())
         browser.wait("return mark.study.seq >= arguments[0]", sequence)
         if n < count - timed:
@@ -84,20 +84,20 @@ def main():
             print(f"first pictures {time.perf_counter() - program.began:.2f} s after the start, of which the program took {ready:.2f} s", flush=True)
             for axis in (2, 1, 0):
                 browser.wait("return mark.slices.underWay.size === 0")
-                shown, asked, gap = scroll(browser, axis, options.slices)
-                print(f"plane {axis}: {shown:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+                shown, requested, gap = scroll(browser, axis, options.slices)
+                print(f"plane {axis}: {shown:.1f} slices a second seen of {requested:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
             browser.js("const p = mark.panels[2]; p.zoomAt(30)")
             begin = time.perf_counter()
             browser.wait("const p = mark.panels[2]; return p.layer.hasFine || p.slice.step === 1")
             print(f"zoomed in: {time.perf_counter() - begin:.2f} s")
-            shown, asked, gap = scroll(browser, 2, options.slices)
-            print(f"plane 2, zoomed in: {shown:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+            shown, requested, gap = scroll(browser, 2, options.slices)
+            print(f"plane 2, zoomed in: {shown:.1f} slices a second seen of {requested:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
             if not options.image or options.ball:
                 first, refined = mark_ball(browser)
                 print(f"from a click to the first outline {np.median(first):.2f} s (at most {max(first):.2f}), to the refined one {np.median(refined):.2f} s (at most {max(refined):.2f})", flush=True)
             if options.shot:
                 browser.driver.save_screenshot(options.shot)
-            browser.tell_memory(program)
+            browser.print_memory(program)
         finally:
             program.close()
     finally:

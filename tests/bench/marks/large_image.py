@@ -1,8 +1,9 @@
-"""An OME-Zarr of 2048 x 2048 x 2048 voxels of 8 bits with a pyramid, of which only some chunks are made: the others are links to them.
+"""An OME-Zarr of 2048 x 2048 x 2048 voxels of 8 bits with a pyramid, of which only some chunks are created: the others are links
+to them.
 
     /usr/bin/python3 tests/bench/marks/large_image.py FOLDER.zarr
 
-A bright ball in noise; SIZE, CENTRE and RADIUS say where it is, in voxels.
+A bright ball in noise; SIZE, CENTRE and RADIUS are in voxels.
 """
 import itertools
 import json
@@ -30,7 +31,7 @@ def write_level(folder, level, rng):
     def pack(values):
         return zlib.compress(np.clip(values + rng.normal(0, noise, values.shape), 0, 255).round().astype(np.uint8).tobytes(), 1)
 
-    # A slow wave that every chunk has, so that slices differ from each other.
+    # A slow wave that is the same in every chunk, so that neighbouring slices differ.
     wave = 12 * np.sin(2 * np.pi * (np.arange(CHUNK) + 0.5) / CHUNK)
     background = DARK + (wave[:, None, None] + wave[None, :, None] + wave) / 3
     variants = []

@@ -1,4 +1,4 @@
-"""How long `covol mark` takes from a click to the first and to the refined surface, on images with truth.
+"""The time that `covol mark` takes from a click to the first and to the refined surface, on images with truth.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/latency.py [--covol BINARY] [--only WORDS]
 

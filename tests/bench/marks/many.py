@@ -2,8 +2,8 @@
 
     /usr/bin/python3 tests/bench/marks/many.py [--covol BINARY] [--count 200] [--marks 12]
 
-The structures are ellipsoids in noise, as nuclei of a tissue. The study is made first and all its surfaces are found; then the
-program is killed, and started again.
+The structures are ellipsoids in noise, like the nuclei of a tissue. First the study is made and all its surfaces are computed;
+then the program is killed and started again.
 """
 import argparse
 import pathlib
@@ -21,7 +21,7 @@ APART, DEPTH, RADII = 30, 40, (10, 11, 9)  # voxels; x y z
 
 
 def make_image(path, count, rng):
-    """Middles of the ellipsoids, voxels."""
+    """Centres of the ellipsoids, voxels."""
     columns = 20
     rows = -(-count // columns)
     x, y, z = np.arange(columns * APART), np.arange(rows * APART), np.arange(DEPTH)
@@ -39,7 +39,7 @@ def make_image(path, count, rng):
 
 
 def begin(covol, image, study, count, marks):
-    """Makes the study; the seconds until all of its surfaces are there, and how many failed."""
+    """Makes the study. @return the seconds until all of its surfaces are there, and how many failed"""
     rng = np.random.default_rng(4)
     middles = make_image(image, count, rng)
     program = Program(covol, image, study=study)
@@ -72,7 +72,7 @@ def shown(browser, count, seconds=300):
 
 
 def click_to_outline(browser, count):
-    """Medians, seconds: from a click beside a structure's surface to its first outline, and from the key z to the picture without the mark."""
+    """Medians in seconds: from a click near a structure's surface to its first outline, and from the key z to the picture without the mark."""
     first, undone = [], []
     for n in range(count):
         browser.js("mark.state.set({active: mark.study.structures[arguments[0]].id})", n)
@@ -116,13 +116,13 @@ def main():
                 shown(browser, options.count - failed)
                 print(f"all surfaces after {time.perf_counter() - program.began:.2f} s", flush=True)
                 for axis in (2, 1, 0):
-                    frames, asked, gap = scroll(browser, axis, 40)
-                    print(f"plane {axis}: {frames:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+                    frames, requested, gap = scroll(browser, axis, 40)
+                    print(f"plane {axis}: {frames:.1f} slices a second seen of {requested:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
                 first, undone = click_to_outline(browser, 10)
                 print(f"from a click to the outline {first:.2f} s, from z to the picture without the mark {undone:.3f} s (medians)", flush=True)
                 if options.shot:
                     browser.driver.save_screenshot(options.shot)
-                browser.tell_memory(program)
+                browser.print_memory(program)
             finally:
                 program.close()
         finally:

@@ -1,14 +1,14 @@
-"""Sections of meshes in planes of any direction: how near does covol's body between them come?
+"""Sections of meshes in planes of any direction: how accurate is covol's body between them?
 
     /usr/bin/python3 tests/bench/marks/networks.py MESH.stl... [--covol BINARY] [--planes 12] [--draws 3]
 
-Each mesh is cut by planes in one family of parallel ones, in two and three families at right angles, and in random
-directions; the sections are written as a .csl file, and `covol reconstruct --contours` makes the body. Of every arrangement
-the rival is shape-based interpolation (covol's own between parallel contours: Raya and Udupa 1990, Herman et al. 1992) of its
-largest family, where it has parallel planes, else of as many parallel planes. Told are the mean distance between the surfaces, both ways, in per
-cent of the mesh's diagonal, pieces and genus, and CPU seconds.
+Each mesh is cut by planes in one family of parallel ones, in two and three families at right angles, and in random directions; the
+sections are written as a .csl file, and `covol reconstruct --contours` makes the body. Each arrangement is compared with
+shape-based interpolation (covol's own between parallel contours: Raya and Udupa 1990, Herman et al. 1992) of its largest family of
+parallel planes, or, if it has none, of as many parallel planes. Reported are the mean distance between the surfaces, both ways, in
+per cent of the mesh's diagonal, pieces and genus, and CPU seconds.
 
-Meshes that are meant: `eight`, `hand`, `ok` and `mammoth` of https://github.com/iamsalvatore/cross_sdf (MIT).
+Meshes to use: `eight`, `hand`, `ok` and `mammoth` of https://github.com/iamsalvatore/cross_sdf (MIT).
 """
 import argparse
 import json
@@ -27,7 +27,7 @@ from tables import markdown  # noqa: E402
 
 
 def read_stl(path):
-    """Vertices and triangles of a binary STL; equal corners are one vertex."""
+    """Vertices and triangles of a binary STL; equal corners become one vertex."""
     data = pathlib.Path(path).read_bytes()
     count = int.from_bytes(data[80:84], "little")
     rows = np.frombuffer(data, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("two", "<u2")]), count, 84)
@@ -36,9 +36,9 @@ def read_stl(path):
 
 
 def cut(vertices, faces, normal, offset):
-    """The loops in the plane normal . x = offset, without vertices that lie nearer than a thousandth of the extent."""
+    """The loops in the plane normal . x = offset, without vertices that are closer than a thousandth of the extent."""
     height = vertices @ normal - offset
-    height[height == 0] = 1e-12  # no vertex lies in the plane
+    height[height == 0] = 1e-12  # so that no vertex lies in the plane
     above = height[faces] > 0
     crossed = faces[above.any(1) & ~above.all(1)]
     to = {}
@@ -53,13 +53,13 @@ def cut(vertices, faces, normal, offset):
                 ends.append((key, height[a] > 0))
         start, end = (ends[0][0], ends[1][0]) if ends[0][1] else (ends[1][0], ends[0][0])
         to[start] = end
-    least = 1e-3 * np.ptp(vertices, axis=0).max()
+    minimum = 1e-3 * np.ptp(vertices, axis=0).max()
     loops = []
     while to:
         first, key = to.popitem()
         loop = [places[first]]
         while key in to:
-            if np.linalg.norm(places[key] - loop[-1]) > least:
+            if np.linalg.norm(places[key] - loop[-1]) > minimum:
                 loop.append(places[key])
             key = to.pop(key)
         if len(loop) >= 4:
@@ -87,7 +87,7 @@ def parallel(vertices, normal, count):
 
 
 def arrangements(vertices, count, rng):
-    """By name: planes, and those of the rival."""
+    """By the arrangement's name: its planes, and those for the other method."""
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0].T
     yield "one family", parallel(vertices, axes[0], count), parallel(vertices, axes[0], count)
     for name, families in (("two families", 2), ("three families", 3)):
@@ -110,7 +110,7 @@ def on_surface(vertices, faces, count, rng):
 
 
 def reconstruct(options, folder, planes, mesh, rng):
-    from scipy.spatial import cKDTree  # exact enough between dense samples
+    from scipy.spatial import cKDTree  # accurate enough between dense samples
     vertices, faces = mesh
     cuts = [(normal, offset, cut(vertices, faces, normal, offset)) for normal, offset in planes]
     cuts = [one for one in cuts if one[2]]
@@ -129,7 +129,7 @@ def reconstruct(options, folder, planes, mesh, rng):
     count = 20000
     true, found = on_surface(*mesh, count, rng), on_surface(*read_stl(folder / "s.stl"), count, rng)
     error = (cKDTree(true).query(found)[0].mean() + cKDTree(found).query(true)[0].mean()) / 2
-    floor = cKDTree(true).query(on_surface(*mesh, count, rng))[0].mean()  # of two samples of one surface
+    floor = cKDTree(true).query(on_surface(*mesh, count, rng))[0].mean()  # mean distance between two samples of one surface
     return {"error, %": 100 * max(error - floor, 0) / diagonal, "pieces": surface["components"], "genus": surface["genus"],
             "CPU s": round(seconds, 1)}
 

@@ -1,10 +1,11 @@
-"""What a person gets from `covol mark` with a number of clicks: true mouse and key events in headless Chromium, on images with truth.
+"""The result of `covol mark` after a number of clicks by a simulated person: real mouse and key events in headless Chromium, on
+images with truth.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/person.py [--covol BINARY] [--only WORDS] [--seeds N] [--shots FOLDER]
 
-The person begins with marks all around the structure, on its outlines in three planes through its middle, then turns through
-some slices of each plane, and clicks where the border lies farthest from the outline that the page shows; each third mark is
-set where the page suggests one (key n). All clicks are off by up to half a voxel. The mask comes from the page's menu.
+The person begins with marks all around the structure, on its outlines in three planes through its middle, then looks at some
+slices of each plane, and clicks at the point of the border that is farthest from the displayed outline; each third mark is set at
+the page's suggestion (key n). All clicks are off by up to half a voxel. The mask is saved with the page's menu.
 """
 import argparse
 import base64
@@ -19,12 +20,12 @@ import annotator
 import truth
 from browser import Browser, Program
 
-# structure, clicks, outlines of twelve corners on slices of its own
+# structure, number of clicks, number of outlines, each with twelve corners on a slice of its own
 JOBS = (("embryo nucleus 2", 20, 0), ("ventricle", 60, 0), ("spleen", 40, 3))
-FIRST = 9          # marks in three planes before there is an outline to look at
-SLICES = 8         # that the person looks at in each plane before a click
+FIRST = 9          # marks in three planes before the first outline is displayed
+SLICES = 8         # in each plane, which the person looks at before a click
 CORNERS = 12
-PIXELS = 4         # of the screen for a voxel, by zooming
+PIXELS = 4         # of the screen per voxel, by zooming
 MESH = """
 const mesh = mark.meshes.items.get(mark.study.structures[0].id), bytes = new Uint8Array(Float32Array.from(mesh.positions).buffer);
 let text = ''; for (let n = 0; n < bytes.length; n += 8192) text += String.fromCharCode(...bytes.subarray(n, n + 8192));
@@ -42,7 +43,7 @@ class Person:
         self.marked = []  # voxels
 
     def zoom(self):
-        """The structure's middle in each plane, a voxel on some pixels, by Ctrl and the wheel."""
+        """Shows the structure's middle in each plane, zoomed by Ctrl and the wheel to some pixels per voxel."""
         middle = [float(np.median(a)) for a in np.nonzero(self.structure.truth)][::-1]
         self.browser.go([round(m) for m in middle])
         for axis in (2, 1, 0):
@@ -55,7 +56,7 @@ class Person:
                 self.browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {"type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": -120, "modifiers": 2})
 
     def click(self, exact, axis, tool=True):
-        """Near a place of the border on a slice of that axis. Whether a mark was set: where there is one, it would be dragged."""
+        """Clicks near a position of the border on a slice of that axis. @return whether a mark was set: an existing one nearby would be dragged"""
         index = np.array(exact, float)
         index += self.rng.uniform(-annotator.IMPRECISION, annotator.IMPRECISION, 3)
         index = np.clip(index, 0, self.structure.sizes - 1)
@@ -69,7 +70,7 @@ class Person:
         return True
 
     def outline_seen(self):
-        """Vertices of the surface whose outlines the page shows, voxels; none yet: None."""
+        """Vertices, in voxels, of the surface whose outlines the page shows; None if there is none yet."""
         self.browser.wait("return mark.queue.waiting === 0")
         sequence = self.browser.js("return mark.study.seq")
         self.browser.wait("const s = mark.study.structures[0], r = s.result; return r && (r.stage === 'empty' || r.stage === 'failed' || "
@@ -101,7 +102,7 @@ class Person:
         self.browser.actions().send_keys("s").perform()
 
     def on_slices(self):
-        """Places of the true border on some slices of each plane, the plane in which each is seen, and these slices."""
+        """Positions on the true border in some slices of each plane, the plane of each, and these slices."""
         places, axes, slices = [], [], []
         for axis in range(3):
             first, last = self.structure.slices(axis)
@@ -113,12 +114,12 @@ class Person:
         return np.concatenate(places), np.concatenate(axes), slices
 
     def where_it_differs(self, seen):
-        """Where on these slices border and outline lie farthest apart: a place of the border, and its plane."""
+        """The position, in these slices, at which border and outline differ most: a point of the border, and its plane."""
         spacing = self.structure.spacing
         places, axes, slices = self.on_slices()
         missed = cKDTree(seen * spacing).query(places * spacing)[0]
         border = cKDTree(places * spacing)
-        # Outline where there is no border: the person clicks on the border that is nearest to it.
+        # If the largest difference is at an outline far from the border, the person clicks on the nearest point of the border.
         near = np.any([np.abs(seen[:, axis] - k) < 0.5 for axis, k in slices], axis=0)
         beyond, nearest = self.structure.surface_tree.query(seen[near] * spacing)
         if len(beyond) and beyond.max() > missed.max():
@@ -127,8 +128,8 @@ class Person:
             worst = missed.argmax()
         return places[worst], int(axes[worst])
 
-    def where_it_asks(self):
-        """Of the border, what is nearest to the page's suggestion in the planes that it brings there; None: there is none."""
+    def suggested_position(self):
+        """The point of the border that is nearest to the page's suggestion, in the planes that the page then shows; None: no suggestion."""
         self.browser.actions().send_keys("n").perform()
         self.browser.wait("return !mark.state.get('isAsking')")
         ring = self.browser.js("const r = mark.state.get('ring'); return r && mark.space.toIndex(r.world)")
@@ -149,17 +150,17 @@ class Person:
         while len(self.marked) < count and tries < 4 * count:
             tries += 1
             seen = self.outline_seen()
-            asked = self.where_it_asks() if seen is not None and tries % 3 == 0 else None
+            suggested = self.suggested_position() if seen is not None and tries % 3 == 0 else None
             if seen is None:
                 places, axes, _ = self.on_slices()
                 n = self.rng.integers(len(places))
                 self.click(places[n], axes[n])
-            elif not self.click(*(asked or self.where_it_differs(seen))):
+            elif not self.click(*(suggested or self.where_it_differs(seen))):
                 self.browser.actions().send_keys("\ue00c").perform()  # Escape
 
 
 def save_mask(browser, folder):
-    """By the page's menu, as a person saves it."""
+    """Saves the mask with the page's menu, as a person does."""
     from selenium.webdriver.common.by import By
     browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": folder})
     browser.driver.find_element(By.CSS_SELECTOR, "button[aria-label^='export']").click()
@@ -208,8 +209,8 @@ def main():
             continue
         for seed in range(options.seeds):
             score, expected, set_marks = measure(options.covol, structures[name], clicks, outlines, seed, options.shots)
-            told = f"{expected['value']:.3f} ({expected['low']:.3f} to {expected['high']:.3f})" if expected else "none"
-            print(f"| {name} | {set_marks} | {outlines} | {score['dice']:.3f} | {score['p95']:.1f} voxels | {told} |", flush=True)
+            reported = f"{expected['value']:.3f} ({expected['low']:.3f} to {expected['high']:.3f})" if expected else "none"
+            print(f"| {name} | {set_marks} | {outlines} | {score['dice']:.3f} | {score['p95']:.1f} voxels | {reported} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""What people have: methods that know the image, the marks, or both, from the same marks as covol.
+"""Established methods that use the image, the marks, or both, with the same marks as covol.
 
 Random walker, watershed and grow-from-seeds need regions inside and outside, not marks on the border. A person who knows the
-border at the marks paints them on both sides of it; here the variational surface through the marks plays that person: inside
-is what lies deeper below it than w, outside what lies higher above it. w is the mean distance from that surface to the nearest
-mark, for so far it may be wrong; at least 1.5 voxels, at most half of its greatest depth, so that something is left inside.
-The image is smoothed by a Gaussian of a voxel and cut to the range that it has in the gap (1 % to 99 %).
+border at the marks would paint such regions on both sides of it; here they are made from the variational surface through the
+marks: positions deeper than w below it are inside, positions higher than w above it outside. w is the mean distance from that
+surface to the nearest mark, since its error may be that large; at least 1.5 voxels, and at most half of the body's greatest depth,
+so that some inside is left. The image is smoothed by a Gaussian of one voxel and clipped to its range in the gap (1 % to 99 %).
 """
 import dataclasses
 
@@ -17,7 +17,7 @@ from skimage.segmentation import random_walker, watershed
 
 from variational import Surface
 
-MANY_VOXELS = 1_500_000  # in the box of the gap: beyond that, those three work on every second voxel of each axis
+MANY_VOXELS = 1_500_000  # in the box of the gap; if there are more, these three methods use every second voxel along each axis
 
 
 # ---- solids from functions ---------------------------------------------------------------------------------------
@@ -25,15 +25,15 @@ MANY_VOXELS = 1_500_000  # in the box of the gap: beyond that, those three work 
 def where_negative(function, structure, margin):
     """Mask of the voxels where a function of world positions is < 0, in the box of the marks and `margin` (world) around it.
 
-    It is asked on a coarse lattice first, and everywhere only in cells near a change of its sign."""
+    It is evaluated on a coarse lattice first, and at every voxel only in cells near a change of sign."""
     low, high = margin
     low = np.maximum(np.floor(low / structure.spacing), 0).astype(int)
     high = np.minimum(np.ceil(high / structure.spacing), structure.sizes - 1).astype(int) + 1
     stride = np.maximum(1, np.round(4 * structure.h / structure.spacing)).astype(int)
     if np.prod(high - low) < 100_000:
         stride[:] = 1
-    lattice = [np.arange(a, b + s, s) for a, b, s in zip(low, high, stride)]  # beyond the end: every voxel lies in a cell
-    coarse = _ask(function, structure, lattice)
+    lattice = [np.arange(a, b + s, s) for a, b, s in zip(low, high, stride)]  # reaches beyond the end, so that every voxel lies in a cell
+    coarse = _evaluate(function, structure, lattice)
     if (stride == 1).all():
         inside = coarse[:-1, :-1, :-1]
     else:
@@ -48,18 +48,18 @@ def where_negative(function, structure, margin):
     return mask
 
 
-def _ask(function, structure, lattice):
+def _evaluate(function, structure, lattice):
     z, y, x = np.meshgrid(*[structure.spacing[a] * lattice[a] for a in (2, 1, 0)], indexing="ij")
     return (function(np.stack([x.ravel(), y.ravel(), z.ravel()], 1)) < 0).reshape(x.shape)
 
 
 def _all_corners(lattice):
-    """Of the cell that begins at a lattice point."""
+    """The voxels of the cell that begins at a lattice point."""
     return ndimage.minimum_filter(lattice.astype(np.uint8), 2, origin=-1).astype(bool)
 
 
 def _box(structure, marks):
-    """Of the marks, and a third of their extent around it, world units."""
+    """Bounding box of the marks, extended by a third of its size, world units."""
     world = marks * structure.spacing
     around = (world.max(0) - world.min(0)).max() / 3
     return world.min(0) - around, world.max(0) + around
@@ -85,15 +85,15 @@ def convex_hull(structure, marks):
 
 @dataclasses.dataclass
 class Seeds:
-    image: np.ndarray   # of the box, smoothed
+    image: np.ndarray   # within the box, smoothed
     labels: np.ndarray  # 1 inside, 2 outside, 0 the gap between them
     spacing: np.ndarray
-    mask: np.ndarray    # of the whole image: the inside, and what lies inside beyond the box
+    mask: np.ndarray    # of the whole image: the inside, including that beyond the box
     box: tuple
-    step: int           # of the voxels of the box that image and labels have
+    step: int           # between the voxels of the box that image and labels contain
 
     def solid(self, inside):
-        """Of the whole image, from a mask like labels."""
+        """A mask of the whole image from one with the shape of `labels`."""
         mask = self.mask.copy()
         part = mask[self.box]
         for axis in range(3):
@@ -103,11 +103,11 @@ class Seeds:
 
 
 def seeds(structure, marks, guess):
-    """@param guess  mask of the variational surface through the marks; None where that is empty"""
+    """@param guess  mask of the variational surface through the marks. @return None if that is empty"""
     spacing = structure.spacing[::-1]
     if not guess.any() or guess.all():
         return None
-    # The gap is at most half the depth, and that at most a quarter of the extent: nothing farther out is needed.
+    # The gap is at most half the depth, which is at most a quarter of the extent: nothing farther out is needed.
     around = ndimage.find_objects(guess)[0]
     room = min((s.stop - s.start) * h for s, h in zip(around, spacing)) / 4 + 3 * structure.h
     around = tuple(slice(max(0, s.start - int(room / h) - 1), s.stop + int(room / h) + 1) for s, h in zip(around, spacing))
@@ -128,23 +128,23 @@ def seeds(structure, marks, guess):
 
 
 def walk(given):
-    """Random walker (Grady 2006), scikit-image's, beta its default."""
+    """Random walker (Grady 2006) of scikit-image, with its default beta."""
     labels = given.labels.astype(np.int32)
     far = ndimage.minimum_filter(labels, 3) == ndimage.maximum_filter(labels, 3)
-    labels[far & (labels > 0)] = -1  # seeds that touch no gap: not in the system
+    labels[far & (labels > 0)] = -1  # seeds that do not touch the gap are left out of the system
     won = random_walker(given.image, labels, mode="cg_j", spacing=given.spacing / given.spacing.min(), tol=1e-3)
     return given.solid((won == 1) | (given.labels == 1))
 
 
 def flood(given):
-    """Watershed of the slope from the seeds as markers, scikit-image's."""
+    """Watershed of the gradient magnitude with the seeds as markers, scikit-image's."""
     slope = ndimage.generic_gradient_magnitude(given.image, lambda a, axis, *rest: ndimage.sobel(a, axis) / given.spacing[axis])
     return given.solid(watershed(slope, given.labels.astype(np.int32)) == 1)
 
 
 def grow(given):
-    """Grow from seeds: a voxel belongs to the seed from which the way to it crosses the least change of brightness (the shortest
-    paths of Zhu and others' fast GrowCut, which 3D Slicer has)."""
+    """Grow from seeds: a voxel belongs to the seed from which the path to it has the smallest change of brightness (the shortest
+    paths of the fast GrowCut of Zhu et al., as in 3D Slicer)."""
     number = np.arange(given.labels.size).reshape(given.labels.shape)
     rows, columns, costs = [], [], []
     for axis in range(3):
@@ -171,8 +171,8 @@ FROM_SEEDS = {"random walker": walk, "watershed": flood, "grow from seeds": grow
 # ---- contours ----------------------------------------------------------------------------------------------------
 
 def shape_based(structure, axis, contours):
-    """Shape-based interpolation (Raya and Udupa 1990): linear between the signed distances of marked slices. Beyond the first
-    and the last of them the body ends in a cone of 45 degrees. Contours are splines; one within another is a hole.
+    """Shape-based interpolation (Raya and Udupa 1990): linear between the signed distances of marked slices. Beyond the first and
+    the last of them the body ends in a cone of 45 degrees. Contours are splines; one within another is a hole.
     @param contours  [(slice, marks in order), ...] of draw_contours"""
     rest = [a for a in (2, 1, 0) if a != axis]
     shape = tuple(structure.sizes[rest])
@@ -190,7 +190,7 @@ def shape_based(structure, axis, contours):
 
 
 def spline(marks, fine=8):
-    """A closed curve through marks in order: cubic, over the root of the chords' lengths."""
+    """A closed curve through marks in order: cubic, parametrised by the square root of the chord lengths."""
     closed = np.concatenate([marks, marks[:1]])
     way = np.r_[0, np.cumsum(np.sqrt(np.linalg.norm(np.diff(closed, axis=0), axis=1)) + 1e-9)]
     return interpolate.CubicSpline(way, closed, bc_type="periodic")(np.linspace(0, way[-1], fine * len(marks), endpoint=False))

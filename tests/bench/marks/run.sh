@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Builds covol and measures how good few marks are; writes tables (.csv, .md) and curve.png into tests/bench/marks/results.
+# Builds covol and measures the quality of results from few marks; writes tables (.csv, .md) and curve.png into
+# tests/bench/marks/results.
 #
 #   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]      (PART: table contours curve bias cut silence correction inference wrong)
 #
-# Options are those of the scripts (table.py --help). What was measured with the same binary and the same scripts is not measured
-# again (build/marks). Table, contours, curve, silence, correction, inference and wrong need the images of COVOL_DATA and are skipped without them.
+# Options are those of the scripts (table.py --help). Results of the same binary and the same scripts are kept in
+# build/marks and not measured again. Table, contours, curve, silence, correction, inference and wrong need the images
+# of COVOL_DATA and are skipped without them.
 set -euo pipefail
 cd "$(dirname "$0")/../../.."
 

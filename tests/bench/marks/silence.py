@@ -1,9 +1,10 @@
-"""Mistakes on purpose: which of them covol refuses, which it warns of, and which pass without a word.
+"""Mistakes on purpose: which of them covol refuses, which it warns of, and which pass without a warning.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/silence.py [--covol BINARY] [--quick] [--check]
 
-Marks as in table.py, and the same after a mistake that people make. A result is wrong where its Dice with the truth is below
-0.8; a false alarm is a warning about right marks and a right result. silence_draws.csv has each run and the warnings' beginnings.
+Marks as in table.py, and the same after a mistake that people make. A result is wrong if its Dice with the truth is below 0.8; a
+false alarm is a warning about correct marks and a correct result. silence_draws.csv has each run and the beginnings of its
+warnings.
 """
 import dataclasses
 import re
@@ -26,7 +27,7 @@ def none(structure, marks, rng):
 
 
 def shifted(structure, marks, rng):
-    """By two thirds of the body, along the image's longest axis, to the side where there is room."""
+    """Shifted by two thirds of the body, along the image's longest axis, to the side with more space."""
     axis = int(np.argmax(structure.sizes * structure.spacing))
     low, high = marks[:, axis].min(), marks[:, axis].max()
     room_above = structure.sizes[axis] - 1 - high > low
@@ -44,22 +45,22 @@ def smaller(structure, marks, rng):
 
 
 def mirrored(structure, marks, rng):
-    """The left for the right, as between the conventions LPS and RAS."""
+    """Left and right exchanged, as between the conventions LPS and RAS."""
     return np.column_stack([structure.sizes[0] - 1 - marks[:, 0], marks[:, 1:]])
 
 
 def swapped(structure, marks, rng):
-    """z y x for x y z."""
+    """z y x instead of x y z."""
     return marks[:, ::-1]
 
 
 def world(structure, marks, rng):
-    """Lengths of the world for numbers of voxels."""
+    """World lengths instead of numbers of voxels."""
     return marks * structure.spacing
 
 
 def strays(structure, marks, rng):
-    """One mark in twenty, and at least one, lies anywhere in the image."""
+    """One mark in twenty, and at least one, is moved to a random position in the image."""
     wrong = rng.choice(len(marks), max(1, len(marks) // 20), replace=False)
     strayed = marks.copy()
     strayed[wrong] = rng.uniform(0, structure.sizes - 1, (len(wrong), 3))
@@ -74,7 +75,7 @@ MISTAKES = (none, shifted, larger, smaller, mirrored, swapped, world, strays, an
 
 
 def shuffled_image(structure, path):
-    """The image's grey values in any order: noise, as it is without the structure."""
+    """The image's grey values in random order: noise, as if the structure were missing."""
     values = annotator.generator(structure.name, "shuffled").permutation(structure.intensities.ravel()).reshape(structure.truth.shape)
     tifffile.imwrite(path, values.astype(np.float32), imagej=True, metadata={"axes": "ZYX", "spacing": structure.spacing[2]},
                      resolution=tuple(1 / structure.spacing[:2]))

@@ -1,10 +1,11 @@
-"""Few marks: covol and what people have, from the same 300, 60 and 20 marks, median and worst of ten draws.
+"""Few marks: covol and established methods, with the same 300, 60 and 20 marks; median and worst of ten draws.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/table.py [--covol BINARY] [--quick] [--check]
 
-300 and 60 marks are drawn by area from the truth's surface, 20 are spread over its outlines in three planes; each is off by up
-to half a voxel an axis, none lies on the image's end faces. "start" is covol's own, without a step of the flow. How the others
-get what they need from the marks: rivals.py. table.csv has a row for each structure, number and method, table_draws.csv all.
+300 and 60 marks are random points of the truth's surface, uniform by area; 20 are spread over its outlines in three planes. Each
+is off by up to half a voxel along each axis, and none lies on the image's end faces. "start" is covol's own start, without steps
+of the flow. rivals.py describes how the inputs of the other methods are made from the marks. table.csv has a row for each
+structure, number and method, table_draws.csv one for each run.
 """
 import sys
 
@@ -48,10 +49,10 @@ def measure(bench):
     return rows
 
 
-# ---- what has to hold --------------------------------------------------------------------------------------------
+# ---- acceptance criteria -----------------------------------------------------------------------------------------
 
 def judge(rows):
-    """Lines that say what holds and what does not."""
+    """Lines that state which criteria hold and which do not."""
     dice = {}
     for row in rows:
         dice.setdefault((row["structure"], row["marks"]), {}).setdefault(row["method"], {})[row["draw"]] = row["dice"]
@@ -83,13 +84,13 @@ def main():
         "--check", action="store_true", help="exit code 1 when something does not hold"))
     rows = measure(bench)
     bench.write("table_draws", rows)
-    told = summary(rows, ("structure", "marks", "method"))
-    bench.write("table", told)
+    reported = summary(rows, ("structure", "marks", "method"))
+    bench.write("table", reported)
     lines, (worse, starts) = judge(rows), below_start(rows)
     failed = [f"- {text}" for holds, text in lines if not holds]
     keys = ("structure", "marks")
-    bench.write_text("# Few marks: Dice, median / worst of the draws", pivot(told, keys, "method", dice_cell),
-                     "95 % distance between the surfaces in voxels, median / worst", pivot(told, keys, "method", p95_cell),
+    bench.write_text("# Few marks: Dice, median / worst of the draws", pivot(reported, keys, "method", dice_cell),
+                     "95 % distance between the surfaces in voxels, median / worst", pivot(reported, keys, "method", p95_cell),
                      starts, "\n".join([f"{len(failed)} of {len(lines)} expectations do not hold.", "", *failed]))
     return 1 if (failed or worse) and bench.options.check else 0
 

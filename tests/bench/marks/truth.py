@@ -1,7 +1,7 @@
 """Structures with their truth, and scores.
 
-Positions are voxels of the image, x y z, voxel centres at whole numbers; arrays are z y x. Lengths that are told are in voxels
-of the image's smallest spacing.
+Positions are voxels of the image, x y z, voxel centres at whole numbers; arrays are z y x. Reported lengths are in voxels of the
+image's smallest spacing.
 """
 import dataclasses
 import functools
@@ -25,9 +25,9 @@ class Structure:
     image: pathlib.Path
     truth: np.ndarray           # bool
     spacing: np.ndarray         # x y z
-    options: tuple = ()         # that covol needs to read the image
-    contour_axis: int = 2       # a person draws contours in slices across it: 0 x, 1 y, 2 z
-    large: bool = False         # fewer draws
+    options: tuple = ()         # with which covol can read the image
+    contour_axis: int = 2       # the axis across the slices in which a person draws contours: 0 x, 1 y, 2 z
+    large: bool = False         # if so, fewer draws
 
     @property
     def h(self):
@@ -51,9 +51,9 @@ class Structure:
         return cKDTree(self.surface[0] * self.spacing)
 
     def outlines(self, axis, k):
-        """Closed lines around the truth in slice k of an axis, an array of positions each; none on end faces."""
+        """Closed lines around the truth in slice k of an axis, an array of positions each; without parts on end faces."""
         image = np.take(self.truth, k, 2 - axis).astype(np.float32)
-        across = [a for a in (2, 1, 0) if a != axis]  # of the rows and columns of the slice
+        across = [a for a in (2, 1, 0) if a != axis]  # axes of the rows and columns of the slice
         lines = []
         for line in measure.find_contours(np.pad(image, 1), 0.5):
             positions = np.full((len(line), 3), float(k))
@@ -62,7 +62,7 @@ class Structure:
         return lines
 
     def slices(self, axis):
-        """The slices of an axis that the truth meets, first and last."""
+        """The first and the last slice of an axis that the truth meets."""
         met = np.flatnonzero(self.truth.any(axis=tuple(a for a in range(3) if a != 2 - axis)))
         return met[0], met[-1]
 
@@ -116,7 +116,7 @@ def structures(data):
                         np.array(file.header.get_zooms()[:3], float), (), axis, large)
 
 
-# Name, image, file with labels, labels (none: all), of several parts the largest alone.
+# Name, image, file with labels, labels (empty: all; if they have several parts, only the largest one counts).
 MORE = (("hippocampus", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", ()),
         ("hippocampus, anterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (1,)),
         ("hippocampus, posterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (2,)),
@@ -146,7 +146,7 @@ MORE = (("hippocampus", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (
 
 
 def more_structures(data):
-    """Others beside those of structures(): thin, curved and branched ones, and nuclei that touch."""
+    """Further structures: thin, curved and branched ones, and nuclei that touch."""
     images = pathlib.Path(data) / "images"
     for name, image, truth_file, labels in MORE:
         values = read_array(images / truth_file)
@@ -156,7 +156,7 @@ def more_structures(data):
 
 
 def by_name():
-    """All structures of the folder that COVOL_DATA names, which must be set."""
+    """All structures in the folder COVOL_DATA, which must be set."""
     data = os.environ.get("COVOL_DATA")
     if not data:
         raise SystemExit("skipped: COVOL_DATA is not set; it names the folder with the images and their truth")
@@ -164,7 +164,7 @@ def by_name():
 
 
 def spacing_of(path):
-    """x y z; of a file that stores none, 1."""
+    """x y z; 1 if the file has none."""
     if path.name.endswith(".nii.gz"):
         return np.array(nibabel.load(path).header.get_zooms()[:3], float)
     if path.suffix == ".nrrd":
@@ -184,7 +184,7 @@ def off_end_faces(structure, positions):
 
 
 class Lines:
-    """Outlines of a slice, walked along by their length in the world."""
+    """The outlines of a slice, parametrised by their length in the world."""
 
     def __init__(self, structure, lines):
         starts, ends, lengths = [], [], []
@@ -197,15 +197,15 @@ class Lines:
         self.total = float(self.lengths.sum())
 
     def at(self, way):
-        """Positions at these lengths from the beginning, round and round."""
+        """Positions at these lengths from the beginning, modulo the total length."""
         ends = np.cumsum(self.lengths)
         way = np.asarray(way, float) % self.total
         n = np.minimum(np.searchsorted(ends, way), len(ends) - 1)
-        share = 1 - (ends[n] - way) / self.lengths[n]
-        return self.starts[n] + share[:, None] * (self.ends[n] - self.starts[n])
+        fraction = 1 - (ends[n] - way) / self.lengths[n]
+        return self.starts[n] + fraction[:, None] * (self.ends[n] - self.starts[n])
 
     def even(self, count, first=0.0):
-        """`count` positions at equal distances; `first`: of the first one, in [0,1) of these."""
+        """`count` positions at equal distances; `first`: offset of the first one, in [0,1) of the distance."""
         return self.at((np.arange(count) + first) / count * self.total)
 
 
@@ -216,7 +216,7 @@ def dice(one, other):
 
 
 def score(structure, mask):
-    """Dice, and the larger of the two directed 95 % distances between the surfaces; 0 and no distance where nothing is there."""
+    """Dice, and the larger of the two directed 95 % distances between the surfaces; 0 and no distance if the mask is empty."""
     if mask is None or not mask.any():
         return {"dice": 0.0, "p95": math.inf}
     vertices = half_surface(mask)[0] * structure.spacing
@@ -226,5 +226,5 @@ def score(structure, mask):
 
 
 def some(positions, enough=20_000):
-    """Every n-th, so many that a percentile of them is one of all."""
+    """Every n-th point, as many as a percentile needs."""
     return positions[::max(1, len(positions) // enough)]

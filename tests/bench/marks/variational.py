@@ -1,9 +1,9 @@
-"""The surface through few marks that bends least, without normals: Huang, Carr and Ju, "Variational implicit point set
-surfaces", SIGGRAPH 2019. Dense linear algebra, for up to some hundred marks.
+"""The surface of minimum bending energy through few marks, without normals: Huang, Carr and Ju, "Variational implicit point set
+surfaces", SIGGRAPH 2019. Dense linear algebra, for up to a few hundred marks.
 
-f(x) = sum_j a_j |x-x_j|^3 + b_j . grad |x-x_j|^3 + c0 + c . x has the least energy J (of third derivatives) among all functions
-with given values s_j and gradients g_j at the marks. J is a quadratic form in (s, g). Sought are unit vectors g, and values s
-that may differ from zero by what the marks' imprecision allows: min  J(s, g) + |s|^2 / lambda.  f < 0 inside.
+f(x) = sum_j a_j |x-x_j|^3 + b_j . grad |x-x_j|^3 + c0 + c . x has the minimum energy J (of third derivatives) among all functions
+with given values s_j and gradients g_j at the marks. J is a quadratic form in (s, g). The unknowns are unit vectors g, and values
+s that may differ from zero because marks are imprecise: min J(s, g) + |s|^2 / lambda. f < 0 inside.
 """
 import numpy as np
 from scipy import linalg
@@ -11,7 +11,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
-LAMBDA = 0.03  # in a unit ball around the marks
+LAMBDA = 0.03  # with the marks scaled to a unit ball
 
 
 class Surface:
@@ -25,7 +25,7 @@ class Surface:
         self._kernel, self._linear = self._system()
         energy = self._energy()
         values, mixed, gradients = energy[:n, :n], energy[:n, n:], energy[n:, n:]
-        # The best values for given gradients are `follow @ g`; with them the energy is a form in g alone.
+        # For given gradients the best values are `follow @ g`; with them the energy is a quadratic form in g alone.
         follow = -linalg.solve(np.eye(n) + smoothing * values, smoothing * mixed, assume_a="pos")
         form = gradients + mixed.T @ follow
         normals = self._unit_vectors((form + form.T) / 2)
@@ -33,7 +33,7 @@ class Surface:
         self._point_outwards()
 
     def _system(self):
-        """Energy's kernel between values and gradients (4n x 4n), and the functions that cost nothing (4n x 4)."""
+        """The energy's kernel between values and gradients (4n x 4n), and the functions of zero energy (4n x 4)."""
         n = len(self.x)
         way = self.x[:, None] - self.x[None]
         r = np.linalg.norm(way, axis=2)
@@ -52,11 +52,11 @@ class Surface:
         return kernel, linear
 
     def _energy(self):
-        """J as a matrix: the kernel's inverse on what is orthogonal to the linear functions."""
+        """J as a matrix: the kernel's inverse on the orthogonal complement of the linear functions."""
         free = linalg.qr(self._linear, mode="economic")[0]
 
         def project(m):
-            """Away from the linear functions."""
+            """Projects onto the orthogonal complement of the linear functions."""
             return m - free @ (free.T @ m)
 
         inner = project(project(self._kernel).T)
@@ -71,7 +71,7 @@ class Surface:
         return project(project(inverse).T)
 
     def _unit_vectors(self, form):
-        """n unit vectors, one after the other in one array, with the least energy that descent finds from several starts."""
+        """n unit vectors in one array, with the minimum energy that descent finds from several starts."""
         n = len(self.x)
 
         def energy(free):

@@ -1,10 +1,10 @@
-"""Gross outliers among the marks: what they cost, and whether they are named.
+"""Gross outliers among the marks: their effect on Dice, and whether they are reported.
 
     COVOL_DATA=FOLDER /usr/bin/python3 tests/bench/marks/wrong.py [--covol BINARY] [--only WORDS] [--draws N]
 
-Of 60 or 300 marks none, 5 or 10 % are replaced by places drawn at random from the structure's box, widened by 0.3 of its sides.
-Those that happen to lie within 2.5 voxels of the true surface are not counted as wrong. wrong_draws.csv has each run, wrong.md the
-Dice coefficients and how many of the wrong marks, and of the right ones, were named (`inference.wrong_marks`).
+Of 60 or 300 marks 0, 5 or 10 % are replaced by random positions in the structure's box, widened by 0.3 of its sides. Those that
+happen to lie within 2.5 voxels of the true surface are not counted as wrong. wrong_draws.csv has each run, wrong.md the Dice
+coefficients and how many of the wrong marks, and of the correct ones, were reported (`inference.wrong_marks`).
 """
 import os
 import sys
@@ -22,7 +22,7 @@ MORE = ("hippocampus", "left atrium", "ventricle", "putamen", "iliac arteries", 
 
 
 def with_outliers(structure, marks, count, rng):
-    """The first marks, replaced; and which of all lie far from the truth."""
+    """Replaces the first marks. @return the marks, and which of them are far from the truth"""
     inside = np.argwhere(structure.truth)[:, ::-1]
     low, high = inside.min(axis=0), inside.max(axis=0)
     sides = high - low
@@ -66,7 +66,7 @@ def main():
                              if s.name in MORE and (not words or any(w in s.name for w in words))]
     rows = measure(bench)
     bench.write("wrong_draws", rows)
-    told = [t | {"what": f"{t['marks']} marks, {100 * t['fraction']:.0f} %"} for t in summary(rows, ("structure", "marks", "fraction"))]
+    reported = [t | {"what": f"{t['marks']} marks, {100 * t['fraction']:.0f} %"} for t in summary(rows, ("structure", "marks", "fraction"))]
     lines = []
     for count in COUNTS:
         right = {(r["structure"], r["draw"]): r["dice"] for r in rows if (r["marks"], r["fraction"]) == (count, 0)}
@@ -76,7 +76,7 @@ def main():
             lines.append(f"- {count} marks, {100 * fraction:.0f} % wrong: Dice {np.mean([r['dice'] for r in of]):.3f} in the mean, lost "
                          f"{np.median(lost):.3f} in the median, {max(lost):.3f} at most; {sum(r['named'] for r in of)} of "
                          f"{sum(r['wrong'] for r in of)} wrong marks are named, and {sum(r['named right'] for r in of)} right ones.")
-    bench.write_text("# Wrong marks: Dice, median / worst of the draws", pivot(told, ("structure",), "what", dice_cell), "\n".join(lines))
+    bench.write_text("# Wrong marks: Dice, median / worst of the draws", pivot(reported, ("structure",), "what", dice_cell), "\n".join(lines))
     return 0
 
 

@@ -7,16 +7,16 @@ def sample(vertices, triangles, count, random):
     corners = vertices[triangles]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     a, b, c = np.moveaxis(corners[random.choice(len(triangles), count, p=areas / areas.sum())], 1, 0)
-    root, share = np.sqrt(random.random((count, 1))), random.random((count, 1))
-    return a * (1 - root) + b * root * (1 - share) + c * root * share
+    root, fraction = np.sqrt(random.random((count, 1))), random.random((count, 1))
+    return a * (1 - root) + b * root * (1 - fraction) + c * root * fraction
 
 
 def cloud(mesh, count, noise=0, outliers=0, seed=1):
-    """(n x 3) points; the same places for all noises and outliers of a seed.
+    """(n x 3) points; for one seed the positions are the same with all values of noise and outliers.
 
     @param mesh      (vertices, triangles)
     @param noise     standard deviation along each axis, in % of the mesh's bounding box diagonal
-    @param outliers  in % of count, on top of it; uniform in the bounding box, which is 10 % longer than the mesh's
+    @param outliers in % of count, in addition to it; uniform in a box 10 % longer than the mesh's bounding box
     """
     vertices, triangles = mesh
     places, errors, strays = (np.random.default_rng([seed, stream]) for stream in range(3))

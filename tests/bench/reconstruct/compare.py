@@ -1,8 +1,10 @@
-"""covol reconstruct beside other programs: surfaces from points without normals, measured against the surface they were drawn from.
+"""covol reconstruct compared with other programs: surfaces from points without normals, measured against the surface from which
+the points were drawn.
 
-run.sh builds what this needs and calls it; README.md says what is measured. A cloud is drawn from each shape with each count of points,
-noise and share of outliers. A program with knobs runs with all the values that methods() gives and its best result counts (the
-smallest sum of both mean distances); covol runs once, as it comes. Writes results.csv and table.md (--scans: scans.csv, scans.md).
+run.sh builds what this needs and calls it; README.md describes the measures. A cloud is drawn from each shape with each number of
+points, noise and fraction of outliers. A program with parameters runs with all the values in methods(), and its best result counts
+(the smallest sum of both mean distances); covol runs once with its defaults. Writes results.csv and table.md (--scans: scans.csv,
+scans.md).
 """
 import argparse
 import csv
@@ -65,7 +67,7 @@ def methods(options):
 
 
 def knobs(steps):
-    """What tells a variant from others: its options with numbers."""
+    """The parameters that distinguish a variant from others: options with numbers."""
     words = [word for step in steps for word in shlex.split(step)]
     return " ".join(f"{a[2:]} {b}" for a, b in zip(words, words[1:]) if a.startswith("--") and b.isdigit())
 
@@ -74,9 +76,9 @@ def knobs(steps):
 
 @dataclasses.dataclass
 class Case:
-    columns: dict               # what names it
+    columns: dict               # the values that identify it
     cloud: pathlib.Path
-    truth: pathlib.Path | None  # none: a scan
+    truth: pathlib.Path | None  # None: a scan
 
 
 def truths(options):
@@ -117,11 +119,11 @@ class Made:
     path: pathlib.Path
     cpu: float = 0
     wall: float = 0
-    peak: int = 0  # bytes, of the step that needed most
+    peak: int = 0  # bytes, of the step that needed most memory
 
 
 class Trial:
-    """What is made of one cloud. A step that two variants begin with runs once."""
+    """The results for one cloud. A step that several variants have in common runs once."""
 
     def __init__(self, options, case, folder):
         self.options, self.case, self.folder = options, case, pathlib.Path(folder)
@@ -133,7 +135,7 @@ class Trial:
             before = self.make(steps[:-1])
             out = self.folder / f"{len(self.made)}.ply"
             command = [word.replace("{in}", str(before.path)).replace("{out}", str(out)) for word in shlex.split(steps[-1])]
-            # Threads that wait for others would count as CPU time.
+            # Busy waiting of threads would count as CPU time.
             run = Run(["prlimit", f"--cpu={self.options.timeout}", *command], OMP_WAIT_POLICY="passive")
             if not out.exists():
                 raise RuntimeError("wrote nothing")
@@ -158,7 +160,7 @@ def digest(*paths):
 
 
 def version(program):
-    """By content, covol's with that of its own library; what lies on PATH goes by its name."""
+    """A hash of the programs, covol's with its own library; programs on PATH are identified by their name."""
     if not pathlib.Path(program).exists():
         return program
     linked = subprocess.run(["ldd", program], capture_output=True, text=True).stdout.splitlines()
@@ -166,9 +168,9 @@ def version(program):
 
 
 def measured(options, case, trial, steps):
-    """A row of the table. What was measured of the same programs, cloud and truth is read again."""
-    told = [[version(shlex.split(step)[0]), *shlex.split(step)[1:]] for step in steps]
-    depends = [told, version(options.rivals), digest(case.cloud), case.truth and digest(case.truth), options.timeout]
+    """A row of the table. Results for the same programs, cloud and truth are read from a previous run."""
+    reported = [[version(shlex.split(step)[0]), *shlex.split(step)[1:]] for step in steps]
+    depends = [reported, version(options.rivals), digest(case.cloud), case.truth and digest(case.truth), options.timeout]
     known = pathlib.Path(options.work) / "known" / f"{hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:24]}.json"
     if not known.exists():
         known.parent.mkdir(parents=True, exist_ok=True)
@@ -181,14 +183,14 @@ def rank(result):
 
 
 def best(results):
-    """The one with the smallest sum of both mean distances; one that fails where all do."""
+    """The variant with the smallest sum of both mean distances; a failed one if all fail."""
     return min(results, key=rank)
 
 
 # ---- tables --------------------------------------------------------------------------------------------------------
 
 def summary(rows):
-    """A row for each method, over all cases; its errors and CPU time as multiples of covol's, case by case."""
+    """A row for each method, over all cases; its errors and CPU time relative to covol's, case by case."""
     by_method, cases = {}, {}
     for row in rows:
         case = tuple(row.get(column) for column in ("scan", "shape", "count", "noise", "outliers"))
@@ -196,14 +198,14 @@ def summary(rows):
     for method, found in by_method.items():
         good = {case: row for case, row in found.items() if "fails" not in row}
         whole = [row for row in good.values() if row["closed"] == "yes" and row["components"] == 1]
-        told = {"method": method, "cases": len(found), "fail": len(found) - len(good), "closed in one piece": len(whole)}
+        reported = {"method": method, "cases": len(found), "fail": len(found) - len(good), "closed in one piece": len(whole)}
         if "shape" in rows[0]:
-            told["these of the right genus"] = sum(row["genus"] == row["genus_truth"] for row in whole)
+            reported["these of the right genus"] = sum(row["genus"] == row["genus_truth"] for row in whole)
         for column in ("mean_to", "mean_from", "hausdorff", "normals", "cpu"):
             ratios = [row[column] / cases[case]["covol"][column] for case, row in good.items()
                       if column in row and cases[case].get("covol", {}).get(column)]
-            told[f"{column} / covol's, median"] = float(np.median(ratios)) if ratios else ""
-        yield told
+            reported[f"{column} / covol's, median"] = float(np.median(ratios)) if ratios else ""
+        yield reported
 
 
 def write(options, name, rows, head):
@@ -223,10 +225,10 @@ def write(options, name, rows, head):
 # ---- options -------------------------------------------------------------------------------------------------------
 
 def some(kind):
-    """A type of options: values between commas."""
+    """A type of options: values separated by commas."""
     def values(text):
         return [kind(word) for word in text.split(",") if word]
-    values.__name__ = f"{kind.__name__}s"  # argparse names it where a value is none
+    values.__name__ = f"{kind.__name__}s"  # argparse shows this name if a value is invalid
     return values
 
 
@@ -274,7 +276,7 @@ def drawn_in(panels, case, trial, found):
 
 def main():
     options = parsed()
-    head = provenance()  # with the load before
+    head = provenance()  # with the load before the measurements
     chosen, rows = methods(options), []
     panels = picture.Panels()
     for case in (scanned if options.scans else drawn)(options):

@@ -26,7 +26,7 @@ using Triangles = std::vector<Triangle>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 using Neighbours = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<Kernel>>;
-using json = nlohmann::ordered_json;  // columns of the table: in this order
+using json = nlohmann::ordered_json;  // keeps the order of the table's columns
 
 constexpr std::size_t samples = 200'000;
 
@@ -58,7 +58,7 @@ struct Sample {
     Vector normal;
 };
 
-/// Uniform by area; the same for the same triangles.
+/// Random samples, uniform by area; the same samples for the same triangles.
 std::vector<Sample> sample(const Triangles& triangles) {
     std::mt19937_64 random(1);
     std::vector<double> area;
@@ -84,7 +84,7 @@ struct OneWay {
     std::vector<double> lengths, angles;
 };
 
-/// From samples of a surface to the triangles of the other.
+/// Distances from samples of a surface to the triangles of the other one.
 OneWay one_way(const Triangles& from, const Tree& to) {
     OneWay found;
     for (const Sample& s : sample(from)) {
@@ -116,8 +116,8 @@ private:
     std::vector<std::size_t> parent_;
 };
 
-/// Of the triangles by their indices. Genus: from V - E + F = 2 components - 2 genus - boundary loops, where the mesh
-/// is a manifold (no edge of more than two triangles, no two fans at a vertex).
+/// Of the triangles, by their indices. The genus follows from V - E + F = 2 components - 2 genus - boundary loops if
+/// the mesh is a manifold (no edge with more than two triangles, no two fans at a vertex).
 json topology(const Ply& ply) {
     struct Edge {
         std::uint32_t a, b;              // a < b
@@ -179,7 +179,7 @@ json topology(const Ply& ply) {
 double spacing_of(const Neighbours::Tree& tree) {
     double sum = 0;
     for (const Point& p : tree) {
-        Neighbours search(tree, p, 7);  // itself comes first
+        Neighbours search(tree, p, 7);  // the point itself is the first one
         double own = 0;
         for (const auto& [q, squared] : search) own += std::sqrt(squared);
         sum += own / 6;

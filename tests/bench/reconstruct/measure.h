@@ -1,4 +1,4 @@
-// What a surface is worth: distances, normals, topology.
+// Quality of a surface: distances, normals, topology.
 #pragma once
 #include <nlohmann/json.hpp>
 
@@ -8,6 +8,6 @@
 /// box; mean angle between normals at nearest points, in degrees, without regard to orientation; topology of both.
 nlohmann::ordered_json measure(const Ply& mesh, const Ply& truth);
 
-/// Of a surface without a truth: the same distances, to the points it was made from; beyond_points is the share of it,
-/// in %, that is farther from all points than 3 times their mean distance to the 6 nearest.
+/// For a surface without a known truth: the same distances to the points from which it was made; beyond_points is the
+/// fraction of its area, in %, that is farther from all points than 3 times their mean distance to the 6 nearest.
 nlohmann::ordered_json measure_points(const Ply& mesh, const Ply& points);

@@ -1,4 +1,4 @@
-"""Surfaces beside each other: shaded, and coloured by how far each place lies from the true surface."""
+"""Surfaces side by side: shaded, and coloured by the distance of each point from the true surface."""
 import matplotlib
 import numpy as np
 from PIL import Image
@@ -8,13 +8,13 @@ matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 
 SIZE = 700           # pixels of a panel, along its longer side
-SAMPLES = 4_000_000  # points that a surface is drawn by
+SAMPLES = 4_000_000  # with which a surface is drawn
 LIGHT = np.array([0.4, 0.5, 0.77])
-FARTHEST = 0.2       # of the colours, in % of the diagonal
+FARTHEST = 0.2       # end of the colour scale, in % of the diagonal
 
 
 class Panels:
-    """A row for each cloud: its points, then what each method makes of them."""
+    """A row for each cloud: its points, then the result of each method."""
 
     def __init__(self):
         self.rows = []
@@ -30,12 +30,12 @@ class Panels:
         row = [(title, grid.draw(cloud @ axes.T, np.full((len(cloud), 3), 0.35)))]
         for name, vertices, triangles in surfaces:
             points, normals = _sampled(vertices, triangles, SAMPLES)
-            # To the plane of the nearest sample, as these lie farther apart than the surfaces.
+            # To the plane of the nearest sample, since samples are farther apart than the surfaces.
             distance, nearest = tree.query(points, workers=-1)
             off = np.minimum(distance, np.abs(((points - true_points[nearest]) * true_normals[nearest]).sum(1))) * 100 / diagonal
             colour = pyplot.get_cmap("turbo")(np.clip(off / FARTHEST, 0, 1))[:, :3]
             normals = normals @ axes.T
-            normals[normals[:, 2] < 0] *= -1  # what is seen faces who looks, whichever way a mesh is oriented
+            normals[normals[:, 2] < 0] *= -1  # visible surfaces face the viewer, whichever way a mesh is oriented
             shade = 0.25 + 0.75 * np.clip(normals @ LIGHT, 0, 1)
             row.append((f"{name}, {off.mean():.3f} %", grid.draw(points @ axes.T, colour * shade[:, None])))
         self.rows.append(row)
@@ -60,7 +60,7 @@ class Panels:
 
 
 class _Grid:
-    """Pixels of a panel; the last axis points to who looks."""
+    """The pixels of a panel; the last axis points to the viewer."""
 
     def __init__(self, low, high):
         self.low, self.scale = low, SIZE / (high - low)[:2].max()
@@ -70,14 +70,14 @@ class _Grid:
         column, row = ((points[:, :2] - self.low[:2]) * self.scale).astype(int).T
         kept = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
         pixel = (self.height - 1 - row[kept]) * self.width + column[kept]
-        order = np.argsort(points[kept, 2])  # the last one that is written is the nearest
+        order = np.argsort(points[kept, 2])  # the nearest point is written last
         picture = np.ones((self.height * self.width, 3))
         picture[pixel[order]] = colours[kept][order]
         return picture.reshape(self.height, self.width, 3)
 
 
 def _axes(vertices):
-    """Rows: the longest extent to the right, the next one up, a little turned so that depth shows."""
+    """Rows: the longest extent to the right, the next one up, rotated a little to show depth."""
     axes = np.linalg.svd(np.cov((vertices - vertices.mean(0)).T))[2]
     axes[2] = np.cross(axes[0], axes[1])
     turn = np.deg2rad(25)

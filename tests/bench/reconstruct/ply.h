@@ -7,7 +7,7 @@
 
 struct Ply {
     std::vector<std::array<double, 3>> points;
-    std::vector<std::array<double, 3>> normals;           ///< none, or one a point
+    std::vector<std::array<double, 3>> normals;           ///< empty, or one for each point
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices of points
 };
 

@@ -7,7 +7,7 @@ TYPES = {"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "<i2
 
 
 def read(path):
-    """(vertices, triangles); no triangles: an array of no rows. @throws ValueError where a face is no triangle"""
+    """(vertices, triangles); without triangles an array with no rows. @throws ValueError if a face is not a triangle"""
     with open(path, "rb") as file:
         layout, elements = _header(file)
         data = file.read()

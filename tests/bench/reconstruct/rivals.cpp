@@ -1,6 +1,5 @@
-// What covol reconstruct is measured with and compared with: CGAL's reconstructions, normals, and a measure. See
-// `rivals` without arguments. Points and meshes are PLY files. Where a rival has a knob its default here is what CGAL's
-// manual uses.
+// CGAL's reconstructions, with which covol reconstruct is compared, normals for them, and the measure. `rivals` without
+// arguments prints its usage. Points and meshes are PLY files. Parameters have the values of CGAL's manual as defaults.
 #include <CGAL/Advancing_front_surface_reconstruction.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Scale_space_reconstruction_3/Jet_smoother.h>

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Builds covol and what it is compared with, measures surfaces from points, and writes results.csv and table.md into
-# tests/bench/reconstruct/results. README.md beside this file says more.
+# Builds covol and the programs with which it is compared, measures surfaces from points, and writes results.csv and
+# table.md into tests/bench/reconstruct/results. README.md in this folder has details.
 #
 #   [COVOL_DATA=FOLDER] bash tests/bench/reconstruct/run.sh [--poisson-recon BINARY] [--shapes NAME,NAME] ...     (--help lists all)
 #
-# Paths are relative to the repository's folder. What was measured with the same programs is not measured again (build/reconstruct).
+# Paths are relative to the repository's folder. Results of the same programs are kept in build/reconstruct and not
+# measured again.
 set -euo pipefail
 cd "$(dirname "$0")/../../.."
 

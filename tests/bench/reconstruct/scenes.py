@@ -1,11 +1,12 @@
-"""covol reconstruct on what is not a sampled solid: rooms, fronts of houses, terrain, leaves, driving lidar, bodies with edges.
+"""covol reconstruct on clouds other than sampled smooth solids: rooms, fronts of houses, terrain, leaves, vehicle lidar, bodies
+with edges.
 
   /usr/bin/python3 tests/bench/reconstruct/scenes.py --covol BINARY [--only NAME,NAME] [--results FOLDER] [--noise SPACINGS] [--clouds FOLDER]
 
-Each scene is made here of flat and curved faces, so that its true surface is known. With `normals` it is given those of
-its faces. Of each result: mean distance from its surface to the true one and back, and the part of its area that is
-farther from all points than three times their spacing, in spacings; for bodies with edges the mean distance of the true
-edges to the surface, too; triangles, genus, pieces, CPU seconds and MiB. Writes scenes.csv.
+Each scene is composed of flat and curved faces, so that its true surface is known. Scenes with `normals` include those of their
+faces. For each result: the mean distance from its surface to the true one and back, in spacings; the fraction of its area that is
+farther from all points than three times their spacing; for bodies with edges also the mean distance of the true edges to the
+surface; triangles, genus, pieces, CPU seconds and MiB. Writes scenes.csv.
 """
 import argparse
 import csv
@@ -25,7 +26,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 class Scene:
-    """Faces that points are drawn from, evenly by area."""
+    """Faces from which points are drawn, uniform by area."""
 
     def __init__(self, seed=1):
         self.random = np.random.default_rng(seed)
@@ -48,7 +49,7 @@ class Scene:
         self.faces.append((area, draw))
 
     def box(self, low, high, inward=False, without=()):
-        """@param without  faces that are left out, of "x0 x1 y0 y1 z0 z1" """
+        """@param without  faces to leave out, some of "x0 x1 y0 y1 z0 z1" by name"""
         low, high = np.asarray(low, float), np.asarray(high, float)
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -115,7 +116,7 @@ def cylinder(scene):
 
 
 def bracket(scene):
-    """An angle of two plates, the upright one with a bore."""
+    """A bracket of two plates, the upright one with a bore."""
     profile = np.array([(0, 0), (20, 0), (20, 4), (4, 4), (4, 16), (0, 16)], float)
     width = 12.0
     for (x0, z0), (x1, z1) in zip(profile, np.roll(profile, -1, 0)):
@@ -136,7 +137,7 @@ def rooms(apart):
 
 
 def room(scene):
-    """Seen from inside: walls, floor, ceiling, a cabinet and a table, a door."""
+    """Scanned from inside: walls, floor, ceiling, a cabinet and a table, a door."""
     scene.box((0, 0, 0), (6, 4, 2.5), inward=True, without=("x0",))
     scene.rectangle((0, 0, 0), (0, 4, 0), (0, 0, 2.5), holes=((0.4, 0.65, 0, 0.8),))
     scene.box((0.02, 3.4, 0.0), (1.5, 4, 2.0), without=("y1", "z0"))
@@ -148,7 +149,7 @@ def room(scene):
 
 
 def facade(scene):
-    """One front, seen from the street: windows set back."""
+    """A house front, scanned from the street: windows are set back."""
     columns, rows, wide, high = 5, 3, 20.0, 10.0
     holes = []
     for i in range(columns):
@@ -166,7 +167,7 @@ def hills(x, y):
 
 
 def terrain(scene):
-    """From the air: ground, houses with saddle roofs, crowns of trees; walls are hardly seen."""
+    """Scanned from the air: ground, houses with saddle roofs, crowns of trees; few points on walls."""
     houses = [(15, 20), (40, 15), (60, 55), (25, 60)]
 
     def ground(n):
@@ -202,7 +203,7 @@ def leaf(scene):
     scene.surface(1, draw)
 
 
-SCENES = {  # name: (how it is made, points)
+SCENES = {  # name: (function that makes it, number of points)
     "box": (box, 6000),
     "cylinder": (cylinder, 6000),
     "bracket": (bracket, 10000),
@@ -216,7 +217,7 @@ SCENES = {  # name: (how it is made, points)
 
 
 def lidar(random):
-    """Rings of a driving lidar on a street between two rows of houses, parked cars beside it."""
+    """Rings of a vehicle lidar in a street between two rows of houses with parked cars."""
     turn = np.linspace(0, 2 * np.pi, 1800, endpoint=False)
     rays = []
     for ring in np.radians(np.linspace(-24, 4, 32)):
@@ -237,7 +238,7 @@ def lidar(random):
 
 
 def odd_clouds():
-    """Clouds without a true surface to be measured by."""
+    """Clouds for which no true surface is known."""
     random = np.random.default_rng(2)
     v = random.normal(size=(20000, 3))
     ball = v / np.linalg.norm(v, axis=1)[:, None] * random.random((20000, 1)) ** (1 / 3)
@@ -248,7 +249,7 @@ def odd_clouds():
 
 
 def run(command, limit):
-    """(exit code, CPU seconds, what it printed)"""
+    """(exit code, CPU seconds, output)"""
     child = subprocess.Popen(["timeout", str(limit), *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     text = child.stdout.read().decode(errors="replace") or child.stderr.read().decode(errors="replace")
     _, status, usage = os.wait4(child.pid, 0)
@@ -273,7 +274,7 @@ def measure(mesh, cloud, truth, edges, random):
     row = {"triangles": len(triangles), "spacing": apart}
     row["bare"] = float((cKDTree(cloud).query(found)[0] > 3 * apart).mean())
     if truth is not None:
-        # To the planes of the nearest samples, where the true surface is not just missing.
+        # To the planes of the nearest samples, at points where the true surface is not simply missing.
         tree = cKDTree(truth[0])
         away, nearest = tree.query(found)
         offset = np.abs(np.einsum("ij,ij->i", found - truth[0][nearest], truth[1][nearest]))
@@ -335,10 +336,10 @@ def main():
             row = {"scene": name, "points": len(points), "cpu_s": round(cpu, 2), "code": code}
             if code == 0 and mesh.exists():
                 row |= measure(mesh, points, truth, edges, np.random.default_rng(3))
-                told = json.loads(report.read_text())
-                row |= {key: told["surface"][key] for key in ("components", "genus", "closed")}
-                row["mib"] = told["peak_rss_bytes"] >> 20
-                row["warnings"] = " | ".join(str(w.get("text", w) if isinstance(w, dict) else w)[:160] for w in told.get("warnings", []))
+                reported = json.loads(report.read_text())
+                row |= {key: reported["surface"][key] for key in ("components", "genus", "closed")}
+                row["mib"] = reported["peak_rss_bytes"] >> 20
+                row["warnings"] = " | ".join(str(w.get("text", w) if isinstance(w, dict) else w)[:160] for w in reported.get("warnings", []))
             else:
                 row["warnings"] = text.strip()[-300:]
             rows.append(row)

@@ -1,7 +1,7 @@
 """Truth meshes with thin parts, branches, handles: closed, in one piece, of known genus.
 
-Shapes are zero sets of signed functions f (negative inside; lengths in the shape's own unit, its longest side about 2), meshed
-by marching cubes; the vertices are then moved onto f = 0. Tubes about closed curves are meshed along the curve.
+Shapes are zero sets of signed functions f (negative inside; lengths in the shape's own unit, its longest side about 2), meshed by
+marching cubes; the vertices are then moved onto f = 0. Tubes around closed curves are meshed along the curve.
 """
 import pathlib
 
@@ -10,13 +10,13 @@ from skimage.measure import marching_cubes
 
 import ply
 
-BLOCK = 8         # cells along the edge of the blocks in which f is sampled where it may be 0
+BLOCK = 8         # cells along the edge of a block; f is sampled only in blocks in which it may be 0
 
 
 # ---- signed functions: f(p), p an array (..., 3) ---------------------------------------------------------------------
 
 def ellipsoid(p, center, axes):
-    """Near its surface a distance to first order."""
+    """Signed distance to an ellipsoid, to first order near its surface."""
     q = (p - np.asarray(center, p.dtype)) / np.asarray(axes, p.dtype)
     length = np.sqrt((q * q).sum(-1)) + 1e-9
     gradient = np.sqrt(((q / np.asarray(axes, p.dtype)) ** 2).sum(-1)) + 1e-9
@@ -44,7 +44,7 @@ def bent(start, pull, end, count=12):
 
 
 def union(a, b, blend):
-    """The smaller one; where both differ by less than `blend` their seam is rounded."""
+    """The minimum of both; the seam is rounded where they differ by less than `blend`."""
     h = np.maximum(blend - np.abs(a - b), 0) / blend
     return np.minimum(a, b) - h * h * (blend / 4)
 
@@ -63,7 +63,7 @@ def head(p):
         horn = bent((side * 0.22, -0.05, 0.36), (side * 0.85, -0.25, 0.7), (side * 0.5, 0.1, 1.35), 16)
         f = union(f, path(p, horn, np.linspace(0.105, 0.014, len(horn))), 0.06)
         ear = bent((side * 0.36, -0.1, 0.1), (side * 0.6, -0.1, 0.2), (side * 0.85, -0.2, 0.05), 6)
-        flat = (p - np.array([0, -0.13, 0], p.dtype)) * np.array([1, 2.2, 1], p.dtype)  # a tube, pressed flat along y
+        flat = (p - np.array([0, -0.13, 0], p.dtype)) * np.array([1, 2.2, 1], p.dtype)  # a tube, flattened along y
         f = union(f, path(flat, ear - [0, -0.13, 0], np.array([0.05, 0.09, 0.12, 0.12, 0.1, 0.07, 0.03])) / 2.2, 0.04)
     return f
 
@@ -94,10 +94,10 @@ def branches():
         if level == 0:
             return
         out = np.cross(direction, across)
-        for side, share in ((-1, 0.86), (1, 0.74)):
+        for side, fraction in ((-1, 0.86), (1, 0.74)):
             turned = direction * 0.72 + side * across * 0.7
             turned /= np.linalg.norm(turned)
-            grow(end, turned, np.cross(turned, out) * 0.3 + out, length * share, max(0.03, 0.74 * radius), level - 1)
+            grow(end, turned, np.cross(turned, out) * 0.3 + out, length * fraction, max(0.03, 0.74 * radius), level - 1)
 
     def unit(v):
         return np.array(v, float) / np.linalg.norm(v)
@@ -129,9 +129,9 @@ def skull(p):
 # ---- meshes ----------------------------------------------------------------------------------------------------------
 
 def mesh_of(f, low, high, resolution=400):
-    """Vertices and triangles of f = 0 in a box, which the shape does not touch. @pre |grad f| < 1.6
+    """Vertices and triangles of f = 0 in a box that the shape does not touch. @pre |grad f| < 1.6
 
-    @param resolution  cells along the longest side
+        @param resolution  cells along the longest side
     """
     low = np.array(low, float)
     cell = (high - low).max() / resolution
@@ -141,7 +141,7 @@ def mesh_of(f, low, high, resolution=400):
     near = np.abs(middle) < 1.6 * BLOCK * cell
     values = np.repeat(np.repeat(np.repeat(middle.reshape(blocks), BLOCK, 0), BLOCK, 1), BLOCK, 2)
     inside = np.stack(np.meshgrid(*[np.arange(BLOCK)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    for some in np.array_split(corners[near], max(1, near.sum() // 500)):  # little memory
+    for some in np.array_split(corners[near], max(1, near.sum() // 500)):  # in batches, to save memory
         at = some[:, None] + inside
         values[tuple(np.moveaxis(at, -1, 0))] = f((low + at * cell).astype(np.float32))
     vertices, triangles, _, _ = marching_cubes(values, 0, spacing=(cell,) * 3, gradient_direction="descent", allow_degenerate=False)
@@ -152,7 +152,7 @@ def mesh_of(f, low, high, resolution=400):
 
 
 def _step_to_zero(f, vertices, cell):
-    """Newton's step along the gradient, at most a quarter of a cell: no triangle turns over."""
+    """A Newton step along the gradient, of at most a quarter of a cell so that no triangle is inverted."""
     h = 0.02 * cell
     gradient = np.stack([f(vertices + h * e) - f(vertices - h * e) for e in np.eye(3)], -1) / (2 * h)
     step = (f(vertices) / np.maximum((gradient ** 2).sum(-1), 0.04))[:, None] * gradient
@@ -161,7 +161,7 @@ def _step_to_zero(f, vertices, cell):
 
 
 def tube_about(curve, radius, along, around):
-    """A tube about a closed curve, its positions at t in [0, 2 pi). @pre the curve bends everywhere"""
+    """A tube around a closed curve, given by positions at t in [0, 2 pi). @pre the curvature is positive everywhere"""
     t = np.arange(along) * (2 * np.pi / along)
     h = 1e-4
     before, here, after = curve(t - h), curve(t), curve(t + h)
@@ -193,7 +193,7 @@ def tree_box():
     return knots.min(0) - 0.1, knots.max(0) + 0.1
 
 
-OWN = {  # name: how its mesh is made
+OWN = {  # name: function that makes its mesh
     "sphere": lambda: mesh_of(sphere, (-1.05,) * 3, (1.05,) * 3, 160),
     "torus": lambda: tube_about(circle, 0.3, 900, 400),
     "knot": lambda: tube_about(trefoil, 0.16, 2000, 120),
@@ -205,7 +205,7 @@ OWN = {  # name: how its mesh is made
 
 
 def truth(name, folder):
-    """Path of the mesh in `folder`; made unless it is there, and newer than this file."""
+    """Path of the mesh in `folder`; it is made unless it exists and is newer than this file."""
     target = pathlib.Path(folder) / f"{name}.ply"
     if not target.exists() or target.stat().st_mtime < pathlib.Path(__file__).stat().st_mtime:
         target.parent.mkdir(parents=True, exist_ok=True)

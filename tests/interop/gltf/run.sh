@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Khronos' glTF validator on covol's .glb files: one structure, several, y up and z up. By hand, for it needs node and,
-# once, the package from npm:
+# Khronos' glTF validator on covol's .glb files: one structure, several, y up and z up. It is run by hand, because it
+# needs node and, once, the package from npm:
 #
 #     COVOL=build/bin/covol bash tests/interop/gltf/run.sh
 set -euo pipefail

@@ -85,8 +85,8 @@ TEST_CASE("shifted spheres have the analytic overlap and distances, as level set
     const Solid a = level_set({0, 0, 0}, r, h), b = level_set({shift, 0, 0}, r, h);
     const double whole = 4.0 / 3 * kPi * r * r * r;
     const double common = kPi * (4 * r + shift) * std::pow(2 * r - shift, 2) / 12;
-    // A sphere's point at angle t from the axis is |sqrt(1 + s^2 - 2 s cos t) - 1| from the other; over cos t in
-    // [-1,1]:
+    // The point of one sphere at angle t from the axis is |sqrt(1 + s^2 - 2 s cos t) - 1| from the other; the mean over
+    // cos t in [-1,1]:
     double mean = 0;
     for (int i = 0; i < 1000; ++i)
         mean += std::abs(std::sqrt(r * r + shift * shift - 2 * shift * r * (-1 + (i + 0.5) / 500)) - r) / 1000;
@@ -114,7 +114,8 @@ TEST_CASE("a solid equals itself, and mesh and level set of one solid agree") {
     CHECK(compare(a, a).dice == 1.0);
     CHECK(compare(a, a).hausdorff < 1e-6);
     CHECK(compare(mesh, mesh).dice == 1.0);
-    // The level set is cut trilinearly on the lattice, the mesh linearly: only centres on the surface differ.
+    // The level set is sampled trilinearly and the mesh is piecewise linear, so they differ only at centres on the
+    // surface.
     CHECK(compare(a, mesh).dice > 0.999);
 }
 
@@ -130,7 +131,7 @@ TEST_CASE("a rotated anisotropic mask agrees with the mesh and the level set of 
         const CompareReport report = compare(mask, *other);
         CHECK(report.dice > 0.998);
         CHECK(report.volume_a == Approx(whole).epsilon(0.01));
-        CHECK(report.hausdorff <= 0.13);  // the surface lies between centres that differ
+        CHECK(report.hausdorff <= 0.13);  // the surface lies between neighbouring centres
         CHECK(report.assd < 0.03);
     }
     const CompareReport swapped = compare(smooth, mask);
@@ -153,7 +154,7 @@ TEST_CASE("what lies outside a mask's image counts as well") {
     geometry.size = {20, 20, 20};
     geometry.spacing = {0.1, 0.1, 0.1};
     geometry.origin = {0.05, 0.05, 0.05};
-    // A full image is the box [0,2]^3, a third of the longer one.
+    // A full image is the box [0,2]^3; the other one is three times as long.
     const Solid full = mask_of(geometry, [](const Vec3&) { return 7; });
     geometry.size[0] = 60;
     const Solid longer = mask_of(geometry, [](const Vec3&) { return 1; });
@@ -178,7 +179,7 @@ TEST_CASE("one label is picked, or any") {
 }
 
 TEST_CASE("rows through edges and corners are counted once") {
-    // A cube whose faces, edges and corners lie on the lattice's rows.
+    // A cube whose faces, edges and corners lie on the rows of the lattice.
     ImageGeometry geometry;
     geometry.size = {8, 8, 8};
     const Solid voxels = mask_of(geometry, [](const Vec3& p) {

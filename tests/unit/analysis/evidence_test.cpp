@@ -23,7 +23,7 @@ const FloatGridPtr& sphere() {
     return grid;
 }
 
-/// Slices 0.7 thick, tilted nowhere: slice k lies at z = -10.5 + 0.7 k.
+/// Slices 0.7 thick and not tilted: slice k lies at z = -10.5 + 0.7 k.
 ImageGeometry slices() {
     ImageGeometry g;
     g.size = {45, 45, 31};
@@ -32,7 +32,7 @@ ImageGeometry slices() {
     return g;
 }
 
-/// On the sphere, dense, where z <= 0 (moved outwards by `off`).
+/// Dense points on the part of the sphere with z <= 0, moved outwards by `off`.
 std::vector<Vec3> lower_half(double off = 0) {
     std::vector<Vec3> marks;
     const int count = 40000;
@@ -46,7 +46,7 @@ std::vector<Vec3> lower_half(double off = 0) {
     return marks;
 }
 
-/// g = 1 everywhere but where `holds`, there 0.2.
+/// g is 0.2 if `holds`, and 1 elsewhere.
 template <typename Holds>
 FloatGridPtr edges(Holds holds) {
     FloatGridPtr g = make_grid(space(), 1.0F, "edge");
@@ -56,7 +56,7 @@ FloatGridPtr edges(Holds holds) {
     return g;
 }
 
-// The angle on the sphere that a chord as long as the reach spans.
+// The angle that a chord of length kReach subtends at the centre of the sphere.
 const double kAngle = 2 * std::asin(kReach / (2 * kR));
 
 }  // namespace
@@ -89,7 +89,7 @@ TEST_CASE("Each slice tells of its own zone of the sphere") {
         marks += s.marks;
         const double z = -10.5 + 0.7 * s.slice;
         if (std::abs(z) < kR - 0.7) {
-            // Archimedes: a zone's area depends on its height alone.
+            // Archimedes: the area of a zone depends only on its height.
             CHECK(s.area == Approx(2 * M_PI * kR * 0.7).epsilon(0.02));
         }
         if (z < -1 && s.marks > 0 && s.area > 0) {
@@ -127,7 +127,8 @@ TEST_CASE("The suggested outline is the one that reaches the most bare surface")
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 20});
     REQUIRE(e.suggestions.size() >= 2);
-    // Marks at elevation t cover t - angle to t + angle: the lowest that wastes nothing is at 2 angle.
+    // Marks at elevation t cover t - kAngle to t + kAngle, and the lower half is covered up to kAngle: the lowest
+    // outline without overlap is at 2 kAngle.
     const double z = kR * std::sin(2 * kAngle);
     CHECK(std::abs(-10.5 + 0.7 * e.suggestions[0].slice - z) <= 0.7);
     CHECK(e.suggestions[0].area == Approx(2 * M_PI * kR * kR * (std::sin(3 * kAngle) - std::sin(kAngle))).epsilon(0.1));

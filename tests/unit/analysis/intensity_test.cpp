@@ -37,7 +37,7 @@ TEST_CASE("Mean and standard deviation are those of the voxels inside") {
     const IntensityStatistics found = measure_intensity(image, *sphere(5, {10, 10, 10}, 0.25));
     CHECK(double(found.voxels) == Approx(4.0 / 3 * M_PI * 1000).epsilon(0.02));
     CHECK(found.mean == Approx(100020).margin(0.01));
-    // A ball's coordinate has the variance R^2 / 5; R is 10 voxels.
+    // A coordinate in a ball has the variance R^2 / 5; R is 10 voxels.
     CHECK(found.standard_deviation == Approx(std::sqrt(100.0 / 5)).epsilon(0.02));
     CHECK(count_voxels_around(image, *sphere(5, {10, 10, 10}, 0.25)) >= 20 * 20 * 20);
 }

@@ -34,7 +34,8 @@ TEST_CASE("a domain survives on a grid") {
 TEST_CASE("unusable boxes and transforms are refused") {
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 0}}, 0.1), Error);
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 1}}, 0.0), Error);
-    CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e-11, 1e-11, 1e-11}}, 1e-12), Error);  // OpenVDB holds none so small
+    CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e-11, 1e-11, 1e-11}}, 1e-12),
+                    Error);  // OpenVDB does not support voxels this small
     CHECK_NOTHROW(set_domain(*FloatGrid::create(), make_domain({{0, 0, 0}, {1e-3, 1e-3, 1e-3}}, 1.5e-5)));
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e12, 1, 1}}, 1e-3), Error);
     auto grid = FloatGrid::create();
@@ -66,7 +67,7 @@ TEST_CASE("the lattice does not depend on the part that is asked for") {
     CHECK(choose_domain(part, 0.5, {}, {}).origin == Vec3{0, 0, 0});
     CHECK(choose_domain(part, 0.5, {}, {}).min == Index3{4, 6, 8});
     CHECK(choose_domain(other, 0.5, image, Vec3{1, 2, 3}).origin == Vec3{1, 2, 3});
-    // Far from the world's origin neighbours share a lattice that the keys of leaves can hold.
+    // Far from the world's origin, neighbouring domains share a lattice whose leaf keys do not overflow.
     const WorldBox far{{4e6, 5e6, 0}, {4e6 + 10, 5e6 + 10, 10}}, beside{{4e6 + 9, 5e6, 0}, {4e6 + 20, 5e6 + 9, 10}};
     const Domain a = choose_domain(far, 0.01, {}, {}), b = choose_domain(beside, 0.01, {}, {});
     CHECK(a.origin == b.origin);

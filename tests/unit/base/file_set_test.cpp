@@ -18,8 +18,8 @@
 using namespace covol;
 namespace fs = std::filesystem;
 
-/// In support/kill_at.cpp: kills this process before the number-th call from here on that puts files in place; 0:
-/// never.
+/// In support/kill_at.cpp: kills this process before the number-th call, counted from here, that puts files in place;
+/// 0: never.
 extern "C" void covol_kill_before(long number);
 
 namespace {
@@ -30,9 +30,9 @@ void write(FileSet& set, const std::string& path, const std::string& text) {
     set.write(path, [&](const std::string& to) { std::ofstream(to) << text; });
 }
 
-/// Runs `body` in a process of its own, which is killed at its end: nothing is cleaned up.
+/// Runs `body` in a separate process that is killed at the end, so that nothing is cleaned up.
 template <typename Body>
-void die_after(const Body& body) {
+void run_and_kill(const Body& body) {
     const pid_t child = ::fork();
     REQUIRE(child >= 0);
     if (child == 0) {
@@ -44,9 +44,9 @@ void die_after(const Body& body) {
     REQUIRE(WIFSIGNALED(status));
 }
 
-/// Runs `body` in a process of its own. @returns whether it was killed (kill_before())
+/// Runs `body` in a separate process. @returns whether it was killed (kill_before())
 template <typename Body>
-bool dies(const Body& body) {
+bool is_killed(const Body& body) {
     const pid_t child = ::fork();
     REQUIRE(child >= 0);
     if (child == 0) {
@@ -159,16 +159,16 @@ TEST_CASE("file_set: the next run clears after one that was killed, and leaves t
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old a");
-    die_after([&] {
+    run_and_kill([&] {
         FileSet* set = new FileSet;  // never destroyed
         write(*set, folder.path("a"), "half of a set");
     });
     CHECK(folder.file_count() == 2);
     const ScratchFolder living(root);
-    CHECK(folder.file_count() == 2);  // the file, and the one that lives
+    CHECK(folder.file_count() == 2);  // the file, and the folder of the living run
     const ScratchFolder another(root);
     CHECK(fs::exists(living.path()));
-    const ScratchFolder inner(living.path());  // the life of one is no obstacle to one in it
+    const ScratchFolder inner(living.path());  // a living folder does not prevent another one inside of it
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 
@@ -198,9 +198,9 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
             }
             for (const std::string& name : names)
                 if (name != "two/fresh") folder.write(name, "old");
-            // As of a server whose clock is ahead.
+            // As if written by a server whose clock is ahead.
             fs::last_write_time(folder.path("one/c"), fs::file_time_type::clock::now() + std::chrono::hours(1));
-            killed = dies([&] {
+            killed = is_killed([&] {
                 FileSet set;
                 for (const std::string& name : names) write(set, folder.path(name), "new");
                 kill_before(call);
@@ -218,7 +218,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                     CHECK(bytes_of(folder.path(name)) == state);
             }
             (state == "new" ? news : olds) += 1;
-            // What is left over in the others goes with the next run there, and changes nothing.
+            // The next run in each of the other folders removes what is left over there, and changes nothing else.
             for (const char* name : {"one", "two"}) {
                 { const ScratchFolder clears(folder.path(name)); }
                 CHECK(scratch_in(folder.path(name)).empty());
@@ -227,7 +227,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                 CHECK((bytes_of(folder.path(name)) == state) == fs::exists(folder.path(name)));
         }
     }
-    // Kills before the commit, between renames and while it cleared up were all met.
+    // All cases occurred: killed before the commit, between the renames and while clearing up.
     CHECK(olds > 2 * 5);
     CHECK(news > 2 * 5);
 }
@@ -241,7 +241,7 @@ TEST_CASE("file_set: a recovery that is killed itself goes on") {
             INFO("killed before call " << first << ", the next run before call " << second);
             for (const char* name : {"one", "two"}) fs::create_directory(folder.path(name));
             for (const std::string& name : names) folder.write(name, "old");
-            if (dies([&] {
+            if (is_killed([&] {
                     FileSet set;
                     for (const std::string& name : names) write(set, folder.path(name), "new");
                     kill_before(first);
@@ -249,7 +249,7 @@ TEST_CASE("file_set: a recovery that is killed itself goes on") {
                     kill_before(0);
                 }))
                 last = first;
-            dies([&] {
+            is_killed([&] {
                 kill_before(second);
                 const ScratchFolder next(folder.path("two"));
                 kill_before(0);
@@ -269,7 +269,7 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
     bool met = false;
     for (long call = 1; call < 100 && !met; ++call) {
         for (const char* name : {"a", "b", "c"}) folder.write(name, "old");
-        dies([&] {
+        is_killed([&] {
             FileSet set;
             for (const char* name : {"a", "b", "c"}) write(set, folder.path(name), "new");
             kill_before(call);
@@ -281,7 +281,8 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
         }
         met = true;
         folder.write("c", "another's");
-        fs::last_write_time(root / "c", fs::file_time_type::clock::now() - std::chrono::hours(1));  // a copy, say
+        fs::last_write_time(root / "c",
+                            fs::file_time_type::clock::now() - std::chrono::hours(1));  // for example a copy
         { const ScratchFolder next(root); }
         CHECK(bytes_of(folder.path("b")) == "new");
         CHECK(bytes_of(folder.path("c")) == "another's");
@@ -293,8 +294,8 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
 TEST_CASE("file_set: only what covol made is cleared") {
     const Scratch folder;
     const fs::path root = folder.path("");
-    // Those of a user: names of all kinds, and copies of one that covol left.
-    die_after([&] {
+    // Files of a user: names of all kinds, and copies of a folder that covol left behind.
+    run_and_kill([&] {
         FileSet* set = new FileSet;
         write(*set, folder.path("a"), "half of a set");
     });
@@ -313,9 +314,9 @@ TEST_CASE("file_set: only what covol made is cleared") {
     std::ofstream(root / "outside/file") << "important";
     fs::create_directory_symlink(root / "outside", root / ".covol-linked");
     std::ofstream(root / ".covol-single") << "a file";
-    fs::create_directory(root / ".covol-empty1");  // as a process leaves it that is killed at once
+    fs::create_directory(root / ".covol-empty1");  // as left by a process that is killed at once
     fs::create_directory(root / ".covol-empty1.5");
-    // A link in one that covol left leads nowhere, and what covol did not list stays.
+    // A link in a folder that covol left behind is not followed, and what covol did not list stays.
     fs::create_directory_symlink(root / "outside", left / "a.zarr");
     std::ofstream(left / "a stranger's") << "important";
     { const ScratchFolder next(root); }
@@ -339,7 +340,7 @@ TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
     }
     for (long call = 1;; ++call) {
         REQUIRE(call < 100);
-        dies([&] {
+        is_killed([&] {
             FileSet set;
             write(set, folder.path("one/a"), "new");
             kill_before(call);
@@ -350,7 +351,7 @@ TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
         { const ScratchFolder clears(folder.path("one")); }
         folder.write("one/a", "old");
     }
-    // Moved into another folder, as a stranger's archive might bring it.
+    // Moved into another folder, as may happen in an archive from somebody else.
     const fs::path left = scratch_in(folder.path("one")), moved = fs::path(folder.path("two")) / left.filename();
     fs::copy(left, moved, fs::copy_options::recursive);
     { const ScratchFolder next(folder.path("two")); }
@@ -469,7 +470,7 @@ TEST_CASE("file_set, write_text_file: a link stays, and what it points to is rep
         REQUIRE(::stat(folder.path("file").c_str(), &entry) == 0);
         CHECK(entry.st_uid == 1234);
         CHECK(entry.st_gid == 2345);
-        // Another user's link in a folder for all, as the kernel has it.
+        // A link of another user in a world-writable folder, with the metadata that the kernel gives it.
         fs::create_directory(root / "tmp");
         ::chmod((root / "tmp").c_str(), 01777);
         fs::create_symlink(root / "file", root / "tmp/link");

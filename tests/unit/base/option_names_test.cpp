@@ -8,7 +8,7 @@ using namespace covol;
 
 namespace {
 
-/// As a form would: "[field]" or "[field: value]".
+/// Formats option names as a form might: "[field]" or "[field: value]".
 std::string in_form(const std::string& message) {
     return replace_names(message, [](const std::string& name, const std::string& value) {
         return "[" + name + (value.empty() ? "" : ": " + value) + "]";
@@ -37,7 +37,7 @@ TEST_CASE("other text between backquotes stays as it is") {
 TEST_CASE("an error carries the option that would help, however it is copied") {
     const Error error(Errc::InvalidInput, "segment: the surface vanished; lower `delta`, or give a `tag_distance`",
                       "delta");
-    const Error copy = error;  // NOLINT: the copy is what is looked at
+    const Error copy = error;  // NOLINT: the copy is under test
     CHECK(copy.option() == "delta");
     CHECK(Error(Errc::Io, "a.vdb: no such file; `delta` is only text").option().empty());
 }

@@ -29,7 +29,7 @@ struct DummyOptions {
 
 }  // namespace
 
-// All that an option needs is a row.
+// An option needs nothing but a row.
 template <>
 inline constexpr auto covol::kWords<Dummy> = std::array{"one", "two"};
 template <>

@@ -17,9 +17,9 @@ TEST_CASE("what steers a terminal is written as its number") {
     CHECK(safe_text(std::string("nul\0end", 7)) == "nul\\u0000end");
     CHECK(safe_text("del\x7f") == "del\\u007f");
     CHECK(safe_text("C1 \xC2\x9B"
-                    "31m") == "C1 \\u009b31m");  // a terminal's CSI in one character
+                    "31m") == "C1 \\u009b31m");  // a terminal's CSI as one character
     CHECK(safe_text("vdb.\xE2\x80\xAE"
-                    "exe") == "vdb.\\u202eexe");  // the rest is written backwards
+                    "exe") == "vdb.\\u202eexe");  // reverses the direction of the text after it
     CHECK(safe_text("\xE2\x81\xA6\xE2\x80\x8F") == "\\u2066\\u200f");
     CHECK(safe_text("line\xE2\x80\xA8separator") == "line\\u2028separator");
 }
@@ -27,11 +27,11 @@ TEST_CASE("what steers a terminal is written as its number") {
 TEST_CASE("bytes that are no UTF-8 are written as their numbers") {
     CHECK(safe_text("latin\xE9") == "latin\\xe9");
     CHECK(safe_text("\x9b"
-                    "31m") == "\\x9b31m");         // CSI of terminals of 8 bits
+                    "31m") == "\\x9b31m");         // CSI of 8-bit terminals
     CHECK(safe_text("\xC1\x9B") == "\\xc1\\x9b");  // an overlong form
     CHECK(safe_text("\xE0\x82\x9B") == "\\xe0\\x82\\x9b");
     CHECK(safe_text("\xED\xA0\x80") == "\\xed\\xa0\\x80");           // half of a surrogate pair
-    CHECK(safe_text("\xF4\x90\x80\x80") == "\\xf4\\x90\\x80\\x80");  // beyond the last character
+    CHECK(safe_text("\xF4\x90\x80\x80") == "\\xf4\\x90\\x80\\x80");  // beyond the last code point
     CHECK(safe_text("cut \xE2\x80") == "cut \\xe2\\x80");
 }
 

@@ -35,7 +35,7 @@ Image ball_image() {
     return Image::from_values(geometry, values.data());
 }
 
-/// All sweeps, one after the other, each from the states of the one before. @return how many there were
+/// All sweeps, each from the states after the one before. @return number of sweeps
 int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridPtr>& states) {
     states.assign(plan.bricks.size(), nullptr);
     for (int sweep = 1;; ++sweep) {
@@ -52,13 +52,13 @@ int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridP
     }
 }
 
-/// Largest difference where both are near their surfaces, voxels; and how many voxels were compared.
-struct Apart {
+/// Largest difference near both surfaces, in voxels, and the number of voxels compared.
+struct StateDifference {
     double maximum = 0;
     std::int64_t count = 0;
 };
-Apart apart(const FloatGrid& a, const FloatGrid& b) {
-    Apart result;
+StateDifference apart(const FloatGrid& a, const FloatGrid& b) {
+    StateDifference result;
     const double h = a.voxelSize()[0];
     const auto at = b.getConstAccessor();
     for (auto value = a.cbeginValueOn(); value; ++value) {
@@ -112,7 +112,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
     options.model = Model::Paper;
-    SegmentOptions from_coarse = options;  // from the tagged start it comes to rest up to 0.06 voxels away
+    SegmentOptions from_coarse = options;  // from the tagged start the steady surface is up to 0.06 voxels away
     from_coarse.coarse_levels = 1;
     const SegmentResult whole = segment(image, points, from_coarse);
     BrickJob job(image, points, options, {});
@@ -128,10 +128,10 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     CHECK(joined.report.surface.components == 1);
     CHECK(joined.report.surface.genus == 0);
     CHECK(joined.surface->transform() == whole.surface->transform());
-    const Apart difference = apart(*joined.surface, *whole.surface);
+    const StateDifference difference = apart(*joined.surface, *whole.surface);
     CHECK(difference.count > 20000);
     CHECK(difference.maximum < 0.05);
-    // Errors against the true ball, at the bricks' faces and away from them.
+    // Errors against the true ball, on the bricks' faces and away from them.
     double on = 0, off = 0;
     for (auto value = joined.surface->cbeginValueOn(); value; ++value) {
         if (std::abs(*value) > 1) continue;
@@ -165,7 +165,7 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     const SegmentResult mesh = with.join(plan, known), lean = without.join(plan, known, true);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.u == nullptr);
-    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);  // rounding, for each brick has its own corner
+    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);  // rounding: each brick has its own origin
     CHECK(lean.report.surface.genus == 0);
     CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
     CHECK(lean.report.fit.mean == Approx(mesh.report.fit.mean).margin(0.01));
@@ -186,7 +186,7 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     CHECK(once.stop_reason == StopReason::Steady);
     CHECK(once.steps > 0);
     CHECK(apart(*once.state, *again.state).maximum == 0);
-    CHECK(measure_seams(plan, 1, none) > 1);  // nothing is known yet
+    CHECK(measure_seams(plan, 1, none) > 1);  // no states yet
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }
 

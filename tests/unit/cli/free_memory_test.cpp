@@ -1,5 +1,5 @@
-// What is free by the words of a machine and of its control groups, on trees of files that stand for them.
-#include "cli/free_memory.h"
+// Free memory as a machine and its control groups report it, on file trees that imitate /proc and /sys.
+#include "cli/system/free_memory.h"
 
 #include <sys/resource.h>
 
@@ -19,26 +19,26 @@ constexpr std::uint64_t kMiB = std::uint64_t(1) << 20;
 constexpr std::uint64_t kMachine = 8000 * kMiB;
 
 /// A machine with 8000 MiB available.
-class Machine {
+class FakeMachine {
 public:
-    Machine() { write("proc/meminfo", "MemTotal: 16384000 kB\nMemAvailable:    8192000 kB\nSwapFree: 5 kB\n"); }
+    FakeMachine() { write("proc/meminfo", "MemTotal: 16384000 kB\nMemAvailable:    8192000 kB\nSwapFree: 5 kB\n"); }
 
-    Machine& write(const std::string& name, const std::string& text) {
+    FakeMachine& write(const std::string& name, const std::string& text) {
         const std::filesystem::path path = std::filesystem::path(root()) / name;
         std::filesystem::create_directories(path.parent_path());
         std::ofstream(path) << text;
         return *this;
     }
-    Machine& group(const std::string& lines) { return write("proc/self/cgroup", lines); }
-    Machine& mounts(const std::string& lines) { return write("proc/self/mountinfo", lines); }
-    Machine& v1(const std::string& folder, const std::string& limit, std::uint64_t usage, std::uint64_t cache) {
+    FakeMachine& group(const std::string& lines) { return write("proc/self/cgroup", lines); }
+    FakeMachine& mounts(const std::string& lines) { return write("proc/self/mountinfo", lines); }
+    FakeMachine& v1(const std::string& folder, const std::string& limit, std::uint64_t usage, std::uint64_t cache) {
         write(folder + "/memory.limit_in_bytes", limit + "\n");
         write(folder + "/memory.usage_in_bytes", std::to_string(usage) + "\n");
         return write(folder + "/memory.stat", "inactive_file 1\ntotal_inactive_file " + std::to_string(cache / 2) +
                                                   "\ntotal_active_file " + std::to_string(cache / 2) + "\n");
     }
-    Machine& v2(const std::string& folder, const std::string& max, const std::string& high, std::uint64_t current,
-                std::uint64_t cache) {
+    FakeMachine& v2(const std::string& folder, const std::string& max, const std::string& high, std::uint64_t current,
+                    std::uint64_t cache) {
         write(folder + "/memory.max", max + "\n");
         write(folder + "/memory.high", high + "\n");
         write(folder + "/memory.current", std::to_string(current) + "\n");
@@ -67,7 +67,7 @@ std::string mib(std::uint64_t n) { return std::to_string(n * kMiB); }
 }  // namespace
 
 TEST_CASE("without control groups the machine says what is free") {
-    const Machine machine;
+    const FakeMachine machine;
     CHECK(machine.free().bytes == kMachine);
     CHECK(machine.free().where == "this machine");
 }
@@ -78,7 +78,7 @@ TEST_CASE("nobody says what is free") {
 }
 
 TEST_CASE("control groups, version 2: the group that this process is in, less what it uses beside caches") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV2).group("0::/user.slice/job\n");
     machine.v2("sys/fs/cgroup/user.slice/job", mib(400), "max", 150 * kMiB, 50 * kMiB);
     CHECK(machine.free().bytes == 300 * kMiB);
@@ -86,7 +86,7 @@ TEST_CASE("control groups, version 2: the group that this process is in, less wh
 }
 
 TEST_CASE("control groups, version 2: the limit that throttles counts as the hard one") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV2).group("0::/job\n").v2("sys/fs/cgroup/job", mib(900), mib(300), 0, 0);
     CHECK(machine.free().bytes == 300 * kMiB);
     machine.v2("sys/fs/cgroup/job", "max", mib(200), 0, 0);
@@ -94,7 +94,7 @@ TEST_CASE("control groups, version 2: the limit that throttles counts as the har
 }
 
 TEST_CASE("control groups, version 2: every group above the process binds it") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV2).group("0::/slurm/job_7/step_0/task_0\n");
     machine.v2("sys/fs/cgroup/slurm/job_7", mib(500), "max", 100 * kMiB, 0);
     machine.v2("sys/fs/cgroup/slurm/job_7/step_0", mib(700), "max", 80 * kMiB, 0);
@@ -104,19 +104,20 @@ TEST_CASE("control groups, version 2: every group above the process binds it") {
 }
 
 TEST_CASE("control groups, version 1: the memory controller's mount") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV1).group("5:cpu,cpuacct:/elsewhere\n4:memory:/slurm/uid_1/job_7\n0::/\n");
     machine.v1("sys/fs/cgroup/memory", kUnlimited, 9000 * kMiB, 0);
     CHECK(machine.free().where == "this machine");
     machine.v1("sys/fs/cgroup/memory/slurm/uid_1/job_7", mib(400), 350 * kMiB, 250 * kMiB);
     CHECK(machine.free().bytes == 300 * kMiB);
-    machine.v1("sys/fs/cgroup/memory/slurm", mib(1000), 950 * kMiB, 0);  // others in it use most
+    machine.v1("sys/fs/cgroup/memory/slurm", mib(1000), 950 * kMiB,
+               0);  // most of it is used by other processes in the group
     CHECK(machine.free().bytes == 50 * kMiB);
     CHECK(machine.free().where == "the control group /sys/fs/cgroup/memory/slurm");
 }
 
 TEST_CASE("control groups of both versions at once: the controller is in one of them") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV1 + "40 31 0:30 / /sys/fs/cgroup/unified rw - cgroup2 cgroup2 rw\n");
     machine.group("4:memory:/job\n0::/job\n").v1("sys/fs/cgroup/memory/job", mib(400), 0, 0);
     machine.write("sys/fs/cgroup/unified/job/cgroup.procs", "1\n");
@@ -124,7 +125,7 @@ TEST_CASE("control groups of both versions at once: the controller is in one of 
 }
 
 TEST_CASE("unlimited values bind nothing") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV1 + kV2).group("4:memory:/job\n0::/job\n");
     machine.v1("sys/fs/cgroup/memory/job", kUnlimited, 100 * kMiB, 0);
     machine.v2("sys/fs/cgroup/job", "max", "max", 100 * kMiB, 0);
@@ -133,7 +134,7 @@ TEST_CASE("unlimited values bind nothing") {
 }
 
 TEST_CASE("a container without a namespace of groups mounts its own group alone") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts("33 31 0:29 /docker/0ab1 /sys/fs/cgroup/memory ro - cgroup cgroup rw,memory\n");
     machine.group("4:memory:/docker/0ab1\n").v1("sys/fs/cgroup/memory", mib(256), 56 * kMiB, 0);
     CHECK(machine.free().bytes == 200 * kMiB);
@@ -142,14 +143,14 @@ TEST_CASE("a container without a namespace of groups mounts its own group alone"
 }
 
 TEST_CASE("a group outside of the namespace: what is mounted is what is known") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV2).v2("sys/fs/cgroup", mib(256), "max", 56 * kMiB, 0);
     for (const char* group : {"0::/../..\n", "0::/../other/job\n", "0::/..\n", "0::/\n"}) {
         CAPTURE(group);
         machine.group(group);
         CHECK(machine.free().bytes == 200 * kMiB);
     }
-    // the mount was made outside of it, and shows more
+    // the mount was made outside of the namespace, and shows more
     machine.mounts("30 23 0:26 /../.. /sys/fs/cgroup rw - cgroup2 cgroup2 rw\n").group("0::/../../other/job\n");
     machine.v2("sys/fs/cgroup/other/job", mib(90), "max", 0, 0);
     CHECK(machine.free().bytes == 90 * kMiB);
@@ -158,14 +159,14 @@ TEST_CASE("a group outside of the namespace: what is mounted is what is known") 
 }
 
 TEST_CASE("version 1 tells of limits above what is mounted") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV1).group("4:memory:/\n").v1("sys/fs/cgroup/memory", kUnlimited, 10 * kMiB, 0);
     machine.write("sys/fs/cgroup/memory/memory.stat", "hierarchical_memory_limit " + mib(110) + "\n");
     CHECK(machine.free().bytes == 100 * kMiB);
 }
 
 TEST_CASE("a group that is full leaves nothing, and one beyond its limit too") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts(kV2).group("0::/job\n").v2("sys/fs/cgroup/job", mib(100), "max", 100 * kMiB, 0);
     CHECK(machine.free().bytes == 0);
     machine.v2("sys/fs/cgroup/job", mib(100), "max", 180 * kMiB, 0);
@@ -173,7 +174,7 @@ TEST_CASE("a group that is full leaves nothing, and one beyond its limit too") {
 }
 
 TEST_CASE("mounts with blanks in their names, and files that hold something else") {
-    Machine machine;
+    FakeMachine machine;
     machine.mounts("damaged\n\n30 23 0:26 / /my\\040groups rw - cgroup2 cgroup2 rw\n").group("nothing\n0::/a b\n");
     machine.v2("my groups/a b", mib(100), "max", 0, 0);
     CHECK(machine.free().bytes == 100 * kMiB);
@@ -192,7 +193,7 @@ TEST_CASE("limits of address space and data bind, less what is in use") {
             REQUIRE(::setrlimit(which, &limit) == 0);
         }
     };
-    Machine machine;
+    FakeMachine machine;
     machine.write("proc/self/statm", "1000 500 100 10 0 300 0\n");  // pages
     constexpr std::uint64_t kPage = 4096;
     {

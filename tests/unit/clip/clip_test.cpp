@@ -1,4 +1,4 @@
-// Solids that the image cuts off: flat caps on the image's box, and mesh, mask and level set that agree.
+// Solids that the end of the image cuts: flat caps on the box of the image, and mesh, mask and level set that agree.
 #include "covol/clip.h"
 
 #include <openvdb/openvdb.h>
@@ -46,12 +46,12 @@ struct Cut {
     std::string name;
     Vec3 spacing;
     double h;
-    double fraction;  // of the body's extent along the cut axis that is left
-    bool two;         // faces of two axes
-    bool turned;      // the image's axes point the other way
+    double fraction;  // remaining fraction of the body's extent along the cut axis
+    bool two;         // cut by faces of two axes
+    bool turned;      // the image's axes are reversed
 };
 
-/// A body around the origin's neighbourhood in an image whose faces leave a share of it.
+/// A body near the origin in an image whose faces cut off part of it.
 struct Scene {
     Vec3 radii, center{0, 0, 0};
     ImageGeometry geometry;
@@ -61,12 +61,12 @@ struct Scene {
 Scene scene_of(const Cut& cut, const Vec3& radii) {
     Scene scene;
     scene.radii = radii;
-    // The face lies where `share` of the extent is left, somewhere within a voxel otherwise.
+    // The face lies where `fraction` of the extent remains; along other axes, somewhere within a voxel.
     scene.geometry.spacing = cut.spacing;
     const Vec3 off{0.31, -0.22, 0.13};
     for (int a = 0; a < 3; ++a) {
         const bool is_cut = a == 2 || (cut.two && a == 0);
-        // Two deep cuts would leave a sliver.
+        // Two deep cuts would leave only a sliver.
         const double left = a == 2 ? cut.fraction : std::max(cut.fraction, 0.5);
         const double low =
             is_cut ? -radii[a] + 2 * radii[a] * (1 - left) : -radii[a] - 5 * cut.spacing[a] + off[a] * cut.spacing[a];
@@ -107,7 +107,7 @@ Truth measure_truth(const Scene& scene) {
     return truth;
 }
 
-/// Of the triangles whose corners all lie at z.
+/// The area of the triangles whose corners all lie at z.
 double area_at(const TriangleMesh& mesh, double z, double tolerance) {
     double area = 0;
     for (const auto& t : mesh.triangles) {
@@ -162,13 +162,13 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                 }
             const Truth truth = measure_truth(scene);
             const double coarse = cut.h / std::min({radii[0], radii[1], radii[2]});
-            // what chords lose of a ball, and more of its cap
+            // chords lose volume of a ball, and a larger fraction of its cap
             const double chords = (cut.fraction < 0.5 ? 1.0 : 0.7) * coarse * coarse;
             const double volume = m.volume / truth.volume - 1,
                          cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;
             CHECK(std::abs(volume) < 0.003 + chords);
             CHECK(std::abs(cap) < 0.005 + 2 * chords);
-            // The label image is the truth's, but for voxels whose centre is beside the wall.
+            // The label image is that of the truth, except for voxels whose centre is close to the surface.
             const auto labels = rasterize(*solid, scene.geometry);
             const auto [ni, nj, nk] = scene.geometry.size;
             double marked = 0, expected = 0;
@@ -182,8 +182,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                     if (std::abs(d) > 0.25 * cut.h) REQUIRE(label == (d < 0));
                 }
             CHECK(std::abs(marked - expected) <= 0.03 * expected);
-            // A level set without the metadata, as other programs see it: only the cut's edge is rounded, by less than
-            // a voxel.
+            // A level set without the metadata, as other programs read it: only the edge of the cut is rounded, by less
+            // than a voxel.
             const FloatGridPtr plain = solid->deepCopy();
             set_clip(*plain, {});
             const TriangleMesh rounded = extract_mesh(*plain);

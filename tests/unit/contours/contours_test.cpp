@@ -40,7 +40,7 @@ public:
         cloud_.lines.push_back(line);
         return *this;
     }
-    /// A circle of world radius r about a place of slice k; `axis` is the slices' normal.
+    /// A circle of world radius r around a position in slice k; `axis` is the normal of the slices.
     Drawing& circle(double x, double y, double k, double r, int axis = 2, int count = 96) {
         const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
         std::vector<Vec3> marks;
@@ -70,7 +70,7 @@ private:
     PointCloud cloud_;
 };
 
-/// Size, spacing and place differ along every axis, and the axes are turned against the world's.
+/// Size, spacing and origin differ along every axis, and the axes are rotated against the world's.
 ImageGeometry turned_geometry() {
     ImageGeometry g;
     g.size = {80, 100, 80};
@@ -102,7 +102,7 @@ std::vector<Vec3> all_points(const Contours& c) {
     return points;
 }
 
-/// By Riemann's sum over the box of the body.
+/// By a Riemann sum over the box of the body.
 double volume(const ContourSolid& solid, double step) {
     const WorldBox box = solid.box();
     double count = 0;
@@ -112,7 +112,7 @@ double volume(const ContourSolid& solid, double step) {
     return count * step * step * step;
 }
 
-/// The largest distance from a place of the surface to its nearest point. Places are found on rays from `inside`.
+/// The largest distance from a position on the surface to its nearest point. Positions are found on rays from `inside`.
 double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, const Vec3& inside, double far) {
     std::mt19937 random(5);
     std::normal_distribution<double> normal;
@@ -134,7 +134,7 @@ double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, co
     return widest;
 }
 
-/// What a flood from outside through {d > D} leaves, by tag_interior()'s own judgement.
+/// The result of a flood fill from outside through {d > D}, with the leak test of tag_interior().
 BandReport flood(const std::vector<Vec3>& points, double h, double D) {
     const Domain domain = make_domain(bounding_box(points, D + 6 * h), h);
     const FloatGridPtr d = covol::compute_distance(points, domain, {D + 6 * h}).grid;
@@ -296,7 +296,7 @@ TEST_CASE("a cylinder's level is the distance to its wall in all three planes, i
         middle[u] = 40;
         middle[v] = 45;
         CHECK(widest_gap(*c.solid, all_points(c), g.index_to_world(middle), 30) < step);
-        // The slices are a world unit apart, with half of one in each dome: 10 + 2 * 1/2.
+        // The slices are one world unit apart, and each dome adds half a unit: 10 + 2 * 1/2.
         CHECK(volume(*c.solid, 0.5) == Approx(kPi * r * r * 11).epsilon(0.01));
     }
 }
@@ -310,7 +310,7 @@ TEST_CASE("steep walls, terraces and caps are closed") {
     CHECK(widest_gap(*c.solid, all_points(c), {40, 40, 14}, 60) < 1);
     const BandReport all = flood(all_points(c), 1, 1.5);
     CHECK_FALSE(all.leaks);
-    // The contours alone do leak, at the caps at least: the points between the slices are what closes them.
+    // The contours alone leak, at least at the caps: the points between the slices close them.
     CHECK(flood(c.along, 1, 1.5).leaks);
 }
 
@@ -377,7 +377,7 @@ TEST_CASE("a single contour that moves by more than its width is carried along")
     CHECK(c.solid->level({21, 40, 12.5}) == Approx(-4).margin(0.1));
     CHECK(c.solid->level({25, 40, 12.5}) == Approx(0).margin(0.1));
     CHECK(c.solid->level({15, 40, 14.9}) > 0);
-    // The same for parts that cannot be told apart: they end.
+    // The same if parts cannot be matched unambiguously: they end.
     Drawing several(cube(80));
     several.circle(10, 20, 10, 5).circle(10, 50, 10, 5).circle(40, 20, 15, 5).circle(40, 50, 15, 5);
     Warnings ended;
@@ -394,7 +394,7 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
     const Contours c = drawing.densify(1);
     CHECK(c.slices == at.size());
     for (double k = 10; k < 30.5; k += 0.7) CHECK(c.solid->level({40, 30, k}) == Approx(0).margin(0.02));
-    // Marks of one slice that differ by rounding alone are one slice.
+    // Marks of one slice that differ only by rounding belong to one slice.
     Drawing shaken(cube(60));
     shaken.circle(30, 30, 10, 12).circle(30, 30, 10.05, 6).circle(30, 30, 12, 12);
     const Contours s = shaken.densify(1);
@@ -405,7 +405,7 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
 // ---- caps -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("a dome ends where the shrinking section would") {
-    // Areas of an ellipsoid's sections near its pole are linear in the height.
+    // Areas of sections of an ellipsoid near its pole are linear in the height.
     CHECK(compute_cap_height(3, 9, 4, 4) == Approx(2));
     CHECK(compute_cap_height(3, 4, 4, 4) == 4);  // not beyond the next slice
     CHECK(compute_cap_height(3, 3, 4, 4) == 4);
@@ -415,7 +415,7 @@ TEST_CASE("a dome ends where the shrinking section would") {
 
 // ---- beyond the image's end -----------------------------------------------------------------------------------------
 
-/// Whether all that is inside lies in box(), and no ball that the surface crosses is denied.
+/// Whether everything inside lies in box(), and may_meet() holds for every ball that the surface crosses.
 void check_bounds(const ContourSolid& solid, const Vec3& middle, double far) {
     const WorldBox box = solid.box();
     std::mt19937 random(11);
@@ -438,8 +438,8 @@ TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned
         const Contours c = drawing.densify(0.5);
         const auto level = [&](double x, double k) { return c.solid->level(g.index_to_world({x, 45, k})); };
         CHECK(level(40, -0.4) < -5);
-        CHECK(level(40, -3) < 0);   // a band's width beyond the image its wall is still there
-        CHECK(level(40, -40) > 0);  // and it ends
+        CHECK(level(40, -3) < 0);   // its wall continues by a band's width beyond the image
+        CHECK(level(40, -40) > 0);  // and then it ends
         CHECK(level(40, -1000) > 0);
         CHECK(c.solid->may_meet(g.index_to_world({40, 45, -1000}), 5) == false);
         check_bounds(*c.solid, g.index_to_world({40, 45, 0}), 60);
@@ -447,7 +447,7 @@ TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned
 }
 
 TEST_CASE("a section that widens towards the image's end does not grow for ever") {
-    // From a radius of 2 to one of 9 over three slices; the image ends 2.5 beyond the second.
+    // The radius grows from 2 to 9 over three slices; the image ends 2.5 beyond the second contour.
     const Contours c = Drawing(cube(60)).circle(30, 30, 54, 2).circle(30, 30, 57, 9).densify(1);
     const auto radius_at = [&](double k) {
         double r = 0;
@@ -456,17 +456,17 @@ TEST_CASE("a section that widens towards the image's end does not grow for ever"
     };
     CHECK(radius_at(57) == Approx(9).margin(0.2));
     CHECK(radius_at(59.4) > 9.5);
-    CHECK(radius_at(59.4) < 9 + 2.4 + 0.2);  // by 45 degrees at most
+    CHECK(radius_at(59.4) < 9 + 2.4 + 0.2);  // by at most 45 degrees
     for (double k = 60; k < 80; k += 1) CHECK(radius_at(k) < 9 + (k - 57) + 0.2);
     check_bounds(*c.solid, {30, 30, 57}, 100);
-    // One that narrows goes on to, as it came.
+    // A narrowing section continues at the same rate.
     const Contours cone = Drawing(cube(60)).circle(30, 30, 54, 20).circle(30, 30, 57, 14).densify(1);
     for (const double k : {58.0, 59.0})
         CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
 }
 
 TEST_CASE("the start from contours in the corner of an image is not inside out") {
-    // As on a nucleus of a worm: two contours of a small body, one of them along the image's side.
+    // Like a nucleus of a worm: two contours of a small body, one of them along the end of the image.
     Drawing drawing(cube(60));
     drawing.add({{5, 59, 55}, {1.5, 59, 55}, {0.5, 58, 55}, {4, 57, 55}});
     drawing.add(
@@ -611,7 +611,7 @@ TEST_CASE("contours in planes of other directions are a network whose directions
     REQUIRE_FALSE((network.inside.empty() || network.outside.empty()));
     for (const Vec3& p : network.inside) CHECK(is_in_ring(p));
     for (const Vec3& p : network.outside) CHECK_FALSE(is_in_ring(p));
-    // Parallel ones have a frame of their own.
+    // Parallel planes have a frame of their own.
     std::vector<Vec3> other = square(10, 30, 0.5);
     for (Vec3& p : other) p[2] += 6;
     const Contours tilted = Drawing(cube(40)).add(square(10, 30, 0.5)).add(other).densify(1);

@@ -73,6 +73,6 @@ TEST_CASE("the field between planes of two directions: each plane's sides, and n
             }
     INFO("wrong " << wrong << " of " << compared);
     CHECK(wrong == 0);
-    // Moved by the level that held-out planes choose.
+    // Shifted by the level that is chosen with held-out planes.
     CHECK(high - low <= 2 + 1e-3);
 }

@@ -35,7 +35,7 @@ TEST_CASE("lines of seeds are scribbles", "[seeds]") {
     line.closed = false;
     cloud.lines = {line};
     const std::vector<Vec3> seeds = collect_seeds(cloud, 1);
-    CHECK(seeds.size() == 9);  // 0..4, then 1..3 along y, and the loose one
+    CHECK(seeds.size() == 9);  // 0..4, then 1..3 along y, and the single one
     CHECK(seeds.back() == Vec3{9, 9, 9});
     cloud.lines[0].closed = true;
     CHECK(collect_seeds(cloud, 1).size() == 13);

@@ -12,7 +12,8 @@ using namespace covol::test;
 
 namespace {
 
-/// Every active voxel has the exact distance, every voxel of the domain in the tube is active, and no other.
+/// Every active voxel has the exact distance, and the active voxels are exactly the voxels of the domain within the
+/// tube.
 void check_against_brute_force(const std::vector<Vec3>& points, const Domain& domain, double radius) {
     const DistanceResult result = compute_distance(points, domain, {radius});
     std::int64_t active = 0;
@@ -106,7 +107,8 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
     std::vector<Vec3> moved = points;
     for (Vec3& p : moved) p = {-p[2], p[0], -p[1]};
     const DistanceResult a = compute_distance(points, domain, {3.0}), b = compute_distance(moved, domain, {3.0});
-    // Sweeping has an order: a few voxels may miss their nearest point in one of the two, by little.
+    // The result depends on the order of the sweeps: in either grid a few voxels may miss their nearest point by
+    // little.
     double worst = 0, sum = 0;
     for (auto value = a.grid->cbeginValueOn(); value; ++value) {
         const openvdb::Coord c = value.getCoord();

@@ -1,4 +1,4 @@
-// The kernel on a leaf against loops that spell out what it says.
+// The kernel on a leaf against plain loops of the same definition.
 #include "distance/nearest_kernel.h"
 
 #include <array>
@@ -24,7 +24,7 @@ void set(NearestBlock& block, int i, int j, int k, const Offer& point, int index
     block.index[at] = index;
 }
 
-/// Of the point that one voxel holds, to the place of another.
+/// Squared distance from the point that one voxel holds to another voxel.
 double squared(const NearestBlock& block, const std::array<int, 3>& holder, const std::array<int, 3>& place) {
     const int at = NearestBlock::offset(holder[0], holder[1], holder[2]);
     const double x = block.x[at] - place[0], y = block.y[at] - place[1], z = block.z[at] - place[2];
@@ -39,9 +39,9 @@ std::unique_ptr<NearestBlock> no_points() {
     return block;
 }
 
-/// Face 2a is that of the least coordinate on axis a, 2a + 1 of the largest. The rows of a face run along the later one
-/// of its axes; a halo voxel looks at the face's voxels in the three rows next to it.
-bool has_news(const NearestBlock& block, int face, double reach) {
+/// Face 2a is that of the minimum coordinate on axis a, 2a + 1 that of the maximum. The rows of a face run along the
+/// later one of its axes; a halo voxel considers the face's voxels in the three rows next to it.
+bool improves_halo(const NearestBlock& block, int face, double reach) {
     const int axis = face / 2, across = axis == 0 ? 1 : 0, along = axis == 2 ? 1 : 2;
     const int own = face % 2 == 0 ? 0 : 7, halo = face % 2 == 0 ? -1 : 8;
     for (int r = 0; r < 8; ++r)
@@ -71,14 +71,14 @@ TEST_CASE("the six faces' news are those of a loop over the halo") {
     std::array<int, 6> found_in{}, silent{};
     for (int round = 0; round < 4000; ++round) {
         const auto block = no_points();
-        // One or two points in it; known beyond some of the faces.
+        // One or two points in the block; nearest points are known beyond some of the faces.
         for (int count = 1 + round % 2; count > 0; --count)
             set(*block, voxel(random), voxel(random), voxel(random), {place(random), place(random), place(random)},
                 count);
         const double reach = kind(random) == 0 ? 4.0 : 400.0;
-        const unsigned news = covol::detail::faces_with_news(*block, float(reach));
+        const unsigned news = covol::detail::improved_faces(*block, float(reach));
         for (int face = 0; face < 6; ++face) {
-            const bool expected = has_news(*block, face, reach);
+            const bool expected = improves_halo(*block, face, reach);
             INFO("round " << round << ", face " << face);
             REQUIRE((news >> face & 1U) == unsigned(expected));
             ++(expected ? found_in : silent)[face];
@@ -156,7 +156,7 @@ TEST_CASE("points are taken over as a loop would, and those that changed within 
         for (std::int32_t& n : nearest) n = index(random);
         const auto before = nearest;
         std::array<std::uint64_t, 8> changed{};
-        covol::detail::take_points(*block, kReach, all, nearest.data(), changed.data());
+        covol::detail::store_points(*block, kReach, all, nearest.data(), changed.data());
         int found_in = 0;
         for (int i = 0; i < 8; ++i)
             for (int j = 0; j < 8; ++j)

@@ -116,7 +116,7 @@ TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised
 TEST_CASE("the edge detector is the dense reference's") {
     const Domain domain = cube_domain(21, kH, 2);  // ends inside leaves
     const Function waves = random_waves(31, 3.0);
-    const Function f = [&](const Vec3& x) { return 0.5 + 0.45 * waves(x); };  // a few values are clamped
+    const Function f = [&](const Vec3& x) { return 0.5 + 0.45 * waves(x); };  // some values are clamped
     const Image image = image_on(domain, f);
     for (const double sigma : {0.0, kH, 2.5 * kH}) {
         INFO("sigma = " << sigma / kH << " h");
@@ -126,7 +126,7 @@ TEST_CASE("the edge detector is the dense reference's") {
         CHECK(largest_difference(domain, *result.grid, expected) < 1e-4);
         double low = 1;
         for (auto v = result.grid->cbeginValueOn(); v; ++v) low = std::min<double>(low, *v);
-        CHECK(low < 0.9);  // else nothing was compared
+        CHECK(low < 0.9);  // otherwise nothing was compared
     }
 }
 
@@ -223,7 +223,7 @@ constexpr double kSheetAt = 0.4;  // off the voxels' centres
 /// A bright sheet across x, 1.2 wide, on a floor.
 double sheet(const Vec3& x) { return 0.2 + 0.6 * std::exp(-0.5 * (x[0] - kSheetAt) * (x[0] - kSheetAt) / 0.36); }
 
-/// Places on the sheet, and their normals.
+/// Positions on the sheet, and their normals.
 MarkedFeature feature_on_sheet(const Image& image) {
     std::vector<Vec3> places, normals;
     for (double y = -4; y <= 4; y += 0.5)
@@ -272,7 +272,7 @@ TEST_CASE("lines take their contrast from a third of the median") {
     o.intensities = {0, 1};
     o.sigma = 0.5;
     o.feature = EdgeFeature::BrightLine;
-    // Oblique to the voxels, of which whole layers would have the median else.
+    // Oblique to the voxels: otherwise whole layers of voxels would have the median.
     const Image oblique = image_on(domain, [](const Vec3& x) {
         return sheet({x[0] + 0.13 * x[1] + 0.07 * x[2], x[1], x[2]});
     });
@@ -294,7 +294,7 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
         feature_on_sheet(image_on(domain, [](const Vec3& x) { return x[0] > kSheetAt ? 0.2 : 0.9; }));
     CHECK(border.feature == EdgeFeature::Slope);
     CHECK(border.step == Approx(-0.35).margin(0.02));
-    // A line on a border is a line where it stands out from both sides.
+    // A line on a border counts as a line if it stands out on both sides.
     const auto both = [](double step) {
         return [step](const Vec3& x) { return sheet(x) + (x[0] > kSheetAt ? step : 0.0); };
     };

@@ -25,7 +25,7 @@ constexpr double kH = 0.5;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Points and image around a lopsided surface, in a band of leaves that the surface cuts anyhow.
+/// Points and image around an asymmetric surface, in a band whose outline does not follow the leaves.
 Problem everything_on(int n = 28, int first = -5) {
     Problem p;
     p.domain = cube_domain(n, kH, first);
@@ -185,7 +185,7 @@ TEST_CASE("a value that is not finite is named, and u stays as it was") {
 TEST_CASE("a frozen value that is not finite leaves u at the step before") {
     const Problem p = everything_on(20);
     const FloatGridPtr u = start_of(p);
-    // Next to an active voxel, so that it enters a row.
+    // Next to an active voxel, so that its value enters a row of the system.
     openvdb::Coord at = u->cbeginValueOn().getCoord();
     while (u->tree().isValueOn(at)) at.x() -= 1;
     u->tree().setValueOff(at, std::numeric_limits<float>::quiet_NaN());
@@ -251,7 +251,7 @@ TEST_CASE("it stops when it is steady, and says so") {
 }
 
 TEST_CASE("an automatic step grows by its ratio while the surface hardly moves") {
-    // A plane in a constant slope moves by slope x step.
+    // A plane under a constant slope of g moves by slope x step.
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
     set_distance(p, [](const Vec3& x) { return 10 - 0.02 * x[0]; });
     EvolveOptions o = evolve_options(p.options, 6);
@@ -263,7 +263,7 @@ TEST_CASE("an automatic step grows by its ratio while the surface hardly moves")
 }
 
 TEST_CASE("inactive leaves leave the surface where it would be") {
-    // The points' sphere touches the start on one side: there it is steady long before the other side arrives.
+    // The sphere of the points touches the start on one side, which is steady long before the other side arrives.
     const Vec3 target{4, 0, 0};
     Problem p = whole_cube(48, kH, [](const Vec3& x) { return clamp_to(length(x) - 9.5, 3 * kH); });
     set_distance(p, [&](const Vec3& x) { return std::abs(length({x[0] - target[0], x[1], x[2]}) - 5.5); });
@@ -273,7 +273,7 @@ TEST_CASE("inactive leaves leave the surface where it would be") {
         EvolveOptions o = evolve_options(p.options, 60);
         o.follow = follow;
         o.solver_tolerance = EvolveOptions{}.solver_tolerance;
-        o.tolerance = 4e-3;  // so much counts as steady that some become inactive
+        o.tolerance = 4e-3;  // a tolerance at which some become inactive
         const FloatGridPtr some_active = start_of(p), all_active = start_of(p);
         const EvolveReport some = evolve(*some_active, Fields(p).get(), o);
         o.tolerance = 0;  // none ever becomes inactive
@@ -327,7 +327,7 @@ TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
         const auto crossings = zero_crossings(p.domain, to_dense(p.domain, *u));
         REQUIRE(crossings.size() > 100);
         for (const Crossing& c : crossings) CHECK(length(c.position) == Approx(kRadius).margin(0.1 * kH));
-        // without it nothing is left
+        // without the obstacle the surface vanishes
         CHECK(evolve(*start_of(p), {}, o).stop_reason == StopReason::Vanished);
     }
 }

@@ -64,7 +64,7 @@ TEST_CASE("the corrected surface passes a mark, near or far, outside or inside",
         CHECK(correction.report().after_max < 0.5);
         const FloatGridPtr start = correction.start();
         CHECK(std::abs(value_at(*start, mark)) < 0.6);
-        // The other side is as it was.
+        // The opposite side is unchanged.
         CHECK(value_at(*start, at(kRadius, 1.1 + 3.1, 0.4)) == Approx(0).margin(0.05));
         CHECK(correction.shift(at(kRadius, 1.1 + 3.1, 0.4)) == 0);
     }
@@ -74,12 +74,12 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
-    // One bump of the least radius, 12 voxels, more than that times 2.2; d: from mark to mark.
+    // One bump of the minimum radius, 12 voxels, times more than 2.2; d: from mark to mark.
     const GuessCorrection one = correct_guess(guess, {off}, {}, {});
     const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)),
                  t = d / 12;
     CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1))
-                               .epsilon(0.05));  // and a narrower one for what that left
+                               .epsilon(0.05));  // and a narrower one for the remainder
     const GuessCorrection both = correct_guess(guess, {on, off}, {}, {});
     CHECK(both.report().after_max < 0.5);
     CHECK(std::abs(both.shift(on)) < 0.5);
@@ -109,7 +109,8 @@ TEST_CASE("many marks of another surface give that surface", "[guess]") {
 }
 
 TEST_CASE("a part that is missing is filled, and what is right beside it is not inflated", "[guess]") {
-    // A ball without its cap, a quarter of it and 0.65 radii high, and ten marks anywhere on the cap.
+    // A ball without its cap, which has a quarter of the ball's area and is 0.65 radii high, and ten random marks on
+    // the cap.
     constexpr double kPlane = 0.347 * kRadius;
     ImageGeometry geometry = ball_mask(kRadius).geometry();
     std::vector<std::uint8_t> values;
@@ -137,7 +138,7 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
     for (int draw = 0; draw < 10; ++draw) {
         std::vector<Vec3> marks;
         while (marks.size() < 10) {
-            const double height = kPlane + (kRadius - kPlane) * uniform(random);  // Archimedes: even on the sphere
+            const double height = kPlane + (kRadius - kPlane) * uniform(random);  // Archimedes: uniform on the sphere
             marks.push_back(at(kRadius, std::acos(height / kRadius), 6.2831853 * uniform(random)));
         }
         CAPTURE(draw);
@@ -148,7 +149,7 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
         CHECK(reached.back() > given);
         const FloatGridPtr start = correction.start();
         for (const Vec3& mark : marks) CHECK(std::abs(value_at(*start, mark)) < 0.8);
-        // The half of the ball away from the cap, and the level set says what the mask does.
+        // On the half of the ball away from the cap, the level set agrees with the mask.
         CHECK(std::abs(value_at(*start, at(kRadius, 2.6, 1))) < 0.6);
         std::size_t n = 0, differ = 0;
         for (int k = 0; k < kSize; ++k)

@@ -16,13 +16,14 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A closed surface with a known volume and a signed distance that is exact to first order beside it.
+/// A closed surface with a known volume and a signed distance that is exact to first order near it.
 struct Shape {
     const char* name;
-    std::function<Vec3(std::mt19937&)> draw;  ///< a random point of it
+    std::function<Vec3(std::mt19937&)> draw;  ///< a random point of the surface
     Function distance;
     double volume;
-    double bias_of_50 = 0.05, volume_of_50 = 0.005;  ///< 50 random points leave gaps as wide as the ring is thick
+    double bias_of_50 = 0.05,
+           volume_of_50 = 0.005;  ///< 50 random points leave gaps as wide as the thickness of the ring
 };
 
 Vec3 random_direction(std::mt19937& random) {
@@ -107,7 +108,7 @@ TEST_CASE("exact points are met without bias, however few") {
 }
 
 TEST_CASE("rough marks in thick slices enclose a body") {
-    // A knobbly body: by their energy alone many such surfaces run through the world and do not close.
+    // A bumpy body: by energy alone, many surfaces through such marks run to infinity and do not close.
     const Shape shape = ellipsoid("ellipsoid", {18, 13, 16});
     const Vec3 spacing{0.8, 0.8, 6.5};
     int held = 0;
@@ -144,7 +145,7 @@ TEST_CASE("what encloses nothing is refused with a reason") {
 TEST_CASE("a guess does not depend on the number of threads, nor on where the world begins") {
     const Shape shape = ellipsoid("ellipsoid", {18, 12, 10});
     const Domain domain = cube_domain(56, 1.0);
-    const std::vector<Vec3> marks = draw(shape, 500, 5);  // parts, too
+    const std::vector<Vec3> marks = draw(shape, 500, 5);  // also parts
     RunContext one, four;
     one.threads = 1;
     four.threads = 4;
@@ -155,7 +156,7 @@ TEST_CASE("a guess does not depend on the number of threads, nor on where the wo
 }
 
 TEST_CASE("marks in the cut are told from marks on the surface") {
-    // A ball whose upper third the image cuts off, marked on its surface and on the cut.
+    // A ball whose upper third is beyond the end of the image, with marks on its surface and on the cut.
     const Shape shape = ellipsoid("sphere", {20, 20, 20});
     Domain domain = cube_domain(72, 1.0);
     domain.max[2] = domain.min[2] + 41;
@@ -183,7 +184,7 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
 }
 
 TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
-    // A thick shell: marks on both of its walls. Without a seed the cavity may be taken for part of the body.
+    // A thick shell with marks on both walls. Without a seed the cavity may be taken for part of the body.
     std::vector<Vec3> marks = draw(ellipsoid("outer", {22, 22, 22}), 120, 11);
     const std::vector<Vec3> inner = draw(ellipsoid("inner", {10, 10, 10}), 40, 12);
     marks.insert(marks.end(), inner.begin(), inner.end());

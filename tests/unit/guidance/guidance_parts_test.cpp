@@ -1,4 +1,4 @@
-// Parts of the image guidance: distances in a wide band, and pieces that a displacement tears off.
+// Parts of the image guidance: distances in a wide band, and pieces that a displacement separates.
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -49,9 +49,9 @@ TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guid
         maximum = std::max(maximum, std::abs(double(*value) - (x.length() - kRadius * h)) / h);
         ++count;
     }
-    // No foot is farther than sqrt(3) / 2 from a vertex, and no distance below 2.5 is one to a vertex.
+    // No foot point is farther than sqrt(3) / 2 from a vertex, and distances below 2.5 are not measured to vertices.
     CHECK(maximum < std::hypot(2.5, 0.5 * std::sqrt(3.0)) - 2.5 + 0.03);
-    // All voxels within the width, on both sides.
+    // All voxels within the width are there, on both sides.
     const double shell = 4.0 / 3 * M_PI * (std::pow(kRadius + kWidth, 3) - std::pow(kRadius - kWidth, 3));
     CHECK(double(count) == Approx(shell).epsilon(0.02));
     const auto accessor = wide.grid()->getConstAccessor();
@@ -103,7 +103,7 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
     const Domain domain = cube(13, 1);
     const openvdb::CoordBBox box(Coord(-13), Coord(13));
     const FloatGridPtr u = make_grid(domain, 40, "u");
-    std::map<Coord, float> expected;  // active ones
+    std::map<Coord, float> expected;  // active voxels
     const float bias = seed == 2 ? 0.45F : 0.5F;
     for (auto at = box.begin(); at; ++at) {
         const float value = uniform(random) + ((*at)[0] < 0 ? bias : -bias);
@@ -173,12 +173,12 @@ TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows
             const std::uint32_t v = patches.members[n];
             ++met[v];
             CHECK(patches.patch[v] == i);
-            // Of one cell of four voxels: at most its diagonal apart.
+            // Members of a patch lie in one cell of four voxels: at most its diagonal apart.
             CHECK(length({patches.places[v][0] - patches.centers[i][0], patches.places[v][1] - patches.centers[i][1],
                           patches.places[v][2] - patches.centers[i][2]}) < 2.0 * std::sqrt(3.0));
         }
         area += patches.area[i];
-        // The mean normal of a part of a sphere.
+        // The direction is close to the mean normal of a part of a sphere.
         const Vec3& c = patches.centers[i];
         const double along =
             (c[0] * patches.directions[i][0] + c[1] * patches.directions[i][1] + c[2] * patches.directions[i][2]) /

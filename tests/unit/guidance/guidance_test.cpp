@@ -32,7 +32,7 @@ ImageGeometry lattice(double along_z = 1) {
     return g;
 }
 
-/// Brightness at a place, with Gaussian noise.
+/// An image with the brightness of a position, plus Gaussian noise.
 Image picture(const ImageGeometry& g, const std::function<double(const Vec3&)>& brightness, double noise,
               unsigned seed = 1) {
     std::mt19937 random(seed);
@@ -81,7 +81,7 @@ struct Radius {
     double mean, rms, largest;
 };
 
-/// Of the surface about the origin, less `radius`: mean, root mean square, largest deviation.
+/// Of the distances of the surface from the origin, minus `radius`: mean, root mean square, largest deviation.
 Radius radius_of(const FloatGrid& grid, double radius) {
     const TriangleMesh mesh = extract_mesh(*extract_surface(grid));
     Radius r{0, 0, 0};
@@ -95,7 +95,8 @@ Radius radius_of(const FloatGrid& grid, double radius) {
     return r;
 }
 
-/// A sphere through the marks with dents and bumps between them: off by `depth` where marks are far.
+/// A sphere through the marks with dents and bumps between them, of amplitude `depth` at the positions farthest from
+/// marks.
 FloatGridPtr wavy_sphere(const Domain& d, const std::vector<Vec3>& marks, double depth) {
     double farthest = 0;
     const auto to_mark = [&](const Vec3& x) {
@@ -177,7 +178,7 @@ TEST_CASE("A stained membrane is found, bright or dark, whatever lies beside it"
 }
 
 TEST_CASE("The border is where the marks have it, not where the slope is steepest") {
-    // The marks lie one and a half voxels outside of the ball's edge.
+    // The marks lie one and a half voxels outside of the ball's border.
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at((length(x) - kRadius + 1.5) / 2); }, 5);
@@ -248,7 +249,8 @@ TEST_CASE("the precision of marks is their standard deviation, as segment() mean
     GuidanceOptions options;
     const GuidanceReport automatic = guide(*guess, marks, image, options).report;
     REQUIRE(automatic.used);
-    options.mark_precision = kUniformDeviation * g.spacing[0];  // of what is uniform over a voxel
+    options.mark_precision =
+        kUniformDeviation * g.spacing[0];  // the standard deviation of a uniform distribution over a voxel
     const GuidanceReport stated = guide(*guess, marks, image, options).report;
     CHECK(stated.gain == Approx(automatic.gain));
     CHECK(stated.image_error == Approx(automatic.image_error));

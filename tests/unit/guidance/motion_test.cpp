@@ -20,7 +20,7 @@ namespace {
 constexpr int kSize = 44;
 const Vec3 kMiddle{21.3, 22.1, 20.7};
 
-/// A body with no symmetry: an ellipsoid with a bump. @param grown  outward, voxels
+/// A body without symmetry: an ellipsoid with a bump. @param grown  outward, voxels
 double level(const Vec3& p, const Vec3& shift, double grown) {
     Vec3 q;
     for (int a = 0; a < 3; ++a) q[a] = p[a] - kMiddle[a] - shift[a];
@@ -29,12 +29,12 @@ double level(const Vec3& p, const Vec3& shift, double grown) {
     return std::min(body, bump) - grown;
 }
 
-struct Look {
+struct Appearance {
     Vec3 shift{0, 0, 0};
     double grown = 0, gain = 100, base = 20, noise = 0;
 };
 
-Image frame(const Look& look) {
+Image frame(const Appearance& look) {
     ImageGeometry geometry;
     geometry.size = {kSize, kSize, kSize};
     std::mt19937_64 random(11);
@@ -44,7 +44,7 @@ Image frame(const Look& look) {
         for (int j = 0; j < kSize; ++j)
             for (int i = 0; i < kSize; ++i) {
                 const double d = level({double(i), double(j), double(k)}, look.shift, look.grown);
-                // Brighter on one side than on the other, and all around.
+                // Brightness gradients within the body and around it.
                 const double inside = 1 + 0.02 * i, outside = 0.01 * j;
                 const double edge = 1 / (1 + std::exp(d / 0.7));
                 values.push_back(
@@ -53,7 +53,7 @@ Image frame(const Look& look) {
     return Image::from_values(geometry, values.data());
 }
 
-FloatGridPtr body(const Look& look = {}) {
+FloatGridPtr body(const Appearance& look = {}) {
     Domain domain;
     domain.max = {kSize - 1, kSize - 1, kSize - 1};
     return start_from_level(domain, {{kMiddle[0], kMiddle[1], kMiddle[2] + 9}},
@@ -76,7 +76,7 @@ CompareReport apart(const FloatGridPtr& one, const FloatGridPtr& other) {
 
 TEST_CASE("In an image that did not change a surface stays where it is") {
     const double noise = GENERATE(0.0, 0.1);
-    const Look look{.noise = noise};
+    const Appearance look{.noise = noise};
     const FloatGridPtr before = body();
     const Followed followed = SurfaceTemplate(before, frame(look)).follow(frame(look));
     CHECK(followed.report.max_offset < 1e-3);
@@ -86,8 +86,8 @@ TEST_CASE("In an image that did not change a surface stays where it is") {
 }
 
 TEST_CASE("A surface follows what moves and grows, whatever the lamp does") {
-    const Look then{.noise = 0.03};
-    Look now{.shift = {3.2, -1.6, 0.7}, .gain = 60, .base = 90, .noise = 0.03};
+    const Appearance then{.noise = 0.03};
+    Appearance now{.shift = {3.2, -1.6, 0.7}, .gain = 60, .base = 90, .noise = 0.03};
     now.grown = GENERATE(0.0, 1.0);
     const FloatGridPtr before = body();
     const Followed followed = SurfaceTemplate(before, frame(then)).follow(frame(now));
@@ -95,7 +95,7 @@ TEST_CASE("A surface follows what moves and grows, whatever the lamp does") {
     CHECK(followed.report.mean_offset == Approx(now.grown).margin(0.3));
     CHECK(followed.report.correlation > 0.9);
     CHECK(apart(followed.u, body(now)).assd < 0.3);
-    CHECK(apart(before, body(now)).assd > 1.2);  // what stays behind
+    CHECK(apart(before, body(now)).assd > 1.2);  // error of a surface that does not follow
 }
 
 TEST_CASE("The surface that follows does not depend on threads") {
@@ -115,7 +115,7 @@ TEST_CASE("A static time-lapse keeps its surface to a tenth of a voxel over ten 
     Marks marks;
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;
-    while (marks.points.size() < 60) {  // on the surface, along random directions
+    while (marks.points.size() < 60) {  // on the surface, in random directions
         Vec3 d{normal(random), normal(random), normal(random)};
         const double length = std::hypot(d[0], d[1], d[2]);
         double low = 0, high = 20;

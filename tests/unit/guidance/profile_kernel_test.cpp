@@ -1,4 +1,4 @@
-// The kernels on profiles against loops that spell out what they say.
+// The kernels on profiles against plain loops of the same definition.
 #include "guidance/profile_kernel.h"
 
 #include <catch2/catch.hpp>

@@ -20,7 +20,7 @@ namespace {
 
 const double kPi = std::acos(-1.0);
 
-/// An octahedron, subdivided and blown up to the unit sphere.
+/// An octahedron, subdivided and projected onto the unit sphere.
 TriangleMesh sphere_mesh(int subdivisions) {
     TriangleMesh mesh{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
                       {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
@@ -68,7 +68,7 @@ double narrowest_angle(const TriangleMesh& mesh) {
     return minimum * 180 / kPi;
 }
 
-/// On the unit sphere, where `keep` says.
+/// Points of the unit sphere for which keep(point) holds.
 template <typename Keep>
 std::vector<Vec3> sphere_points(int count, unsigned seed, Keep keep) {
     std::vector<Vec3> points;
@@ -129,7 +129,7 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
 }
 
 TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
-    // A square of four triangles around a centre; two opposite ones stay.
+    // A square of four triangles around a centre; two opposite ones are kept.
     const TriangleMesh square{{{0, 0, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}},
                               {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}}};
     const TriangleMesh part = holes::kept_part({square, {1, 0, 1, 0}});
@@ -192,7 +192,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             CHECK(m.area == Approx(2 * kPi * (1 + level)).margin(rim * spacing));
             CHECK(open.report.fraction == Approx((1 - level) / 2).margin(rim * spacing / (4 * kPi)));
             CHECK(narrowest_angle(open.mesh) > 5);
-            // Outward: away from the middle.
+            // Outward means away from the centre.
             std::size_t inward = 0;
             for (const auto& t : open.mesh.triangles) {
                 double up = 0;
@@ -295,6 +295,6 @@ TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set
     CHECK(flat.distance_to_points.size() == flat.mesh.vertices.size());
 
     options.holes.policy = Holes::Open;
-    options.holes.distance = 3;  // farther than anything: no hole
+    options.holes.distance = 3;  // farther than any position: no hole
     CHECK(reconstruct(points, options).report.surface.closed);
 }

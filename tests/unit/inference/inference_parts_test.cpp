@@ -22,7 +22,7 @@ ImageGeometry geometry(const Index3& size, const Vec3& spacing) {
 
 Lattice cube(int n, const Vec3& spacing = {1, 1, 1}) { return {{n, n, n}, {0, 0, 0}, spacing}; }
 
-/// sum weight |grad u| + cost u of the forward differences, in double precision.
+/// Sum of weight |grad u| + cost u, with forward differences in double precision.
 double energy(const Lattice& l, const Field& weight, const Field& cost, const Field& u) {
     double sum = 0;
     for (int k = 0; k < l.size[2]; ++k)
@@ -120,7 +120,8 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
     minimize_surface(l, weight, cost, 300, u, {});
     for (std::size_t n = 0; n < u.size(); ++n) REQUIRE(u[n] == (n % 3 == 0 ? 1.0F : 0.0F));
 
-    // A ball of cost -a in a ball of radius R: it is kept where a R > 3 (cost -a 4/3 pi R^3 against surface 4 pi R^2).
+    // A ball of cost -a in a ball of radius R: the minimiser is the ball if a R > 3 (cost -a 4/3 pi R^3 against surface
+    // 4 pi R^2).
     const double radius = 10;
     for (const double gain : {0.2, 0.6}) {
         for (std::size_t n = 0; n < cost.size(); ++n) {
@@ -137,7 +138,7 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
             CHECK(volume == 0);
         else
             CHECK(volume == Approx(4.0 / 3 * M_PI * radius * radius * radius).epsilon(0.05));
-        // No body with another radius is better.
+        // No body with another radius has a smaller energy.
         const double minimum = energy(l, weight, cost, u);
         for (double r = 0; r < 14; r += 1) {
             Field ball(l.count());
@@ -160,7 +161,8 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
             for (float& v : s.at) v = normal(random);
             s.inside = n % 2 == 0;
             s.fold = n % kFolds;
-            // A shell of brightness: no line parts it from what is darker and brighter.
+            // Inside is a layer of brightness between darker and brighter voxels outside: no linear rule separates
+            // them.
             if (!s.inside)
                 s.at[0] = (n % 4 == 1 ? apart : -apart) + 0.2F * normal(random);
             else
@@ -175,7 +177,7 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
     const Appearance appearance(learnt, 3);
     Features middle{}, off{}, far{};
     off[0] = 2;
-    far[0] = 100;  // beyond what was seen it says what it says at the end of that
+    far[0] = 100;  // beyond the range of the samples the slope at its end continues
     CHECK(appearance.log_odds(middle) > 1);
     CHECK(appearance.log_odds(off) < -1);
     CHECK(appearance.log_odds(far) < -1);
@@ -191,7 +193,7 @@ TEST_CASE("Marks are ordered by their place, and their hull leaves the image's e
     const Marks marks(g, world);
     CHECK(marks.spread.size() == 150);
     std::vector<Vec3> turned(world.rbegin(), world.rend());
-    turned.push_back(world.front());  // a copy counts once
+    turned.push_back(world.front());  // duplicates count once
     CHECK(Marks(g, turned).places == marks.places);
     CHECK(marks.above_hull({25, 25, 25}) < 0);
     CHECK(marks.above_hull({25, 25, 49}) > 5);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kSize = 64;
 
-/// A horn: three quarters of a ring whose thickness falls to its ends. Negative inside, about a distance.
+/// A horn: three quarters of a ring that tapers to its ends. Negative inside, approximately a distance.
 double horn(const Vec3& p) {
     const double angle = std::clamp(std::atan2(p[1], p[0]), -2.4, 2.4), ring = 18,
                  radius = 4 - 1.5 * std::abs(angle) / 2.4;
@@ -36,7 +36,7 @@ ImageGeometry geometry() {
 
 using Body = double (*)(const Vec3&);
 
-/// Brighter inside by `contrast`, with noise.
+/// Brighter inside by `contrast`, plus noise.
 std::vector<float> picture(Body body, double contrast, double noise) {
     std::mt19937 random(1);
     std::normal_distribution<double> normal(0, noise);
@@ -52,7 +52,7 @@ std::vector<float> picture(Body body, double contrast, double noise) {
     return values;
 }
 
-/// Anywhere on the surface, each moved by up to half a voxel along each axis.
+/// Random marks on the surface, each moved by up to half a voxel along each axis.
 std::vector<Vec3> marks_on(Body body, int count, unsigned seed = 4) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> wide(-30, 30), half(-0.5, 0.5);
@@ -72,7 +72,7 @@ FloatGridPtr guess_of(const std::vector<Vec3>& marks) {
     return guess_from_marks(make_domain(geometry().world_box(), 1.0), marks, options).u;
 }
 
-/// Of a level set with a body.
+/// Dice coefficient of a level set and a body.
 double dice(const FloatGrid& u, const std::function<double(const Vec3&)>& body) {
     double both = 0, sum = 0;
     const auto at = u.getConstAccessor();
@@ -182,7 +182,7 @@ TEST_CASE("An image of noise, or of nothing, does not make a surface worse") {
 TEST_CASE("Places that are known to be outside are outside") {
     const Case c = horn_case();
     const std::vector<Vec3> middle{{18, 0, 0}};
-    // The middle of the horn's thick part is said to be outside: it is a hole then, whatever the image says.
+    // A seed makes the middle of the horn's thick part an outside region: it is then a hole, whatever the image shows.
     const Inferred inferred = infer(*c.guess, c.marks, c.image, {{}, middle});
     if (inferred.report.used) CHECK(detail::levels_at(*inferred.u, middle)[0] > 0);
     const Inferred right = infer(*c.guess, c.marks, c.image, {middle, {{0, 0, 0}}});

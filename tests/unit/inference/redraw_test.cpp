@@ -19,7 +19,7 @@ constexpr double kRadius = 11;
 
 double away(const Vec3& p) { return std::hypot(p[0] - kMiddle[0], p[1] - kMiddle[1], p[2] - kMiddle[2]); }
 bool in_truth(const Vec3& p) { return away(p) < kRadius; }
-/// Another tool's result: without what lies beyond a plane.
+/// The result of another tool, which lacks everything beyond a plane.
 bool in_guess(const Vec3& p) { return in_truth(p) && p[0] < kMiddle[0] + 4; }
 
 ImageGeometry geometry() {
@@ -55,7 +55,7 @@ FloatGridPtr guess() {
     return start_from_mask(domain, mask_of(in_guess));
 }
 
-/// On the part of the true surface that the guess lacks.
+/// Marks on the part of the true surface that the guess lacks.
 std::vector<Vec3> marks() {
     std::vector<Vec3> places{{kMiddle[0] + kRadius, kMiddle[1], kMiddle[2]}};
     for (int n = 0; n < 4; ++n) {
@@ -93,7 +93,7 @@ TEST_CASE("Where marks say that a guess lacks a part the image redraws it") {
     const double before = dice(inside_of(given), in_truth), after = dice(inside_of(redrawn.u), in_truth);
     CHECK(before < 0.92);
     CHECK(after > 0.98);
-    // Far from what was missed it is the guess.
+    // Far from the missing part the result equals the guess.
     CHECK(redrawn.u->tree().getValue({9, 20, 20}) == Approx(given->tree().getValue({9, 20, 20})));
 
     const GuessCorrection correction = correct_guess(given, marks(), {}, {}, {}, {}, {redrawn.u, redrawn.box});
@@ -117,7 +117,7 @@ TEST_CASE("An image that does not tell the sides of a guess does not redraw it, 
 }
 
 TEST_CASE("What hangs on nothing does not come") {
-    // A second ball, as bright, beside the part that is missing, but apart from it.
+    // A second ball, equally bright, near the missing part but separate from it.
     const Vec3 other{kMiddle[0] + kRadius + 4, kMiddle[1], kMiddle[2]};
     std::vector<float> values;
     for (int k = 0; k < kSize; ++k)

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::uint32_t kTask = 7;
 
-Trial try_one(const Piece& piece, double seconds = 10, const SharedMemory& results = SharedMemory(0)) {
-    return try_pieces(COVOL_ODD_READER, kTask, {piece}, results, seconds, RunContext()).front();
+PieceOutcome try_one(const Piece& piece, double seconds = 10, const SharedMemory& results = SharedMemory(0)) {
+    return run_pieces(COVOL_ODD_READER, kTask, {piece}, results, seconds, RunContext()).front();
 }
 
 std::size_t open_descriptors() {
@@ -37,7 +37,7 @@ TEST_CASE("A program's result comes back, and nothing of it stays open") {
     const std::size_t before = open_descriptors();
     {
         const SharedMemory results(16);
-        const Trial trial = try_one({"write", "", 8, 4}, 10, results);
+        const PieceOutcome trial = try_one({"write", "", 8, 4}, 10, results);
         CHECK_FALSE(trial.crashed);
         CHECK_FALSE(trial.refused);
         std::uint32_t written = 0, beside = 0;
@@ -45,7 +45,7 @@ TEST_CASE("A program's result comes back, and nothing of it stays open") {
         std::memcpy(&beside, results.data() + 4, sizeof beside);
         CHECK(written == kTask);
         CHECK(beside == 0);
-        CHECK(ftruncate(results.descriptor(), 1) != 0);  // nor may the program take it away
+        CHECK(ftruncate(results.descriptor(), 1) != 0);  // the program may not shrink the memory either
     }
     CHECK(open_descriptors() == before);
 }
@@ -61,10 +61,10 @@ TEST_CASE("Many pieces of work: each is done, and those that fail are told of") 
     for (const int threads : {1, 8}) {
         const SharedMemory results(4 * kCount);
         const auto* const values = reinterpret_cast<const std::uint32_t*>(results.data());
-        std::vector<Trial> trials;
+        std::vector<PieceOutcome> trials;
         RunContext run;
         run.threads = threads;
-        with_threads(run, [&] { trials = try_pieces(COVOL_ODD_READER, kTask, pieces, results, 10, run); });
+        with_threads(run, [&] { trials = run_pieces(COVOL_ODD_READER, kTask, pieces, results, 10, run); });
         REQUIRE(trials.size() == kCount);
         for (std::size_t n = 0; n < kCount; ++n) {
             CHECK(trials[n].crashed == (n % 50 == 7));
@@ -73,12 +73,13 @@ TEST_CASE("Many pieces of work: each is done, and those that fail are told of") 
             CHECK(values[n] == (n % 50 == 7 || n % 50 == 9 ? 0 : kTask));
         }
     }
-    CHECK(try_pieces(COVOL_ODD_READER, kTask, {}, SharedMemory(0), 10, RunContext()).empty());
+    CHECK(run_pieces(COVOL_ODD_READER, kTask, {}, SharedMemory(0), 10, RunContext()).empty());
 }
 
 TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancelled does not wait for it") {
     const std::vector<Piece> pieces{{"write"}, {"hang"}, {"write"}};
-    const std::vector<Trial> trials = try_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 0.2, RunContext());
+    const std::vector<PieceOutcome> trials =
+        run_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 0.2, RunContext());
     CHECK_FALSE(trials[0].crashed);
     CHECK(trials[1].crashed);
     CHECK_FALSE(trials[2].crashed);
@@ -91,7 +92,7 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
         cancel = true;
     });
     try {
-        try_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 1000, run);
+        run_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 1000, run);
         FAIL("not cancelled");
     } catch (const Error& error) {
         CHECK(error.code() == Errc::Cancelled);
@@ -100,17 +101,17 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
 }
 
 TEST_CASE("An error in the program is told of") {
-    const Trial trial = try_one({"refuse", "a.h5: sheared"});
+    const PieceOutcome trial = try_one({"refuse", "a.h5: sheared"});
     CHECK_FALSE(trial.crashed);
     REQUIRE(trial.refused);
     CHECK(trial.refused->code() == Errc::Unsupported);
     CHECK(std::string(trial.refused->what()) == "a.h5: sheared");
 
-    const Trial cut = try_one({"refuse", std::string(1 << 20, 'x')});
+    const PieceOutcome cut = try_one({"refuse", std::string(1 << 20, 'x')});
     REQUIRE(cut.refused);
     CHECK(std::string(cut.refused->what()) == std::string(4095, 'x'));
 
-    const Trial other = try_one({"fail"});
+    const PieceOutcome other = try_one({"fail"});
     REQUIRE(other.refused);
     CHECK(std::string(other.refused->what()) == "fail: a failure");
     CHECK_THROWS_AS(try_one({"no memory"}), std::bad_alloc);
@@ -136,7 +137,7 @@ TEST_CASE("The program gets no variable and no open file of this process") {
 
 TEST_CASE("A program that is not there is an error that says so") {
     try {
-        try_pieces("/none/covol-reader", kTask, {{"write"}}, SharedMemory(0), 10, RunContext());
+        run_pieces("/none/covol-reader", kTask, {{"write"}}, SharedMemory(0), 10, RunContext());
         FAIL("started");
     } catch (const Error& error) {
         CHECK(error.code() == Errc::Io);

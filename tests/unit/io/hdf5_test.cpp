@@ -1,4 +1,4 @@
-// Files in the layouts of Imaris, BigDataViewer and ilastik, made by the HDF5 library itself.
+// Files in the layouts of Imaris, BigDataViewer and ilastik, written by the HDF5 library itself.
 #include <hdf5.h>
 #include <zstd.h>
 
@@ -16,7 +16,7 @@ namespace {
 constexpr Index3 kSize{6, 5, 4};
 constexpr std::array<hsize_t, 3> kShape{4, 5, 6}, kChunk{2, 2, 4};
 
-/// Voxels of an image, i fastest, all different.
+/// Voxels of an image, i fastest, all values different.
 std::vector<std::uint16_t> ramp(const std::vector<hsize_t>& shape, std::uint16_t first = 0) {
     const auto count = std::accumulate(shape.begin(), shape.end(), hsize_t(1), std::multiplies<>());
     std::vector<std::uint16_t> values(static_cast<std::size_t>(count));
@@ -24,7 +24,7 @@ std::vector<std::uint16_t> ramp(const std::vector<hsize_t>& shape, std::uint16_t
     return values;
 }
 
-/// An HDF5 file that is written: groups come with what is in them.
+/// Writes an HDF5 file; groups are created as needed.
 class Writer {
 public:
     explicit Writer(const std::string& path)
@@ -40,7 +40,7 @@ public:
 
     [[nodiscard]] hid_t id() const { return file_; }
 
-    /// `edit` changes how it is stored; values are left out where there are none.
+    /// `edit` changes the creation properties; an empty `values` writes no data.
     template <typename T>
     void dataset(
         const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const std::vector<T>& values,
@@ -62,7 +62,7 @@ public:
     void group(const std::string& name) const {
         H5Gclose(H5Gcreate2(file_, name.c_str(), links_, H5P_DEFAULT, H5P_DEFAULT));
     }
-    /// As one text, or as Imaris has it: a character an element.
+    /// As one string, or as in Imaris files: one character per element.
     void text(const std::string& object, const std::string& name, const std::string& value, bool letters) const {
         const hid_t type = H5Tcopy(H5T_C_S1);
         const hsize_t count = letters ? value.size() : 1;
@@ -89,7 +89,7 @@ private:
     hid_t file_, links_;
 };
 
-/// The image is the ramp that starts at `first`.
+/// Checks that the image is the ramp that starts at `first`.
 void check_ramp(const std::string& path, int first, const ReadImageOptions& options = {}) {
     INFO(path);
     const Image image = read_image(path, options);
@@ -126,7 +126,7 @@ std::string imaris(const Scratch& scratch) {
         for (int channel = 0; channel < 2; ++channel) {
             const std::string group =
                 "/DataSet/ResolutionLevel " + std::to_string(level) + "/TimePoint 0/Channel " + std::to_string(channel);
-            // padded to whole chunks: the attributes have the size
+            // padded to whole chunks; the size is in the attributes
             file.image(group + "/Data", std::uint16_t(1000 * channel + 100 * level),
                        level == 0 ? std::vector<hsize_t>{4, 5, 6} : std::vector<hsize_t>{2, 2, 3});
             for (int a = 0; a < 3; ++a)
@@ -167,7 +167,7 @@ TEST_CASE("Imaris: levels, channels, extent and names", "[hdf5]") {
     CHECK(info.format == "Imaris");
     CHECK(info.geometry.size == kSize);
     CHECK(info.geometry.spacing == Vec3{1, 1, 1});
-    CHECK(info.geometry.origin == Vec3{0.5, 10.5, 20.5});  // ExtMin is a corner
+    CHECK(info.geometry.origin == Vec3{0.5, 10.5, 20.5});  // ExtMin is the outer corner
     CHECK(info.geometry.unit == "um");
     CHECK(info.channel_names == std::vector<std::string>{"red", "green"});
     CHECK(info.levels.size() == 2);
@@ -254,7 +254,8 @@ TEST_CASE("chunks that a damaged index hides are not taken for missing ones", "[
     }
     check_ramp(path, 0);
     std::string bytes = bytes_of(path);
-    const std::size_t node = bytes.find(std::string("TREE\1", 5));  // of chunks; a group's has a 0
+    const std::size_t node =
+        bytes.find(std::string("TREE\1", 5));  // a node of chunks; nodes of groups have a 0 instead of the 1
     REQUIRE(node != std::string::npos);
     bytes[node] = 'F';
     scratch.write("b.h5", bytes);
@@ -267,7 +268,7 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
     const std::vector<hsize_t> shape{2, 2, 4};  // one chunk
     const std::vector<std::uint16_t> values = ramp(shape);
     const auto bytes = std::string(reinterpret_cast<const char*>(values.data()), 2 * values.size());
-    // Sizes in big endian; a block as large as what it holds is stored as it is.
+    // Sizes are big endian; a block whose compressed size equals its size is stored uncompressed.
     const std::string lz4 = std::string("\0\0\0\0\0\0\0\x20\0\0\0\x20\0\0\0\x20", 16) + bytes;
     const std::string lzf = std::string(1, char(31)) + bytes;  // one run of 32 literals
     std::string zstd(ZSTD_compressBound(bytes.size()), '\0');
@@ -277,7 +278,7 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
         {"lzf", 32000, lzf},
         {"zstd", 32015, zstd},
         {"short", 32004, lz4.substr(0, 20)},
-        {"wild", 32000, std::string("\x20\xff", 2)},  // refers to what is not there
+        {"wild", 32000, std::string("\x20\xff", 2)},  // refers to bytes before the output
         {"bitshuffle", 32008, bytes}};
     {
         const Writer file(path);

@@ -51,7 +51,7 @@ TEST_CASE("grids come back as they were written, by name or as the first") {
     const FloatGridPtr first = sphere("surface");
     const FloatGridPtr second = sphere("u", 1.5F);
     write_vdb(path, {first, second}, {false, {{"covol_delta", "0.35"}}});
-    CHECK(scratch.file_count() == 1);  // no temporary is left
+    CHECK(scratch.file_count() == 1);  // no temporary file is left
 
     const FloatGridPtr read = read_vdb(path, "u");
     CHECK(same_tree(*read, *second));
@@ -59,7 +59,7 @@ TEST_CASE("grids come back as they were written, by name or as the first") {
     CHECK(read->getGridClass() == openvdb::GRID_LEVEL_SET);
     CHECK(read_vdb(path)->getName() == "surface");
     CHECK(same_tree(*read_vdb(path), *first));
-    // the caller's grids are not touched
+    // the caller's grids are not modified
     CHECK(first->getCreator().empty());
     CHECK_FALSE(first->getMetadata<openvdb::StringMetadata>("covol_delta"));
 }
@@ -190,7 +190,7 @@ TEST_CASE("every compression gives the same grid, and a listing names it") {
         return std::vector<std::string>{list[0].compression, list[1].compression};
     };
     CHECK(names_of(VdbCompression::None) == std::vector<std::string>{"none", "none"});
-    // OpenVDB leaves level sets as they are under zip.
+    // With zip, OpenVDB does not compress level sets.
     CHECK(names_of(VdbCompression::Zip) == std::vector<std::string>{"none", "zip"});
     CHECK(names_of(VdbCompression::Blosc) == std::vector<std::string>{"blosc", "blosc"});
 }

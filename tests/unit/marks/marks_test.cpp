@@ -28,7 +28,7 @@ Image labels(const std::function<int(int, int, int)>& label) {
 
 bool in_ball(int i, int j, int k, double x, double r) { return std::hypot(i - x, j - 11.5, k - 11.5) < r; }
 
-/// Discs on every fourth slice, and two specks on slices side by side, which are no tips of a body.
+/// Discs on every fourth slice, and two specks on adjacent slices that are not tips of a body.
 int discs(int i, int j, int k) {
     if (k % 4 == 0 && in_ball(i, j, k, 11.5, 8)) return 1;
     return (k == 1 || k == 2) && (i == 11 || i == 12) && (j == 11 || j == 12) ? 1 : 0;
@@ -120,8 +120,8 @@ TEST_CASE("Painted labels go to the structures of their names, a single one to m
     add_paint(other, {painted(one, {}, "ve")});
     CHECK(other.at(1).name == "ve");
     number_labels(other);
-    CHECK(other[1].label == 1);  // its own
-    CHECK(other[0].label == 2);  // what is free
+    CHECK(other[1].label == 1);  // its own label
+    CHECK(other[0].label == 2);  // the first free one
 }
 
 TEST_CASE("A guess is one label of a mask") {
@@ -149,7 +149,7 @@ TEST_CASE("Painted slices become contours, other paint seeds that are counted as
     CHECK(input.options.inside.size() == 9);
     CHECK(input.options.painted_seeds == 8);
     CHECK(input.paint.at(0).second.label == 1);
-    CHECK(input.contour_rules.empty());  // no file has them
+    CHECK(input.contour_rules.empty());  // not written to any file
 }
 
 TEST_CASE("Paint of one structure is outside of the others, and the outside label of all") {

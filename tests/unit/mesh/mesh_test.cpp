@@ -101,7 +101,8 @@ TEST_CASE("normals are unit length, weighted by angle and point outward") {
     const TriangleMesh mesh = cube(1);
     const auto normals = compute_vertex_normals(mesh);
     REQUIRE(normals.size() == 8);
-    for (int c = 0; c < 8; ++c)  // by angle, not by triangle count: exactly along the diagonals
+    for (int c = 0; c < 8;
+         ++c)  // weighted by angle and not by number of triangles, they lie exactly along the diagonals
         for (int a = 0; a < 3; ++a)
             CHECK(normals[c][a] == Approx((c >> (2 - a) & 1 ? 1 : -1) / std::sqrt(3.0)).epsilon(1e-6));
 }
@@ -123,7 +124,7 @@ TEST_CASE("sets united by many threads are those united one by one, known by the
     std::mt19937 random(3);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs(kCount * 3 / 4);
     for (auto& [a, b] : pairs) a = std::uint32_t(random() % kCount), b = std::uint32_t(random() % kCount);
-    // By relabelling, from the least member on.
+    // By relabelling, in the order of the minimum members.
     std::vector<std::vector<std::uint32_t>> beside(kCount);
     for (const auto& [a, b] : pairs) {
         beside[a].push_back(b);

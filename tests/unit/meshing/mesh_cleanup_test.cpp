@@ -58,13 +58,15 @@ TEST_CASE("self-intersections are counted in pairs, contact in shared corners an
     CHECK(count_self_intersections(sphere(8, 1)) == 0);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, -1}, {0.5F, 0.6F, 1}, {0.6F, 0.5F, 1})) == 1);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, 1}, {0.5F, 0.6F, 2}, {0.6F, 0.5F, 2})) == 0);
-    TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});  // goes through the first from its corner 0
+    TriangleMesh corner =
+        two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});  // passes through the first one, starting at its corner 0
     corner.triangles[1][0] = 0;
     CHECK(count_self_intersections(corner) == 1);
     corner.vertices[4] = {-1, 1, 1};
     corner.vertices[5] = {-1, 1, -1};
     CHECK(count_self_intersections(corner) == 0);
-    TriangleMesh side = two_triangles({0, 0, 0}, {0, 0, 0}, {1, 1, 0});  // in one plane, on the same side of edge 0-1
+    TriangleMesh side =
+        two_triangles({0, 0, 0}, {0, 0, 0}, {1, 1, 0});  // in one plane, on the same side of the edge 0-1
     side.triangles[1] = {1, 0, 5};
     CHECK(count_self_intersections(side) == 1);
     side.vertices[5] = {1, -1, 0};
@@ -81,7 +83,7 @@ TEST_CASE("crossings of pieces with each other are told from those with themselv
     CHECK(crossed.within == 0);
     CHECK(crossed.between > 0);
     CHECK(count_self_intersections(both) == crossed.between);
-    // A third piece that cuts itself: two triangles through each other, joined at a corner.
+    // A third piece that intersects itself: two triangles through each other, joined at a corner.
     TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});
     corner.triangles[1][0] = 0;
     for (auto& v : corner.vertices) v[0] += 10;
@@ -194,7 +196,7 @@ TEST_CASE("a wall is as thick as the solid between two faces") {
     REQUIRE(measure(slab).volume == Approx(4));
     CHECK(measure_wall(slab) == Approx(0.25));
     CHECK(measure_wall({}) < 0);
-    // One triangle alone has nothing opposite.
+    // A single triangle has nothing opposite.
     TriangleMesh open = slab;
     open.triangles.resize(1);
     CHECK(measure_wall(open) < 0);

@@ -1,4 +1,4 @@
-// The parts that relaxation and decimation are made of: adjacency, contacts, moves taken back.
+// The parts of relaxation and decimation: adjacency, contacts, moves that are undone.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -19,7 +19,7 @@ namespace {
 
 TriangleMesh solid_mesh(unsigned seed) { return extract_mesh(*test::random_solid(seed).level_set); }
 
-/// Opposite corners, found anew.
+/// Compares with opposite corners that are computed from scratch.
 void check_table(const CornerTable& table, std::vector<Triangle> triangles) {
     std::vector<std::size_t> numbers;
     std::vector<Triangle> kept;
@@ -126,7 +126,7 @@ TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
     for (const unsigned seed : {0U, 1U, 7U}) {
         TriangleMesh mesh = solid_mesh(seed);
         INFO("seed " << seed);
-        // extracted triangles can be as small as doubt
+        // extracted triangles can be smaller than rounding errors
         CHECK(ContactFinder(mesh.vertices, mesh.triangles).contacts(false).size() <= 2);
         std::mt19937 random(seed);
         std::normal_distribution<float> shift(
@@ -134,7 +134,8 @@ TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
         for (auto& v : mesh.vertices)
             for (float& c : v) c += shift(random);
         const auto contacts = ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
-        CHECK(contacts == ContactFinder(mesh.vertices, mesh.triangles).contacts(true));  // no sheet is single
+        CHECK(contacts == ContactFinder(mesh.vertices, mesh.triangles)
+                              .contacts(true));  // no triangle is skipped as part of a simple sheet
         int touching = 0;
         for (const auto& [s, t] : contacts) {
             TriangleMesh pair{mesh.vertices, {mesh.triangles[s], mesh.triangles[t]}};

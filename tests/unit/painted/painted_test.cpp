@@ -88,7 +88,7 @@ TEST_CASE("the outline of a disc lies on its circle", "[painted]") {
         }
         INFO("radius " << r);
         CHECK(std::abs(mean / count) < 0.03);
-        // The staircase itself is 0.235 off.
+        // The staircase itself is off by 0.235.
         CHECK(std::sqrt(square / count) < (r < 5 ? 0.21 : 0.14));
         CHECK(worst < 0.55);
     }
@@ -100,7 +100,7 @@ TEST_CASE("a staircase becomes a straight line", "[painted]") {
         double worst = 0;
         for (const Polygon& line : painted::outlines(half, {true, true, true, true}))
             for (const auto& p : line) {
-                if (p[1] < 0 || p[0] < 0 || p[0] > 59) continue;  // where the image cuts it
+                if (p[1] < 0 || p[0] < 0 || p[0] > 59) continue;  // at the cut by the image's end
                 worst = std::max(worst, std::abs(p[1] - 20.3 - slope * p[0]) / std::hypot(1, slope));
             }
         INFO("slope " << slope);
@@ -140,8 +140,8 @@ TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last ce
     double left = 1e9;
     for (const auto& p : cut[0]) left = std::min(left, p[0]);
     CHECK(left == -0.5);
-    CHECK(signed_area(cut[0]) == Approx(kPi * 50).epsilon(0.01));  // corners stay
-    // The same paint away from the image's end is rounded there.
+    CHECK(signed_area(cut[0]) == Approx(kPi * 50).epsilon(0.01));  // corners are kept
+    // Without the image's end, the corners of the same painting are rounded.
     CHECK(signed_area(painted::outlines(half, {})[0]) < kPi * 50 * 0.998);
 }
 
@@ -218,7 +218,7 @@ TEST_CASE("paint in places is a scribble", "[painted]") {
         slices.as = PaintedAs::Slices;
         CHECK(understood(image, slices).labels[0].views.size() == 1);
     }
-    // A shell of the ball: the voxels within it tell nothing more.
+    // Only a shell of the ball: the voxels deeper inside add no information.
     CHECK(understood(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
     PaintedOptions scribbles;
     scribbles.as = PaintedAs::Scribbles;
@@ -235,7 +235,7 @@ TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
     const auto views = [](const Label& label, const ImageGeometry& geometry = lattice({40, 40, 40})) {
         return understood(painting(geometry, label)).labels[0].views;
     };
-    // Of a ball of 14 slices the middle eight, of one of 20 all but the first, half of one, a bent tube.
+    // The middle eight slices of a ball of 14, half of a ball of 20, and an oblique tube.
     const Label both = [&](int i, int j, int k) {
         return of(i, j, k) > 15 && of(i, j, k) < 24 && in_ball(i, j, k, 19.5, 7) ? 1 : 0;
     };
@@ -249,7 +249,7 @@ TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
         REQUIRE(found.size() == 1);
         CHECK(found[0].axis == axis);
     }
-    // Through the whole image.
+    // A cylinder through the whole image.
     CHECK(views([](int i, int j, int) { return std::hypot(i - 19.5, j - 19.5) < 8 ? 1 : 0; }).size() == 1);
 }
 
@@ -277,7 +277,7 @@ TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
         CHECK(is_scribble([&](int i, int j, int k) {
             return beside(i, j, k, {30.5, 30.5, 30.5}, {30.5, 30.5, 30.5}) < r ? 1 : 0;
         }));
-        // Dragged along a slice, and along its normal.
+        // A brush that is dragged along a slice, and along its normal.
         CHECK(is_scribble([&](int i, int j, int k) {
             return beside(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0;
         }));
@@ -288,7 +288,7 @@ TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
     CHECK(is_scribble([](int i, int j, int k) {
         return std::max({std::abs(i - 30), std::abs(j - 30), std::abs(k - 30)}) < 5 ? 1 : 0;
     }));
-    // A stroke that was repeated on neighbouring slices.
+    // A stroke that was repeated on adjacent slices.
     CHECK(is_scribble(
         [](int i, int j, int k) { return k > 20 && k < 27 && std::abs(j - 30) <= 1 && i > 22 && i < 36 ? 1 : 0; }));
 }

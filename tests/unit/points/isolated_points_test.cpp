@@ -8,7 +8,7 @@ using namespace covol;
 
 namespace {
 
-/// Marks on a sphere of radius 10 around 0.
+/// Marks on a sphere of radius 10 around the origin.
 std::vector<Vec3> sphere(int count, unsigned seed) {
     std::vector<Vec3> marks = test::box_cloud(count, {{-1, -1, -1}, {1, 1, 1}}, seed);
     for (Vec3& m : marks) {

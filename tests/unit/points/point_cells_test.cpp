@@ -21,7 +21,7 @@ struct Named {
     std::vector<Vec3> points;
 };
 
-/// Clouds in a box of edge about 2, each hard for cells in its own way.
+/// Clouds in a box of edge about 2, each difficult for cells in its own way.
 std::vector<Named> clouds(int count, unsigned seed) {
     const std::vector<Vec3> spread = test::box_cloud(count, {{-1, -1, -1}, {1, 1, 1}}, seed);
     std::vector<Vec3> clustered = spread, doubled = spread, flat = spread, line = spread;
@@ -53,7 +53,7 @@ double squared(const Vec3& a, const Vec3& b) {
     return d2;
 }
 
-/// A box within a bit more than the points' own; some are flat or one place.
+/// A box within slightly more than the bounding box of the points; some are flat or a single position.
 WorldBox random_box(const std::vector<Vec3>& points, std::mt19937& random) {
     const WorldBox whole = bounding_box(points, 0.3);
     const auto uniform = [&] { return random() / 4294967296.0; };
@@ -116,7 +116,7 @@ TEST_CASE("the ranges of a box hold all of its points, and each at most once") {
                     of_box += in(points[n], box);
                 }
             }
-            // Small cells leave most others out.
+            // With small cells, few points outside of the box are visited.
             if (std::string(name) == "spread" && edge == 0.02) CHECK(double(found) < 1.3 * double(of_box) + 50);
         }
 }

@@ -26,7 +26,7 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
     for (Vec3& p : plane) p = {x(random), x(random), 0};
     CHECK(measure_layer_thickness(plane, 0.1) < 1e-9);
     const std::vector<Vec3> block = test::box_cloud(40000, {{0, 0, 0}, {1, 1, 1}}, 5);
-    // The plane of least squares is the best of all, and balls stick out of the block: less than 3/8, not by far.
+    // Less than 3/8, since the least-squares plane fits best and balls extend beyond the block, but not by much.
     CHECK(measure_layer_thickness(block, 0.1) < 0.0375);
     CHECK(measure_layer_thickness(block, 0.1) > 0.75 * 0.0375);
     CHECK(measure_layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
@@ -35,14 +35,14 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
 }
 
 TEST_CASE("average_layers brings two layers of one sphere together between them, and keeps a thin one") {
-    // 0.98 and 1.02: 0.04 apart, four times the spacing.
+    // Radii 0.98 and 1.02: 0.04 apart, four times the spacing.
     std::vector<Vec3> points = test::sphere_cloud(40000, 0.98, 1);
     const std::vector<Vec3> outer = test::sphere_cloud(40000, 1.02, 2);
     points.insert(points.end(), outer.begin(), outer.end());
     const std::vector<Vec3> averaged = average_layers(points, 0.15);
     REQUIRE(averaged.size() == points.size());
     CHECK(mean_off_sphere(points, 1) == Approx(0.02));
-    // A plane lies below the cap that it is fitted to: by radius^2 / 8 with these weights, in each of two passes.
+    // A plane lies below the cap to which it is fitted: by radius^2 / 8 with these weights, in each of two passes.
     const double sag = 0.15 * 0.15 / 4;
     CHECK(mean_off_sphere(averaged, 1) < 1.15 * sag);
     const std::vector<Vec3> thin = test::sphere_cloud(40000, 1, 3);
@@ -50,7 +50,7 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
 }
 
 TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
-    // 2.5 voxels of 4.8 spacings reach around the sphere, or around a good part of it.
+    // 2.5 voxels of 4.8 spacings cover the whole sphere, or a large part of it.
     for (const int count : {50, 100, 300, 1000}) {
         const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
         const double spacing = 6 * std::sqrt(M_PI / count);
@@ -64,7 +64,8 @@ TEST_CASE("choose_scan_voxel_size: two sides of a plate are no noise, points tha
     const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
     plate.insert(plate.end(), above.begin(), above.end());
     CHECK(choose_scan_voxel_size(plate, 1).voxel_size == Approx(1));
-    // Filled, points lie 5/4 from the plane on the mean: 1.25^6 is the first with 0.35 voxels above that.
+    // If the plate is filled, the mean distance of points from its middle plane is 5/4: 1.25^6 is the first size for
+    // which 0.35 voxels exceed it.
     const std::vector<Vec3> filled = test::box_cloud(50000, {{0, 0, 0}, {100, 100, 5}}, 7);
     CHECK(choose_scan_voxel_size(filled, 1).voxel_size == Approx(std::pow(1.25, 6)));
 }
@@ -83,7 +84,7 @@ TEST_CASE("choose_scan_voxel_size: the spacing for a clean scan, coarser than th
     const ScanVoxelSize choice = choose_scan_voxel_size(noisy, spacing);
     CHECK(choice.voxel_size > 2 * spacing);
     CHECK(choice.voxel_size < 5 * spacing);
-    // The mean distance of a normal distribution, 0.8 sigma, and what the plane swallowed.
+    // The mean distance of a normal distribution, 0.8 sigma, less what the fitted plane absorbs.
     CHECK(choice.thickness == Approx(0.8 * 0.02).epsilon(0.25));
     CHECK(choice.thickness <= 0.35 * choice.voxel_size);
 }

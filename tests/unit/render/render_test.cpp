@@ -29,10 +29,10 @@ std::array<int, 3> pixel(const Picture& p, int x, int y) {
 
 bool is_white(const std::array<int, 3>& c) { return c[0] > 250 && c[1] > 250 && c[2] > 250; }
 bool is_ink(const std::array<int, 3>& c) { return c[0] < 40 && c[1] < 40 && c[2] < 40; }
-/// Orange, as a lone structure is: much more red than blue.
+/// Orange, the colour of a single structure: much more red than blue.
 bool is_warm(const std::array<int, 3>& c) { return c[0] > c[2] + 30; }
 
-/// Of pixels for which `is` holds, in a part of the picture.
+/// Bounds of the pixels for which `is` holds, in a part of the picture.
 struct Bounds {
     int count = 0, left = 1 << 20, right = -1, top = 1 << 20, bottom = -1;
 };
@@ -63,7 +63,7 @@ RenderStructure structure(const FloatGridPtr& surface, const std::string& name =
     return s;
 }
 
-/// Its voxels have the value that `value` gives for their place in the world.
+/// An image whose voxels have the value of `value` at their world position.
 Image make_image(const ImageGeometry& geometry, const std::function<float(const Vec3&)>& value) {
     std::vector<float> values;
     for (int k = 0; k < geometry.size[2]; ++k)
@@ -84,12 +84,12 @@ RenderOptions sized(int width, int height, FigureKind kind) {
 }  // namespace
 
 TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
-    // Ten voxels from the centre to the surface. Normals that are constant in each voxel would be off by up to 0.05
-    // rad, and the shade by 0.03.
-    const double h = 0.1, radius = 1 - h * h / 3;  // that of the smoothed field
+    // Ten voxels from the centre to the surface. With normals that are constant in each voxel, they would be off by up
+    // to 0.05 rad, and the shading by 0.03.
+    const double h = 0.1, radius = 1 - h * h / 3;  // radius of the smoothed field
     const FloatGridPtr ball = make_ball({0.03, -0.02, 0.01}, 1, h);
     figure::Camera camera;
-    camera.basis = figure::look(-32, 28);
+    camera.basis = figure::view_basis(-32, 28);
     camera.center = {0.03, -0.02, 0.01};
     camera.pixel = 0.01;
     camera.at = {0, 0, 240, 240};
@@ -124,7 +124,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
 
 TEST_CASE("a scale bar is as long as it says") {
     figure::Canvas canvas(300, 100, figure::gray(1));
-    // A third of 250 pixels of 0.5 um are 40 um: the bar is of 20 um, 40 pixels.
+    // A third of 250 pixels of 0.5 um is 40 um: the bar is 20 um long, 40 pixels.
     figure::draw_scale_bar(canvas, 280, 90, 250, 0.5, "um", {figure::gray(0), 14, 0});
     const Bounds bar = find(canvas.picture(), {0, 88, 300, 2}, is_ink);
     CHECK(bar.right == 279);
@@ -199,12 +199,12 @@ TEST_CASE("outlines lie on the circle that a plane cuts out, also where voxels a
 }
 
 TEST_CASE("slices of patients lie as radiologists have them, and letters say so") {
-    // Its first index runs to the right of the patient, its second to the back, its third to the head.
+    // The first index runs to the right of the patient, the second to the back, the third to the head.
     ImageGeometry geometry;
     geometry.size = {20, 24, 16};
     geometry.direction = {{{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     geometry.origin = {19, 0, 0};
-    const Vec3 left_place{15, 12, 8};  // to the patient's left of the middle
+    const Vec3 left_place{15, 12, 8};  // left of the patient's midline
     const Image image = make_image(geometry, [&](const Vec3& at) {
         return std::abs(at[0] - left_place[0]) + std::abs(at[1] - left_place[1]) < 2 ? 200.0F : 0.0F;
     });
@@ -219,11 +219,11 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     };
     const figure::Plane axial = figure::plane_across(2, 8, scene), coronal = figure::plane_across(1, 12, scene);
     const figure::Plane sagittal = figure::plane_across(0, 9, scene);
-    CHECK(place(axial, {15, 12, 8})[0] > place(axial, {5, 12, 8})[0]);        // left to the right
-    CHECK(place(axial, {10, 20, 8})[1] > place(axial, {10, 5, 8})[1]);        // back down
-    CHECK(place(coronal, {15, 12, 8})[0] > place(coronal, {5, 12, 8})[0]);    // left to the right
-    CHECK(place(coronal, {10, 12, 12})[1] < place(coronal, {10, 12, 3})[1]);  // head up
-    CHECK(place(sagittal, {10, 20, 8})[0] > place(sagittal, {10, 5, 8})[0]);  // back to the right
+    CHECK(place(axial, {15, 12, 8})[0] > place(axial, {5, 12, 8})[0]);        // the patient's left is on the right
+    CHECK(place(axial, {10, 20, 8})[1] > place(axial, {10, 5, 8})[1]);        // the back is at the bottom
+    CHECK(place(coronal, {15, 12, 8})[0] > place(coronal, {5, 12, 8})[0]);    // the patient's left is on the right
+    CHECK(place(coronal, {10, 12, 12})[1] < place(coronal, {10, 12, 3})[1]);  // the head is at the top
+    CHECK(place(sagittal, {10, 20, 8})[0] > place(sagittal, {10, 5, 8})[0]);  // the back is on the right
     CHECK(figure::letters_of(0, geometry) == std::array<std::string, 2>{"R", "L"});
     CHECK(figure::letters_of(1, geometry) == std::array<std::string, 2>{"P", "A"});
     CHECK(figure::letters_of(2, geometry) == std::array<std::string, 2>{"S", "I"});
@@ -237,7 +237,8 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     figure::draw_slice(canvas, canvas.whole(), axial, region, scene, style, {});
     const Picture picture = canvas.picture();
     const auto bright = [](const std::array<int, 3>& c) { return c[0] > 200 && c[2] > 200; };
-    // The bright block; then the letters, beside which the picture is dark: L has ink at its foot, R at its top right.
+    // The bright block; then the letters, next to which the picture is dark: an L has ink at its foot, an R at its top
+    // right.
     CHECK(find(picture, {135, 115, 40, 20}, bright).count > 150);
     CHECK(find(picture, {25, 115, 40, 20}, bright).count == 0);
     const Bounds r = find(picture, {0, 105, 24, 30}, bright), l = find(picture, {178, 105, 22, 30}, bright);
@@ -266,12 +267,12 @@ TEST_CASE("marked slices are found and chosen") {
     CHECK(figure::spread_slices(2, 3, boxes, marked, geometry) == std::vector<int>{9, 15, 22});
     CHECK(figure::spread_slices(2, 3, boxes, {}, geometry) == std::vector<int>{7, 13, 19});
     CHECK(figure::middle_slice(0, boxes, marked, geometry) == 50);
-    // Of two structures that have no slice in common but one, that one.
+    // If two structures have only one slice in common, that slice.
     const std::vector<WorldBox> two{{{0, 0, 0}, {10, 10, 42}}, {{0, 0, 33}, {10, 10, 87}}};
     const int both = figure::middle_slice(2, two, {}, geometry);
     CHECK(both >= 13);
     CHECK(both <= 14);
-    // A cloud lies on no slices.
+    // A cloud has no slices.
     for (std::size_t n = 0; n < marks.size(); ++n) marks[n][2] += 0.37 * double(n % 7);
     CHECK(figure::find_marked_slices(marks, geometry).axis == -1);
 }
@@ -324,7 +325,7 @@ TEST_CASE("frames of a turn differ and have one scale") {
             for (int x = 150; x < 300; ++x)
                 for (const int c : pixel(picture, x, y)) bar.push_back(std::uint8_t(c));
         bars.insert(bar);
-        // Nothing reaches the rim.
+        // Nothing reaches the edge of the picture.
         for (int x = 0; x < 300; ++x) CHECK(is_white(pixel(picture, x, 2)));
         for (int y = 60; y < 180; ++y) CHECK((is_white(pixel(picture, 1, y)) && is_white(pixel(picture, 298, y))));
     }
@@ -350,7 +351,7 @@ TEST_CASE("a composed figure is filled, shows slices with marks, and is the same
     scene.unit = "um";
     RenderOptions options = sized(600, 400, FigureKind::Composed);
     const Picture picture = render(scene, options);
-    // No column and no half of the picture is empty.
+    // Neither a column nor a half of the picture is empty.
     for (const Rect& part :
          {Rect{0, 0, 300, 200}, Rect{300, 0, 300, 200}, Rect{0, 200, 300, 200}, Rect{300, 200, 300, 200}})
         CHECK(find(picture, part, [](const auto& c) { return !is_white(c); }).count > 300 * 200 / 8);
@@ -361,7 +362,7 @@ TEST_CASE("a composed figure is filled, shows slices with marks, and is the same
         run.threads = threads;
         CHECK(render(scene, options, run).rgb == picture.rgb);
     }
-    // Behind the surface the image is there where it was asked for.
+    // The image is shown behind the surface only if it was requested.
     options.figure = FigureKind::Surface;
     const Picture bare = render(scene, options);
     options.volume = true;
@@ -399,7 +400,8 @@ TEST_CASE("text stands where it is asked to, and what the font lacks is shown as
     CHECK(ink.left > 100 - figure::text_width("HH", 20));
     CHECK(figure::text_width("HH", 20) == Approx(2 * figure::text_width("H", 20)));
     CHECK(figure::text_width("\xc3\xa9", 20) == Approx(figure::text_width("e", 20)).epsilon(0.05));
-    CHECK(figure::text_width("\xe4\xb8\xad", 20) == figure::text_width("\xff", 20));  // no such letter, no UTF-8
+    CHECK(figure::text_width("\xe4\xb8\xad", 20) ==
+          figure::text_width("\xff", 20));  // an unsupported character, invalid UTF-8
 }
 
 TEST_CASE("views by name and by angles") {
@@ -408,7 +410,8 @@ TEST_CASE("views by name and by angles") {
     CHECK(parse_view("-30,45.5", false).elevation == 45.5);
     for (const char* bad : {"", "behind", "1", "1,", ",1", "1,2,3", "1,95", "nan,0", "1e999,0"})
         CHECK_THROWS_AS(parse_view(bad, false), Error);
-    const figure::Basis front = figure::look(0, 0), top = figure::look(0, 90), right = figure::look(90, 0);
+    const figure::Basis front = figure::view_basis(0, 0), top = figure::view_basis(0, 90),
+                        right = figure::view_basis(90, 0);
     CHECK(front.right[0] == Approx(1));
     CHECK(front.up[2] == Approx(1));
     CHECK(top.up[1] == Approx(1));

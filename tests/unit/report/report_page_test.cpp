@@ -65,7 +65,7 @@ std::size_t count_of(const std::string& text, const std::string& word) {
     return count;
 }
 
-/// The data in a page's script element, as a browser finds it.
+/// The data in the script element of a page, as a browser finds it.
 json data_of(const std::string& page) {
     const std::string open = "<script type=\"application/json\" id=\"data\">";
     const std::size_t begin = page.find(open) + open.size();
@@ -108,7 +108,7 @@ TEST_CASE("a coded mesh is the mesh, within half a step of its lattice") {
     for (std::size_t v = 0; v < back.vertices.size(); ++v)
         for (int a = 0; a < 3; ++a)
             maximum = std::max(maximum, std::abs(double(back.vertices[v][a]) - mesh.vertices[coded.from[v]][a]));
-    CHECK(maximum <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // and the rounding of floats near 100
+    CHECK(maximum <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // plus the rounding of floats near 100
     CHECK(maximum > 0);
     // Neighbouring triangles share vertices: three corners take little more than three bytes.
     CHECK(coded.corners.size() < 6 * mesh.triangles.size());
@@ -154,7 +154,7 @@ TEST_CASE("a clustered sphere has few triangles, vertices of the sphere, and nea
     for (std::size_t v = 0; v < small.mesh.vertices.size(); ++v)
         REQUIRE(small.values[0].second[v] == Approx(small.mesh.vertices[v][2]).margin(2.5));
     for (const auto& v : small.mesh.vertices) REQUIRE(away(v) == Approx(kRadius).margin(0.05));
-    // A mesh that is small enough stays as it is.
+    // A mesh that is small enough is unchanged.
     CHECK(detail::cluster({mesh, {}}, std::int64_t(mesh.triangles.size())).mesh.triangles == mesh.triangles);
 }
 
@@ -170,7 +170,7 @@ TEST_CASE("slices: all of a small image, the part around the places of a large o
     CHECK(part.region.min == Index3{18, 18, 9});
     CHECK(part.region.max == Index3{32, 27, 12});
     const detail::SlicePlan thin = detail::plan_slices(geometry, all, {}, 60 * 40 * 20 / 4);
-    CHECK(thin.step == Index3{2, 2, 1});  // k is the coarsest axis already
+    CHECK(thin.step == Index3{2, 2, 1});  // k is already the coarsest axis
     CHECK(thin.size == Index3{30, 20, 20});
 }
 

@@ -1,4 +1,4 @@
-// The vectorised kernels against the formulas of the scheme written out plainly in double precision.
+// The vectorised kernels against the formulas of the scheme, implemented plainly in double precision.
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
@@ -84,7 +84,7 @@ Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const Scheme
     return row;
 }
 
-/// A leaf's rows from the kernel, and as fractions.
+/// The rows of a leaf from the kernel, as fractions.
 struct LeafRows {
     std::vector<Fraction> fractions = std::vector<Fraction>(6 * 512);
     [[nodiscard]] double operator()(int f, int n) const { return double(fractions[fraction_at(f, n)]) / kFractionUnit; }
@@ -153,7 +153,7 @@ TEST_CASE("no pull acts where a field is unknown") {
     for (const SchemeKernels* set : available_kernels()) {
         set->assemble(u.data(), phi.data(), nullptr, nullptr, kAllActive.data(), constants, c.data());
         const auto at = [&](int face, int i) { return c(face, (i * 8 + 3) * 8 + 3); };
-        CHECK(at(kMinusI, 2) > 0.4F);  // the pull comes from -i
+        CHECK(at(kMinusI, 2) > 0.4F);  // the flow comes from -i
         for (int f = 0; f < 6; ++f) CHECK(at(f, 4) == 0.0F);
         CHECK(at(kMinusI, 5) == 0.0F);
         CHECK(at(kMinusI, 6) > 0.4F);
@@ -180,7 +180,7 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
             if (!is_closed) kept += open(f, n);
             if (is_closed || !on) REQUIRE(closed(f, n) == 0.0F);
         }
-        // undo the division by the diagonal 1 + S: S = c/(1-Σc), and what is kept of S is the same in both
+        // undo the division by the diagonal 1 + S: S = c/(1-Σc), and the part of S that is kept is the same in both
         if (on && j <= 6)
             REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
     }
@@ -188,12 +188,12 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
 
 namespace {
 
-/// A padded buffer as seven blocks; the six around hold what the halo does where it counts.
+/// A padded buffer as seven blocks; the six around it hold the halo's values at the positions that are read.
 struct Blocks {
     std::array<std::vector<float>, 7> values;
     explicit Blocks(const Padded& from) {
         for (int n = 0; n < 7; ++n) {
-            values[n].assign(512, -1e30F);  // nobody may ask for the rest
+            values[n].assign(512, -1e30F);  // other values must not be read
             const int step[3] = {n < 6 ? kSteps[n][0] : 0, n < 6 ? kSteps[n][1] : 0, n < 6 ? kSteps[n][2] : 0};
             for (int p = 0; p < 512; ++p) {
                 const int at[3] = {(p >> 6) + 8 * step[0], (p >> 3 & 7) + 8 * step[1], (p & 7) + 8 * step[2]};
@@ -300,7 +300,7 @@ TEST_CASE("the mean of a wave's neighbours is its exact multiple") {
 }
 
 TEST_CASE("a plane's distance is found exactly from where it comes") {
-    // Differences of a linear function are exact, whether its front comes along one, two or three axes.
+    // Differences of a linear function are exact, whether its front moves along one, two or three axes.
     const std::array<double, 3> normals[] = {{1, 0, 0},
                                              {0, -1, 0},
                                              {0, 0, 1},

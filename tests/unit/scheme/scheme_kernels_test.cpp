@@ -11,7 +11,7 @@
 #include "support/dense_reference.h"
 #include "support/shapes.h"
 
-// The kernels on one leaf against the dense reference on the same values, on every instruction set.
+// The kernels on one leaf against the dense reference with the same values, on every instruction set.
 
 using namespace covol;
 using namespace covol::test;
@@ -81,7 +81,7 @@ Rows assemble_leaf(const detail::SchemeKernels& kernels, const DenseField& u, co
     return rows;
 }
 
-/// As the kernel's rows: -a_pq / (1 - Σ a), zero rows where not active.
+/// In the form of the kernel's rows: -a_pq / (1 - Σ a), zero rows for inactive voxels.
 std::vector<double> reference_rows(const DenseField& u, const DenseField* d, const DenseField* g, const DenseOptions& o,
                                    const detail::LeafMask& mask) {
     const DenseSystem system = assemble(u, inner_active(u, mask), {d, g}, o);

@@ -8,7 +8,7 @@
 #include "support/shapes.h"
 
 // The scheme of DESIGN.md, section 1, on the dense reference: closed forms, and for each erratum of the printed paper
-// an identity that the corrected form and evolve() keep and the printed form breaks.
+// an identity that the corrected form and evolve() satisfy and the printed form violates.
 
 using namespace covol;
 using namespace covol::test;
@@ -40,7 +40,7 @@ double mirror_defect(const Problem& p, const Solver& solver, int axis) {
 
 TEST_CASE("a linear function has its exact gradient on all 24 tetrahedra") {
     const Domain d = cube_domain(3, kH);
-    const DenseField u = [&] {  // ghosts too: no mirror in the way
+    const DenseField u = [&] {  // with the linear values in the ghosts, too, instead of mirrored ones
         DenseField f(3, 3, 3, kH);
         for (int i = -1; i <= 3; ++i)
             for (int j = -1; j <= 3; ++j)
@@ -143,7 +143,7 @@ TEST_CASE("v_pq: points that are not known do not pull, a frozen voxel keeps its
         double sum = 0;
         for (int q = 0; q < 6; ++q) sum += system.a[6 * row + q];
         const int i = static_cast<int>(system.voxel[row] / 100) - 1;  // 10 x 10 padded voxels in a slice
-        // The pull is along +x at unit speed, so that -x is upwind; i = 0 has its mirror image there, i = 4 is unknown.
+        // The flow is along +x at unit speed, so that -x is upwind; i = 0 has its mirror image there, i = 4 is unknown.
         CHECK(sum == Approx(i >= 1 && i <= 3 ? -p.options.tau / kH : 0.0).margin(1e-6));
     }
     const DenseField after = run_dense(p, 1);
@@ -210,7 +210,8 @@ TEST_CASE("one dense step shrinks a sphere at 2 delta / r") {
     CHECK(mean == Approx(std::sqrt(1 - 4 * 0.01)).margin(0.002));
 }
 
-// --- Errata of the printed paper. Each identity: kept by the corrected form and by evolve(), broken as printed.
+// --- Errata of the printed paper. Each identity holds for the corrected form and evolve(), and fails for the printed
+// form.
 
 TEST_CASE("erratum 1: with v^b as printed a mirrored cloud does not give the mirrored surface") {
     Problem p = whole_cube(12, kH, lopsided);
@@ -253,7 +254,7 @@ TEST_CASE("erratum 3: with the last sum as printed curvature prefers one side") 
 }
 
 TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outruns its speed") {
-    // u = x on the way to points at x = +5 along parallel rays: after two steps the plane has moved by 2 tau.
+    // u = x moves along parallel rays towards points at x = +5: after two steps the plane has moved by 2 tau.
     Problem p = whole_cube(16, kH, [](const Vec3& x) { return x[0]; });
     set_distance(p, [](const Vec3& x) { return 5 - x[0]; });
     p.options.tau = 0.2 * kH;
@@ -268,7 +269,7 @@ TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outru
             }
         return n > 0 ? mean / n : NAN;
     };
-    // The inflow side stands still, and what it sends has reached the plane to about 2e-3 h.
+    // The values on the inflow side are fixed; their effect on the plane is about 2e-3 h by then.
     CHECK(travelled(p, run_dense) == Approx(2 * p.options.tau).margin(0.02 * kH));
     CHECK(travelled(p, by_evolve) == Approx(travelled(p, run_dense)).margin(1e-4 * kH));
     p.options.printed.neighbours = true;

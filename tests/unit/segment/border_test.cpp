@@ -22,7 +22,7 @@ Image blank_image() {
     return Image::from_values(geometry, values.data());
 }
 
-/// A small ball, in a corner of the image or elsewhere, turned inside out.
+/// The complement of a small ball, in a corner of the image or elsewhere.
 FloatGridPtr inverted_ball(const Image& image, const Vec3& center, double radius) {
     const FloatGridPtr u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, radius);
     for (auto value = u->beginValueAll(); value; ++value) value.setValue(-*value);
@@ -54,7 +54,7 @@ TEST_CASE("a surface that is inside out is refused unless something says so") {
         problem, *start_from_sphere(make_domain(image.geometry().world_box(), 1), center, 5), {}));
     CHECK(message_of([&] { pipeline::require_outside(problem, *inverted, {}); }).find("is inside out: ") !=
           std::string::npos);
-    // Marks or seeds all over the border, or a start that was named, mean it.
+    // Allowed if marks or seeds lie all over the border, or if the start was given explicitly.
     CHECK_NOTHROW(pipeline::require_outside(Problem(&image, all_over, plain, run), *inverted, {}));
     SegmentOptions seeds;
     seeds.inside = all_over;

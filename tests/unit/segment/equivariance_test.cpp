@@ -1,4 +1,4 @@
-// What segment() finds does not depend on how its input is written down.
+// The result of segment() does not depend on how its input is represented.
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -14,23 +14,24 @@ using namespace covol;
 
 namespace {
 
-constexpr double kMaxDice = 0.002;  // of change
-// Forward differences of the least surface, the cells of patches and the hull's directions have no mirror symmetry.
+constexpr double kMaxDice = 0.002;  // largest difference
+// Forward differences of the minimal surface, the cells of patches and the directions of the hull have no mirror
+// symmetry.
 constexpr double kMaxDiceOfTurned = 0.01;
 
-/// Three quarters of a ring whose thickness falls to its ends: thin, curved, with ends. Negative inside.
+/// Three quarters of a ring that tapers to its ends: thin, curved, with ends. Negative inside.
 double horn(const Vec3& p) {
     const double angle = std::clamp(std::atan2(p[1], p[0]), -2.4, 2.4), ring = 15,
                  radius = 4.5 - 1.5 * std::abs(angle) / 2.4;
     return std::hypot(p[0] - ring * std::cos(angle), p[1] - ring * std::sin(angle), p[2]) - radius;
 }
 
-/// The scene, seen through a map of places. @pre the map is an isometry times `unit`
+/// The scene in other coordinates. @pre the map is an isometry times `unit`
 struct View {
     std::array<int, 3> axes{0, 1, 2};  ///< axis a of the view is axes[a] of the scene
     std::array<int, 3> signs{1, 1, 1};
-    double unit = 1;       ///< lengths of the view in those of the scene
-    Vec3 origin{0, 0, 0};  ///< added to places of the view, in its own unit
+    double unit = 1;       ///< length of the view's unit in units of the scene
+    Vec3 origin{0, 0, 0};  ///< added to positions of the view, in its own unit
     double gain = 1, base = 0;
     bool shuffled = false, repeated = false;
 
@@ -49,7 +50,7 @@ struct View {
 constexpr std::array kSizes{52, 52, 28};  // of the scene
 
 double noise_at(const Vec3& q) {
-    // Of the scene's own voxel, the same in every view.
+    // Made from the scene's own voxel, so that noise is the same in every view.
     std::uint64_t key = 0;
     for (int a = 0; a < 3; ++a) key = key * 1000003 + std::uint64_t(std::llround(2 * q[a]) + 500);
     std::mt19937_64 random(key);

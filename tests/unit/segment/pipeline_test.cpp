@@ -78,7 +78,7 @@ TEST_CASE("segment: image and points agree on the ball") {
     CHECK(result.report.domain.voxel_size == 1.0);
     CHECK(result.report.surface.closed);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
-    // A guess that the image corrects needs no edges: none are looked for.
+    // A guess that the image corrects needs no edges, so that none are detected.
     CHECK(result.report.guidance.used);
     CHECK(result.edge == nullptr);
     CHECK_FALSE(result.report.resolved.edge.edge_k.has_value());
@@ -108,7 +108,7 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     options.start = SphereStart{{0, 0, 0}, kRadius + 4};
     options.margin = 8;
     options.evolve.attraction_range = 0;
-    // the points are a voxel apart: more and curvature wins between them
+    // the points are a voxel apart: with a larger delta, curvature would dominate between them
     options.evolve.delta = 0.1 * h;
     const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
@@ -173,7 +173,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
     CHECK(lean.edge == nullptr);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.surface->tree().hasSameTopology(whole.surface->tree()));
-    // Relaxing draws slivers together, two triangles a time.
+    // Relaxation collapses slivers, two triangles at a time.
     CHECK(lean.report.mesh.triangles == whole.report.mesh.triangles + 2 * whole.report.mesh.collapses);
     CHECK(lean.report.surface.volume == Approx(whole.report.surface.volume).epsilon(3e-4));  // not relaxed
     CHECK(lean.report.surface.genus == 0);
@@ -182,7 +182,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
 }
 
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
-    // A plate of three voxels: a voxel and a half at twice the size.
+    // A plate three voxels thick: one and a half at twice the voxel size.
     const Image image = ellipsoid_image({24, 24, 2});
     const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
     CHECK(both.report.surface.closed);
@@ -221,7 +221,7 @@ TEST_CASE("segment: parts of an image and of a cloud have the whole's lattice") 
     options = {};
     options.voxel_size = 0.7;
     const SegmentResult cloud = reconstruct(sphere_points(6000), options);
-    std::vector<Vec3> turned = sphere_points(5000);  // another cloud, with a box of its own
+    std::vector<Vec3> turned = sphere_points(5000);  // another cloud, with a bounding box of its own
     for (Vec3& p : turned) std::swap(p[0], p[2]);
     CHECK(reconstruct(turned, options).surface->transform() == cloud.surface->transform());
     options.lattice_origin = Vec3{0.1, 0.2, 0.3};
@@ -254,7 +254,7 @@ TEST_CASE("points are tagged, or guessed from") {
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(image).voxel_size == 2.0);
-    // Three distinct points: as many voxels as 4,000 would have, or a thousand that are tagged.
+    // Three distinct points: as many voxels as for 4,000 points, or a thousand that are tagged.
     const std::vector<Vec3> three{{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}};
     CHECK(choose_voxel_size(three).voxel_size == Approx(3 * std::sqrt(3.0 / 4000)));
     CHECK(choose_voxel_size(three, true).voxel_size == Approx(3 * std::sqrt(3.0 / 1000)));

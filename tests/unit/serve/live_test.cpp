@@ -1,4 +1,4 @@
-// WebSockets of the running server.
+// WebSockets of a running server.
 #include <catch2/catch.hpp>
 #include <future>
 #include <thread>
@@ -15,12 +15,12 @@ using covol::serve::Request;
 using covol::serve::Response;
 using Clock = std::chrono::steady_clock;
 
-/// A server that greets clients, and sends back what they send.
+/// A server that greets its clients and echoes their messages.
 class Echo {
 public:
     explicit Echo(Options options = {}, const Handlers& other = {}) : site_(handlers(other), std::move(options)) {}
     Site& site() { return site_; }
-    Log& log() { return log_; }
+    CallRecorder& log() { return log_; }
     [[nodiscard]] Client last() const { return {last_}; }
 
 private:
@@ -41,7 +41,7 @@ private:
         return made;
     }
 
-    Log log_;
+    CallRecorder log_;
     std::atomic<std::uint64_t> last_{0};
     Site site_;
 };
@@ -63,7 +63,7 @@ TEST_CASE("a client is greeted, and gets back what it sends") {
         CHECK(echo.log().lines() == std::vector<std::string>{"opened 1"});
         live.close();
     }
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
     CHECK_FALSE(echo.site().server.send(Client{1}, "late"));
     CHECK_FALSE(echo.site().server.send(Client{77}, "nobody"));
     Live second(echo.site());
@@ -72,7 +72,7 @@ TEST_CASE("a client is greeted, and gets back what it sends") {
 }
 
 TEST_CASE("texts to a client keep their order, and those of a client theirs") {
-    Log log;
+    CallRecorder log;
     Handlers handlers;
     handlers.message = [&](Client, std::string_view text) { log.add(std::string(text)); };
     Echo echo({}, handlers);
@@ -81,7 +81,7 @@ TEST_CASE("texts to a client keep their order, and those of a client theirs") {
     for (int n = 0; n < 2000; ++n) CHECK(echo.site().server.send(echo.last(), std::to_string(n)));
     for (int n = 0; n < 2000; ++n) CHECK(live.receive() == std::to_string(n));
     for (int n = 0; n < 300; ++n) live.send(std::to_string(n));
-    REQUIRE(soon([&] { return log.lines().size() == 300; }));
+    REQUIRE(becomes_true([&] { return log.lines().size() == 300; }));
     for (std::size_t n = 0; n < 300; ++n) CHECK(log.lines()[n] == std::to_string(n));
 }
 
@@ -102,7 +102,7 @@ TEST_CASE("broadcasts reach all clients in one order") {
 
 TEST_CASE("what opened sends comes before any broadcast") {
     std::promise<void> go;
-    std::shared_future<void> gone = go.get_future().fraction();
+    std::shared_future<void> gone(go.get_future());
     std::atomic<bool> is_inside{false};
     Site* site = nullptr;
     Handlers handlers;
@@ -115,7 +115,7 @@ TEST_CASE("what opened sends comes before any broadcast") {
     Site made(handlers);
     site = &made;
     Live live(made);
-    REQUIRE(soon([&] { return is_inside.load(); }));
+    REQUIRE(becomes_true([&] { return is_inside.load(); }));
     made.server.broadcast("before");
     go.set_value();
     CHECK(live.receive() == "state");
@@ -155,7 +155,7 @@ TEST_CASE("messages that are too large, too many or no text end a client") {
         for (int n = 0; n < 60; ++n) live.socket().ping({});
         CHECK(live.closed_with() == 1008);
     }
-    CHECK(soon([&] { return echo.log().count("closed ") == 5; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed ") == 5; }));
     CHECK(echo.log().count("error") == 0);
 }
 
@@ -166,7 +166,7 @@ TEST_CASE("a client that is sent texts all the while is told, too, why it is clo
     Live live(echo.site());
     CHECK(live.receive() == "hello");
     std::jthread talker([&] {
-        for (int n = 0; n < 50; ++n) {  // before and after the server has said why
+        for (int n = 0; n < 50; ++n) {  // before and after the server has sent the reason
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
             (void)echo.site().server.send(echo.last(), "x");
         }
@@ -174,7 +174,7 @@ TEST_CASE("a client that is sent texts all the while is told, too, why it is clo
     live.send(std::string(20'000'000, 'x'));
     CHECK(live.closed_with() == 1009);
     talker.join();
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
 }
 
 TEST_CASE("a client that closes while it is sent texts gets an answer") {
@@ -202,7 +202,7 @@ TEST_CASE("a flood that does not stop is cut off") {
         live.socket().write(asio::buffer("x", 1), status);
     }
     CHECK(status);
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
 }
 
 TEST_CASE("an allowed burst is answered") {
@@ -220,7 +220,7 @@ TEST_CASE("a handler that throws ends its client, and is told to the log") {
     Live live(echo.site());
     live.send("x");
     CHECK(live.closed_with() == 1011);
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
     CHECK(echo.log().count("error message: detail") == 1);
 }
 
@@ -232,7 +232,7 @@ TEST_CASE("no more clients than are allowed") {
     auto two = std::make_unique<Live>(echo.site());
     CHECK(echo.site().get("/live", echo.site().upgrade()).result_int() == 503);
     two.reset();
-    CHECK(soon([&] { return echo.log().count("closed 2") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 2") == 1; }));
     Live three(echo.site());
     CHECK(three.receive() == "hello");
 }
@@ -245,7 +245,7 @@ TEST_CASE("handshakes that are no good") {
     fields = echo.site().upgrade();
     fields[3].second = "12";
     CHECK(echo.site().get("/live", fields).result_int() == 426);
-    Wire early(echo.site().port);
+    HttpConnection early(echo.site().port);
     early.send(echo.site().head("/live", echo.site().upgrade()) + "early");
     CHECK(early.receive().result_int() == 400);
     CHECK(echo.log().lines().empty());
@@ -264,7 +264,7 @@ TEST_CASE("a client that does not read is closed, and the others are not") {
     int sent = 0;
     while (echo.site().server.send(first, text)) REQUIRE(++sent < 100);
     CHECK(sent >= 8);
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
     CHECK_FALSE(echo.site().server.send(first, "x"));
     good.send("still here");
     CHECK(good.receive() == "still here");
@@ -275,8 +275,8 @@ TEST_CASE("a client that does not answer is closed after a while") {
     Options options;
     options.live_idle = std::chrono::milliseconds(400);
     Echo echo(options);
-    Live silent(echo.site());  // it would answer pings while it reads
-    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    Live silent(echo.site());  // it answers pings only while it reads
+    CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
     Live there(echo.site());
     CHECK(there.receive() == "hello");
     std::thread sender([&] {
@@ -289,7 +289,7 @@ TEST_CASE("a client that does not answer is closed after a while") {
 
 TEST_CASE("slow pictures do not delay messages") {
     std::promise<void> go;
-    std::shared_future<void> gone = go.get_future().fraction();
+    std::shared_future<void> gone(go.get_future());
     std::atomic<int> waiting{0};
     Handlers handlers;
     handlers.get = [&](const Request&) {
@@ -298,12 +298,12 @@ TEST_CASE("slow pictures do not delay messages") {
         return Response();
     };
     Echo echo({}, handlers);
-    std::vector<std::unique_ptr<Wire>> wires;
+    std::vector<std::unique_ptr<HttpConnection>> wires;
     for (int n = 0; n < 6; ++n) {
-        wires.push_back(std::make_unique<Wire>(echo.site().port));
+        wires.push_back(std::make_unique<HttpConnection>(echo.site().port));
         wires.back()->send(echo.site().head("/slice"));
     }
-    REQUIRE(soon([&] { return waiting == 4; }));
+    REQUIRE(becomes_true([&] { return waiting == 4; }));
     Live live(echo.site());
     CHECK(live.receive() == "hello");
     live.send("now");
@@ -324,17 +324,17 @@ TEST_CASE("a handler that is slow gets all messages, and little is kept for it")
     Echo echo(options, handlers);
     Live live(echo.site());
     for (int n = 0; n < 500; ++n) live.send(std::string(1000, 'x'));
-    CHECK(soon([&] { return handled == 500; }));
+    CHECK(becomes_true([&] { return handled == 500; }));
 }
 
 TEST_CASE("the end is told to clients, and takes less than a second") {
-    Log log;
+    CallRecorder log;
     Handlers handlers;
     handlers.opened = [&](Client client) { log.add("opened " + std::to_string(client.number)); };
     handlers.closed = [&](Client client) { log.add("closed " + std::to_string(client.number)); };
     auto site = std::make_unique<Site>(handlers);
     Live reading(*site), silent(*site);
-    REQUIRE(soon([&] { return log.count("opened") == 2; }));
+    REQUIRE(becomes_true([&] { return log.count("opened") == 2; }));
     auto code = std::async(std::launch::async, [&] { return reading.closed_with(); });
     const auto start = Clock::now();
     site->server.stop();
@@ -374,5 +374,5 @@ TEST_CASE("clients come and go while all talk") {
     is_over = true;
     threads[0].join();
     threads[1].join();
-    CHECK(soon([&] { return echo.log().count("closed") == 40; }));
+    CHECK(becomes_true([&] { return echo.log().count("closed") == 40; }));
 }

@@ -1,5 +1,5 @@
 #pragma once
-// A server under test, and what a browser or somebody else would send it.
+// A server under test, and clients that send what a browser or others would send.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -30,8 +30,8 @@ namespace websocket = beast::websocket;
 using Answer = http::response<http::string_body>;
 using Fields = std::vector<std::pair<std::string, std::string>>;
 
-/// Whether it becomes true within ten seconds.
-inline bool soon(const std::function<bool()>& is_true) {
+/// Whether the condition becomes true within ten seconds.
+inline bool becomes_true(const std::function<bool()>& is_true) {
     for (int n = 0; n < 1000; ++n) {
         if (is_true()) return true;
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -39,8 +39,8 @@ inline bool soon(const std::function<bool()>& is_true) {
     return false;
 }
 
-/// What handlers were called with.
-class Log {
+/// The calls of handlers.
+class CallRecorder {
 public:
     void add(const std::string& text) {
         const std::lock_guard lock(mutex_);
@@ -61,12 +61,14 @@ private:
     std::vector<std::string> lines_;
 };
 
-/// One connection that speaks HTTP as it is told to.
-class Wire {
+/// One connection that sends and receives HTTP.
+class HttpConnection {
 public:
-    explicit Wire(std::uint16_t port) : socket_(io_) { socket_.connect({asio::ip::address_v4::loopback(), port}); }
+    explicit HttpConnection(std::uint16_t port) : socket_(io_) {
+        socket_.connect({asio::ip::address_v4::loopback(), port});
+    }
     void send(const std::string& bytes) { asio::write(socket_, asio::buffer(bytes)); }
-    /// The next answer. @param is_head  it has no body
+    /// The next answer. @param is_head  without a body
     Answer receive(bool is_head = false) {
         http::response_parser<http::string_body> parser;
         parser.body_limit(std::uint64_t(1) << 30);
@@ -74,7 +76,7 @@ public:
         http::read(socket_, buffer_, parser);
         return parser.release();
     }
-    /// Whether the server has closed it, which is waited for.
+    /// Waits until the server closes the connection. @return whether it has
     bool is_at_end() {
         beast::error_code status;
         char byte = 0;
@@ -97,7 +99,7 @@ public:
         : server(std::move(options), std::move(handlers)), port(server.port()) {
         host = "127.0.0.1:" + std::to_string(port);
         token = server.url().substr(server.url().find('=') + 1);
-        Wire wire(port);
+        HttpConnection wire(port);
         wire.send("GET /?token=" + token + " HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
         const std::string set(wire.receive()[http::field::set_cookie]);
         cookie = set.substr(0, set.find(';'));
@@ -117,7 +119,7 @@ public:
     }
     [[nodiscard]] Answer get(const std::string& target, const Fields& changes = {},
                              const std::string& method = "GET") const {
-        Wire wire(port);
+        HttpConnection wire(port);
         wire.send(head(target, changes, method));
         return wire.receive(method == "HEAD");
     }
@@ -153,7 +155,7 @@ public:
         socket_.read(buffer);
         return beast::buffers_to_string(buffer.data());
     }
-    /// Reads to the end. @return why the server closed: a number of RFC 6455, or 0 where it did not say
+    /// Reads to the end. @return the server's reason for closing: a number of RFC 6455, or 0 if it sent none
     unsigned closed_with() {
         beast::error_code status;
         while (!status) {

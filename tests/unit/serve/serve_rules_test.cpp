@@ -1,4 +1,4 @@
-// Which requests are answered, and what stands above answers: without sockets.
+// Which requests are accepted, and the headers of answers: without sockets.
 #include <catch2/catch.hpp>
 #include <set>
 
@@ -12,7 +12,7 @@
 namespace {
 
 using namespace covol::serve;
-using Kind = Judgement::Kind;
+using Kind = Decision::Kind;
 using Fields = std::vector<std::pair<std::string_view, std::string_view>>;
 
 const std::string kToken(64, 'a'), kCookie(64, 'b');
@@ -28,7 +28,7 @@ Rules rules() {
     return made;
 }
 
-/// A request that is answered; tests spoil one part of it.
+/// A request that is accepted; tests change one part of it.
 RequestHead good_head(std::string_view target = "/image") {
     return {"GET", target, {{"Host", "127.0.0.1:8000"}, {"Cookie", kCookieField}}, false};
 }
@@ -51,7 +51,7 @@ RequestHead good_upgrade() {
 }
 
 int status_of(const RequestHead& head) {
-    const Judgement judgement = judge(head, rules());
+    const Decision judgement = judge(head, rules());
     return judgement.kind == Kind::Refuse ? judgement.status : 0;
 }
 
@@ -79,7 +79,7 @@ TEST_CASE("requests that browsers make are answered") {
 }
 
 TEST_CASE("a handler gets the decoded path and query") {
-    const Judgement judgement = judge(good_head("/sl%69ce?axis=1&name=K%C3%B6rper+2&empty=&sum=1=2"), rules());
+    const Decision judgement = judge(good_head("/sl%69ce?axis=1&name=K%C3%B6rper+2&empty=&sum=1=2"), rules());
     REQUIRE(judgement.kind == Kind::Get);
     CHECK(judgement.request.path == "/slice");
     CHECK(judgement.request.query ==
@@ -111,7 +111,7 @@ TEST_CASE("without the cookie nothing is answered") {
         CHECK(status_of(with(good_head(), "Cookie", cookie)) == 403);
         CHECK(status_of(with(good_upgrade(), "Cookie", cookie)) == 403);
     }
-    // What is asked for stays unknown to who may not ask.
+    // Without permission, a client does not learn whether the target exists.
     CHECK(status_of(without(good_head("/%00"), "Cookie")) == 403);
     CHECK(status_of(without(good_head("/live"), "Cookie")) == 403);
 }
@@ -165,13 +165,13 @@ TEST_CASE("pages of other sites do not lead here") {
     CHECK(status_of(two) == 403);
     const std::string right = "/?token=" + kToken;
     CHECK(status_of(with(good_head(right), "Sec-Fetch-Site", "cross-site")) == 403);
-    // A link of another page, or of a file, that a person follows.
+    // A link on another page, or in a file, that a person follows.
     const auto link = [&](std::string_view target, std::string_view mode, std::string_view to) {
         return with(with(with(good_head(target), "Sec-Fetch-Site", "cross-site"), "Sec-Fetch-Mode", mode),
                     "Sec-Fetch-Dest", to);
     };
-    const Judgement followed = judge(link(right, "navigate", "document"), rules());
-    CHECK(followed.kind == Judgement::Kind::SetCookie);
+    const Decision followed = judge(link(right, "navigate", "document"), rules());
+    CHECK(followed.kind == Decision::Kind::SetCookie);
     CHECK(followed.is_link);
     CHECK_FALSE(judge(good_head(right), rules()).is_link);
     CHECK(status_of(link(right, "no-cors", "document")) == 403);
@@ -183,7 +183,7 @@ TEST_CASE("a frame of a page on the same host leads here where frames are allowe
     Rules own = rules();
     const std::string target = "/?token=" + kToken;
     const auto framed = [&](std::string_view to, std::string_view site, std::string_view dest = "iframe") {
-        const Judgement judgement =
+        const Decision judgement =
             judge(with(with(with(good_head(to), "Sec-Fetch-Site", site), "Sec-Fetch-Mode", "navigate"),
                        "Sec-Fetch-Dest", dest),
                   own);
@@ -232,7 +232,7 @@ TEST_CASE("a POST is answered where files are taken, from the page itself, and w
     const auto judged = [](const RequestHead& head, std::size_t maximum = 1000) {
         Rules own = rules();
         own.max_body_bytes = maximum;
-        const Judgement judgement = judge(head, own);
+        const Decision judgement = judge(head, own);
         return judgement.kind == Kind::Refuse ? judgement.status : judgement.kind == Kind::Post ? 0 : -1;
     };
     RequestHead good = with(with(good_head("/import"), "Origin", "http://127.0.0.1:8000"), "Content-Length", "1000");
@@ -248,7 +248,7 @@ TEST_CASE("a POST is answered where files are taken, from the page itself, and w
     two.fields.emplace_back("content-length", "1000");
     CHECK(judged(two) == 411);
     CHECK(judged(with(good, "Transfer-Encoding", "chunked")) == 400);
-    // Forms and scripts of other pages, of which a browser tells where they are from.
+    // Forms and scripts of other pages, whose origin a browser states.
     CHECK(judged(without(good, "Origin")) == 403);
     CHECK(judged(with(good, "Origin", "null")) == 403);
     CHECK(judged(with(good, "Origin", "http://127.0.0.1:8001")) == 403);
@@ -404,7 +404,7 @@ TEST_CASE("rates of messages") {
     CHECK_FALSE(rate.allows_one(now + milliseconds(50)));
     CHECK(rate.allows_one(now + milliseconds(101)));
     CHECK_FALSE(rate.allows_one(now + milliseconds(102)));
-    now += std::chrono::hours(1);  // no more than the burst is saved up
+    now += std::chrono::hours(1);  // no more than the burst accumulates
     for (int n = 0; n < 5; ++n) CHECK(rate.allows_one(now));
     CHECK_FALSE(rate.allows_one(now));
 }
@@ -412,9 +412,9 @@ TEST_CASE("rates of messages") {
 TEST_CASE("texts wait in order, up to a limit") {
     const auto text = [](std::size_t size) { return std::make_shared<const std::string>(size, 'x'); };
     Outbox box(100);
-    CHECK(box.add(text(1), true) == Outbox::Added::Refused);  // not before it is greeted
+    CHECK(box.add(text(1), true) == Outbox::Added::Refused);  // not before the greeting
     const SharedText first = text(150), second = text(10);
-    CHECK(box.add(first, false) == Outbox::Added::First);  // alone it may be larger
+    CHECK(box.add(first, false) == Outbox::Added::First);  // a single message may be larger
     CHECK(box.next() == first);
     CHECK_FALSE(box.written());
     CHECK(box.add(first, true) == Outbox::Added::First);

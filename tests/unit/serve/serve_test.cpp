@@ -1,4 +1,4 @@
-// The running server: who is answered, and with what.
+// A running server: which requests it answers, and how.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -34,7 +34,7 @@ Handlers pages() {
     return handlers;
 }
 
-/// Handlers that wait until they are let go.
+/// Handlers that wait until they are released.
 class Gate {
 public:
     ~Gate() { open(); }
@@ -143,7 +143,7 @@ TEST_CASE("a request that breaks a rule gets no more than the rule, and the end 
     };
     for (const Case& one : cases) {
         CAPTURE(one.what);
-        Wire wire(site.port);
+        HttpConnection wire(site.port);
         wire.send(one.text);
         const Answer answer = wire.receive();
         CHECK(int(answer.result_int()) == one.status);
@@ -170,7 +170,7 @@ TEST_CASE("further names that a page may have") {
 
 TEST_CASE("one connection has many requests, also when they come together") {
     const Site site(pages());
-    Wire wire(site.port);
+    HttpConnection wire(site.port);
     for (int n = 0; n < 3; ++n) {
         wire.send(site.head("/" + std::to_string(n)));
         CHECK(wire.receive().body() == "/" + std::to_string(n));
@@ -183,7 +183,7 @@ TEST_CASE("one connection has many requests, also when they come together") {
     wire.send(site.head("/7", {{"Connection", "close"}}));
     CHECK(wire.receive().body() == "/7");
     CHECK(wire.is_at_end());
-    Wire old(site.port);
+    HttpConnection old(site.port);
     old.send("GET /8 HTTP/1.0\r\nHost: " + site.host + "\r\nCookie: " + site.cookie + "\r\n\r\n");
     CHECK(old.receive().body() == "/8");
     CHECK(old.is_at_end());
@@ -221,14 +221,14 @@ TEST_CASE("bodies that are deflated, large or files") {
     CHECK(site.get("/large").count("Content-Encoding") == 0);
     CHECK(site.get("/file")["Content-Disposition"] ==
           "attachment; filename=\"K__rper.ply\"; filename*=UTF-8''K%C3%B6rper.ply");
-    Wire wire(site.port);
+    HttpConnection wire(site.port);
     wire.send(site.head("/none") + site.head("/deflated"));
     CHECK(wire.receive().result_int() == 204);
     CHECK(wire.receive().body().size() == 6);
 }
 
 TEST_CASE("the body of a POST comes whole, one at a time, and its connection goes on") {
-    Log log;
+    CallRecorder log;
     std::atomic<bool> may_answer{true};
     Handlers handlers;
     handlers.post = [&](const Request& request, std::string body) {
@@ -247,7 +247,7 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
     };
     const std::string body = std::string(2'999'997, 'x') + "end";
     {
-        Wire wire(site.port);
+        HttpConnection wire(site.port);
         for (int n = 0; n < 2; ++n) {
             wire.send(head(body.size()) + body);
             const Answer answer = wire.receive();
@@ -261,20 +261,20 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
         CHECK(wire.is_at_end());
     }
     may_answer = false;
-    Wire first(site.port), second(site.port);
+    HttpConnection first(site.port), second(site.port);
     first.send(head(4) + "1234");
-    REQUIRE(soon([&] { return log.count("/import 4") == 1; }));
+    REQUIRE(becomes_true([&] { return log.count("/import 4") == 1; }));
     second.send(head(4) + "5678");
     CHECK(second.receive().result_int() == 503);
     may_answer = true;
     CHECK(first.receive().body() == "234");
-    // One that stops in the middle makes room again.
+    // A client that stops halfway frees its place.
     {
-        Wire cut(site.port);
+        HttpConnection cut(site.port);
         cut.send(head(1000) + "half");
     }
-    CHECK(soon([&] {
-        Wire next(site.port);
+    CHECK(becomes_true([&] {
+        HttpConnection next(site.port);
         next.send(head(4) + "9abc");
         return next.receive().result_int() == 200;
     }));
@@ -282,7 +282,7 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
 }
 
 TEST_CASE("what goes wrong in a handler is told to the log alone") {
-    Log log;
+    CallRecorder log;
     Handlers handlers;
     handlers.get = [](const Request& request) -> Response {
         if (request.path == "/number") throw 7;
@@ -317,9 +317,9 @@ TEST_CASE("connections that wait make room, those at work do not") {
     Options options;
     options.max_connections = 4;
     const Site site(handlers, options);
-    std::vector<std::unique_ptr<Wire>> wires;
+    std::vector<std::unique_ptr<HttpConnection>> wires;
     for (int n = 0; n < 4; ++n) {
-        wires.push_back(std::make_unique<Wire>(site.port));
+        wires.push_back(std::make_unique<HttpConnection>(site.port));
         wires.back()->send(site.head("/" + std::to_string(n)));
         CHECK(wires.back()->receive().result_int() == 200);
     }
@@ -327,20 +327,20 @@ TEST_CASE("connections that wait make room, those at work do not") {
     CHECK(wires[0]->is_at_end());
     wires.erase(wires.begin());
     for (auto& wire : wires) wire->send(site.head("/slow"));
-    wires.push_back(std::make_unique<Wire>(site.port));
+    wires.push_back(std::make_unique<HttpConnection>(site.port));
     wires.back()->send(site.head("/slow"));
-    REQUIRE(soon([&] { return gate.waiting() == 4; }));
+    REQUIRE(becomes_true([&] { return gate.waiting() == 4; }));
     CHECK(site.get("/more").result_int() == 503);
     gate.open();
     for (auto& wire : wires) CHECK(wire->receive().body() == "/slow");
-    CHECK(soon([&] { return site.get("/more").result_int() == 200; }));
+    CHECK(becomes_true([&] { return site.get("/more").result_int() == 200; }));
 }
 
 TEST_CASE("connections without a request are closed after a while") {
     Options options;
     options.idle = std::chrono::milliseconds(200);
     const Site site(pages(), options);
-    Wire silent(site.port), half(site.port), kept(site.port);
+    HttpConnection silent(site.port), half(site.port), kept(site.port);
     half.send("GET / HTTP/1.1\r\nHost: ");
     kept.send(site.head("/"));
     CHECK(kept.receive().result_int() == 200);
@@ -355,21 +355,21 @@ TEST_CASE("a handler learns that nobody waits for its answer any more") {
     Handlers handlers;
     handlers.get = [&](const Request& request) {
         gate.wait();
-        if (request.path == "/left") left = soon([&] { return request.gone->load(); }) ? 1 : -1;
+        if (request.path == "/left") left = becomes_true([&] { return request.gone->load(); }) ? 1 : -1;
         if (request.path == "/stayed") stayed = *request.gone ? -1 : 1;
         return page(request);
     };
     const Site site(handlers, {});
-    Wire patient(site.port);
-    patient.send(site.head("/stayed") + site.head("/stayed"));  // the second one waits for its turn
+    HttpConnection patient(site.port);
+    patient.send(site.head("/stayed") + site.head("/stayed"));  // the second one is queued
     {
-        Wire hasty(site.port);
+        HttpConnection hasty(site.port);
         hasty.send(site.head("/left"));
-        REQUIRE(soon([&] { return gate.waiting() == 2; }));
+        REQUIRE(becomes_true([&] { return gate.waiting() == 2; }));
     }
     gate.open();
     for (int n = 0; n < 2; ++n) CHECK(patient.receive().body() == "/stayed");
-    CHECK(soon([&] { return left == 1; }));
+    CHECK(becomes_true([&] { return left == 1; }));
     CHECK(stayed == 1);
 }
 
@@ -396,7 +396,7 @@ TEST_CASE("a port that is taken is said to be, and is free after the end") {
         CHECK(error.option() == "port");
         CHECK_THAT(error.what(), Catch::Contains("port " + std::to_string(options.port) + " of 127.0.0.1: another"));
     }
-    Wire wire(options.port);
+    HttpConnection wire(options.port);
     first.reset();
     CHECK(wire.is_at_end());
     const WebServer third(options, pages());
@@ -414,7 +414,7 @@ TEST_CASE("it listens on one address, and programs that are started do not inher
         CHECK(status);
         other.close(status);
     }
-    Wire wire(site.port);
+    HttpConnection wire(site.port);
     wire.send(site.head("/"));
     CHECK(wire.receive().result_int() == 200);
     int found = 0;
@@ -442,9 +442,9 @@ TEST_CASE("the end waits for a handler that runs, and drops requests that wait")
     Options options;
     options.get_threads = 1;
     Site site(handlers, options);
-    Wire one(site.port), two(site.port), idle(site.port);
+    HttpConnection one(site.port), two(site.port), idle(site.port);
     one.send(site.head("/1"));
-    REQUIRE(soon([&] { return gate.waiting() == 1; }));
+    REQUIRE(becomes_true([&] { return gate.waiting() == 1; }));
     two.send(site.head("/2"));
     std::thread opener([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -459,5 +459,5 @@ TEST_CASE("the end waits for a handler that runs, and drops requests that wait")
     CHECK(idle.is_at_end());
     site.server.stop();
     opener.join();
-    CHECK_THROWS(Wire(site.port));
+    CHECK_THROWS(HttpConnection(site.port));
 }

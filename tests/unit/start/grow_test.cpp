@@ -1,4 +1,4 @@
-// Starts inside an object, or around one: which grow, and to what.
+// Starts inside an object, or around one: which of them grow, and to what size.
 #include "start/grow.h"
 
 #include <openvdb/openvdb.h>

@@ -63,5 +63,5 @@ TEST_CASE("blocks of one sign cross nothing") {
     CHECK_FALSE(detail::may_cross(*grid, {Coord(-2, -2, -2), Coord(4, 4, 4)}));
     CHECK_FALSE(detail::may_cross(*grid, {Coord(20, 20, 20), Coord(26, 26, 26)}));
     CHECK(detail::may_cross(*grid, {Coord(10, 0, 0), Coord(16, 6, 6)}));
-    CHECK(detail::may_cross(*grid, {Coord(-2, -2, -2), Coord(9, 9, 9)}));  // too large to be worth a look
+    CHECK(detail::may_cross(*grid, {Coord(-2, -2, -2), Coord(9, 9, 9)}));  // too large to be examined
 }

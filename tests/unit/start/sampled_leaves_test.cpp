@@ -22,7 +22,7 @@ const Domain kDomain = make_domain({{0, 0, 0}, {48, 47, 46}}, 1.0);
 
 using Level = std::function<double(const Vec3&)>;
 
-/// The level set's start from all values of the domain, and no leaf left out.
+/// The start from all values of the level set in the domain, without skipping leaves.
 FloatGridPtr start_from_all(const Level& level) {
     const Domain& domain = kDomain;
     FloatGridPtr all = make_grid(domain, 100, "all");

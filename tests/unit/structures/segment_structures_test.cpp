@@ -16,7 +16,7 @@ namespace {
 constexpr int kSize = 40;
 constexpr double kRadius = 8;
 
-/// Two balls that overlap by 6 voxels, at the middle plane x = 20 and beside it by `shift`.
+/// Two balls that overlap by 6 voxels, symmetric about the plane x = 20 shifted by `shift`.
 const Vec3 kLeft{15, 20, 20}, kRight{25, 20, 20};
 
 double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
@@ -69,7 +69,7 @@ TEST_CASE("Structures are measured as they are once they are separated") {
         CHECK(s.result.surface->getName() == s.name);
         const SegmentReport& report = s.result.report;
         const std::vector<double> levels = LevelSet(s.result.surface).sample(s.marks);
-        // Marks of the cap that went to the other structure lie outside, by up to 3 voxels.
+        // Marks on the part of a cap that was assigned to the other structure lie outside, by up to 3 voxels.
         std::size_t off = 0;
         double sum = 0, sign = 0;
         for (const Vec3& mark : s.marks) {
@@ -82,10 +82,10 @@ TEST_CASE("Structures are measured as they are once they are separated") {
         CHECK(off > 10);
         CHECK(report.marks_off.farthest == Approx(3).margin(0.3));
         CHECK(report.fit.max == Approx(report.marks_off.farthest));
-        // The band holds distances up to 3 voxels, and these are smaller: the mean of the signed distances.
+        // The distances are within the band (3 voxels), so that the bias is the mean of the signed distances.
         CHECK(report.fit.bias == Approx(sign / double(s.marks.size())).margin(0.05));
         CHECK(report.fit.bias == Approx(sum / double(s.marks.size())).margin(0.15));
-        // Marks that both claim are off one of the two, as they have to be.
+        // Marks in the overlap are off one of the two surfaces by construction, and cause no warning.
         CHECK(std::none_of(report.warnings.begin(), report.warnings.end(),
                            [](const std::string& line) { return line.find("off the surface") != std::string::npos; }));
     }
@@ -106,7 +106,7 @@ TEST_CASE("One structure is what segment() makes of it") {
 
 TEST_CASE("A frame of a time-lapse starts from the one before, and a failed one is passed over") {
     TimeLapse lapse;
-    CHECK_THROWS_AS(lapse.segment(scene(), {Marks{}}), Error);  // no marks, and nothing to start from
+    CHECK_THROWS_AS(lapse.segment(scene(), {Marks{}}), Error);  // neither marks nor a start
     CHECK_FALSE(lapse.started());
     StructuresOptions options;
     const StructuresResult first = lapse.segment(scene(), {ball("", kLeft)}, options);

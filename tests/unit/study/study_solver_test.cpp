@@ -47,8 +47,8 @@ std::shared_ptr<const StudyStructure> ball(StudyId id, int count) {
     return structure;
 }
 
-/// What a solver said.
-struct Listener {
+/// Records the results of a solver.
+struct ResultRecorder {
     std::mutex mutex;
     std::vector<StudyResult> results;
     std::function<void(const StudyResult&)> on_result() {
@@ -69,7 +69,7 @@ struct Listener {
 }  // namespace
 
 TEST_CASE("A structure gets a first surface, and then the one that segment gives") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(3, 25), 11);
     solver.wait();
@@ -86,13 +86,13 @@ TEST_CASE("A structure gets a first surface, and then the one that segment gives
 }
 
 TEST_CASE("What is known is made again when nothing else is left to do, and without a first surface") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     solver.confirm(ball(1, 25), 5);
     solver.confirm(ball(2, 24), 5);
     solver.confirm(ball(3, 23), 5);
     solver.solve(ball(4, 22), 6);
-    solver.solve(ball(3, 22), 7);  // not known any more
+    solver.solve(ball(3, 22), 7);  // no longer known
     solver.wait();
     CHECK(listener.of(1, Stage::First).empty());
     REQUIRE(listener.of(1, Stage::Refined).size() == 1);
@@ -104,7 +104,7 @@ TEST_CASE("What is known is made again when nothing else is left to do, and with
 }
 
 TEST_CASE("Too few marks are told, and no surface is left") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 20), 1);
     solver.wait();
@@ -118,7 +118,7 @@ TEST_CASE("Too few marks are told, and no surface is left") {
 }
 
 TEST_CASE("The first surface after a change is the last one moved to the marks") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 25), 1);
     solver.wait();
@@ -132,7 +132,7 @@ TEST_CASE("The first surface after a change is the last one moved to the marks")
 }
 
 TEST_CASE("Every structure is solved in the end, the newest marks last, whatever was cancelled on the way") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     for (std::uint64_t n = 1; n <= 12; ++n)
         for (const StudyId id : {1, 2, 3}) solver.solve(ball(id, 15 + int(n)), n);
@@ -149,7 +149,7 @@ TEST_CASE("Every structure is solved in the end, the newest marks last, whatever
 }
 
 TEST_CASE("A guess gives a surface without marks, and marks correct it as in segment") {
-    Listener listener;
+    ResultRecorder listener;
     const ImageGeometry geometry = scene().geometry();
     std::vector<std::uint8_t> values;
     for (int k = 0; k < kSize; ++k)
@@ -182,7 +182,7 @@ TEST_CASE("A guess gives a surface without marks, and marks correct it as in seg
 }
 
 TEST_CASE("Paint on one slice is asked for a second one") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     auto structure = std::make_shared<StudyStructure>();
     structure->id = 1;
@@ -204,7 +204,7 @@ TEST_CASE("Paint on one slice is asked for a second one") {
 }
 
 TEST_CASE("Other options give another surface") {
-    Listener listener;
+    ResultRecorder listener;
     StudySolver solver(scene, {}, listener.on_result());
     solver.solve(ball(1, 25), 1);
     solver.wait();
@@ -220,7 +220,7 @@ TEST_CASE("Other options give another surface") {
 }
 
 TEST_CASE("A solver that is gone stops at once") {
-    Listener listener;
+    ResultRecorder listener;
     {
         StudySolver solver(scene, {}, listener.on_result());
         for (const StudyId id : {1, 2, 3, 4, 5}) solver.solve(ball(id, 30), 1);

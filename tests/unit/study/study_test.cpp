@@ -25,7 +25,7 @@ ImageGeometry image_of(int size = 20) {
     return geometry;
 }
 
-/// A folder that is gone with this object.
+/// A folder that is removed with this object.
 struct Folder {
     fs::path path = fs::temp_directory_path() / ("covol_study_" + std::to_string(::getpid()));
     Folder() { fs::remove_all(path); }
@@ -45,7 +45,7 @@ bool is_same(const StudyState& a, const StudyState& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) { return *x == *y; });
 }
 
-/// What a person may do next, sensible or not.
+/// A random action, sensible or not.
 StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
     const auto below = [&](std::size_t n) { return std::size_t(rng() % n); };
     const auto place = [&] { return Vec3{double(below(20)), double(below(20)), double(below(22))}; };  // some outside
@@ -111,7 +111,7 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     std::mt19937 rng(seed);
     StudyHistory history(image_of());
     std::vector<StudyAction> carried_out;
-    std::vector<StudyState> states{history.state()};  // behind each other, as undo goes back through them
+    std::vector<StudyState> states{history.state()};  // the stack of states, as undo goes back through them
     std::vector<StudyOptions> options{history.options()};
     std::size_t at = 0;
     int refused = 0;
@@ -145,7 +145,7 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     CHECK(states.size() > 100);
     StudyHistory again(image_of());
     for (const StudyAction& action : carried_out)
-        again.apply(parse_study_action(to_json({"", action})).action);  // by way of the journal's text
+        again.apply(parse_study_action(to_json({"", action})).action);  // by way of its text in the journal
     CHECK(is_same(again.state(), history.state()));
     CHECK(again.options() == history.options());
 }
@@ -180,7 +180,7 @@ TEST_CASE("Options, guesses and labels are undone and done again") {
     CHECK_THROWS_AS(history.apply(act::SetOptions{{0.0, {}, {}, {}}}), Error);
     CHECK_THROWS_AS(history.apply(act::SetOptions{{{}, 1.5, {}, {}}}), Error);
     CHECK(history.state().size() == 2);
-    // A label keeps its value in masks.
+    // The values of labels are kept in masks.
     const std::vector<Marks> marks =
         marks_of(history.state(), {image_of(), [](const StudyGuess&, const RunContext&) { return GivenGuess{}; }});
     REQUIRE(marks.size() == 2);
@@ -190,7 +190,7 @@ TEST_CASE("Options, guesses and labels are undone and done again") {
 
 namespace {
 
-/// How much of the image is painted.
+/// The painted volume of the image.
 double painted_volume(const StudyStructure& structure, const ImageGeometry& image) {
     const std::optional<Image> paint = paint_of(structure, image);
     if (!paint) return 0;
@@ -215,7 +215,7 @@ TEST_CASE("A brush paints balls, discs and what lies between two places, and an 
     structure.strokes.push_back({1, false, 5, {}, 0, {at(30, 30, 30)}});
     const double ball = 4.0 / 3 * M_PI * 125;
     CHECK(painted_volume(structure, image) == Approx(ball).epsilon(0.03));
-    // The same place once more adds nothing; a line adds a cylinder.
+    // Painting the same position again adds nothing; a line adds a cylinder.
     structure.strokes.push_back({2, false, 5, {}, 0, {at(30, 30, 30), at(38, 30, 30)}});
     CHECK(painted_volume(structure, image) == Approx(ball + 25 * M_PI * 4).epsilon(0.03));
     structure.strokes.push_back({3, true, 100, {}, 0, {at(30, 30, 30)}});
@@ -244,7 +244,7 @@ TEST_CASE("Marks of a file are one action, of every kind and with its lines") {
     (void)history.apply(act::AddStructure{"one", {}});
     const StudyOutline line{0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 6, 4}}};
     const act::AddMarks marks{1, MarkKind::Surface, {{1, 2, 3}}, {{4, 5, 6}}, {{7, 8, 9}, {1, 1, 1}}, {line}};
-    // Through the journal's line.
+    // By way of its line in the journal.
     const KeyedAction again = parse_study_action(to_json({"k", marks}));
     (void)history.apply(again.action);
     const StudyStructure& one = *history.state().front();
@@ -404,7 +404,7 @@ TEST_CASE("Damage before the last line is an error that names the line") {
     write(folder.journal(), "this is no journal\n");
     CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
                       Catch::Matchers::Contains("its first line is none"));
-    // Without an end of a line, too, it is not taken for a line that was cut off, and stays.
+    // A last line without a line end is not taken for a truncated line of a journal, and is not removed.
     write(folder.journal(), "somebody's notes");
     CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
                       Catch::Matchers::Contains("its first line is none"));

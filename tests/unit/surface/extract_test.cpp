@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Values clamp(f, -3h, 3h) in every voxel of [-n, n]^3, in leaves; signed tiles elsewhere are the background.
+/// Values clamp(f, -3h, 3h) in every voxel of [-n, n]^3, in leaves; elsewhere the background, with signed tiles.
 FloatGridPtr dense_grid(int n, double h, const Vec3& origin, const std::function<double(const Vec3&)>& f) {
     Domain domain;
     domain.voxel_size = h;
@@ -159,7 +159,7 @@ TEST_CASE("small components are dropped on demand") {
 TEST_CASE("inside tiles without a rim of leaves are closed too") {
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     grid->tree().addTile(1, {0, 0, 0}, -1.0F, false);    // 8^3
-    grid->tree().addTile(1, {8, 8, 0}, -1.0F, true);     // touches the first in an edge
+    grid->tree().addTile(1, {8, 8, 0}, -1.0F, true);     // touches the first tile at an edge
     grid->tree().addTile(2, {256, 0, 0}, -1.0F, false);  // 128^3
     grid->tree().setValue({-1, -1, 8}, -0.5F);
     const TriangleMesh mesh = extract_mesh(*grid);
@@ -189,7 +189,7 @@ TEST_CASE("grids that have no closed surface are refused, an empty one gives an 
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface")).empty());
     CHECK_THROWS_AS(extract_mesh(*make_grid({}, -1.0F, "surface")), Error);
     ExtractOptions options;
-    options.min_component_volume = 0.5;  // nothing was there to be too small
+    options.min_component_volume = 0.5;  // no component was there to be too small
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface"), options).empty());
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     grid->tree().setValue({0, 0, 0}, -1.0F);
@@ -200,7 +200,7 @@ TEST_CASE("grids that have no closed surface are refused, an empty one gives an 
     CHECK_THROWS_AS(extract_mesh(*grid), Error);
     grid = make_grid({}, 1.0F, "surface");
     grid->tree().setValue({0, 0, 0}, -1.0F);
-    grid->tree().setValue({1 << 24, 0, 0}, -1.0F);  // too far from each other for single precision
+    grid->tree().setValue({1 << 24, 0, 0}, -1.0F);  // too far apart for single precision
     CHECK_THROWS_AS(extract_mesh(*grid), Error);
 }
 

@@ -15,14 +15,14 @@ using namespace covol;
 namespace {
 
 constexpr double kVoxel = 0.05;
-constexpr double kSmall = 0.12;  // radius of the small ones: thinner than the band
-const Vec3 kBeside{1.1, 0, 0};   // the second ball's band meets the first one's
-const Vec3 kFar{1.6, 0, 0};      // it does not
+constexpr double kSmall = 0.12;  // radius of the small balls: thinner than the band
+const Vec3 kBeside{1.1, 0, 0};   // the bands of both balls meet
+const Vec3 kFar{1.6, 0, 0};      // the bands do not meet
 const Vec3 kCavity{0, 0.3, 0};
 
 double ball(const Vec3& p, const Vec3& center, double radius) { return test::distance(p, center) - radius; }
 
-/// A ball of radius 0.8 with a small cavity, and a small ball: a band.
+/// A narrow band of a ball of radius 0.8 with a small cavity, and of a small ball.
 FloatGridPtr solid(const Vec3& second) {
     return test::start_grid(
         test::cube_domain(80, kVoxel),
@@ -69,7 +69,7 @@ TEST_CASE("pieces and cavities with fewer points than asked for go") {
         CHECK(dropped(joined(on_main, in_cavity), 1, 2) == 1);
         CHECK(dropped(on_main, 1, 1) == 2);
         CHECK(dropped(joined(joined(on_main, in_cavity), on_second), 41, 1) == 2);
-        // The largest piece stays in any case.
+        // The largest piece is always kept.
         CHECK(dropped({}, 1, 1) == 2);
         CHECK(dropped(joined(in_cavity, on_second), 1, 3) == 0);
     }

@@ -13,7 +13,7 @@ using namespace covol;
 
 namespace {
 
-/// Rotated about two axes, with pixels that are no squares.
+/// Rotated about two axes, with pixels that are not square.
 ImageGeometry turned_lattice() {
     ImageGeometry g;
     g.size = {50, 44, 20};
@@ -69,7 +69,7 @@ TEST_CASE("Contours of a ball lie on it, in each slice that it meets, whatever t
                 CHECK(distance(point, center) == Approx(kRadius).margin(0.02 * 0.5));
             }
             const double off = (contour.slice - 9.4) * 1.4, square = kRadius * kRadius - off * off;
-            // Chords of length c cut off about pi c^2 / 6, whatever the radius is.
+            // Chords of length c cut off an area of about pi c^2 / 6, independent of the radius.
             CHECK(area(in_pixels(contour, g)) * 0.5 * 0.7 == Approx(M_PI * square).epsilon(0.005).margin(0.5));
         }
     }
@@ -78,7 +78,7 @@ TEST_CASE("Contours of a ball lie on it, in each slice that it meets, whatever t
 TEST_CASE("Contours end half a voxel beyond the image's last centres") {
     openvdb::initialize();
     const ImageGeometry g = turned_lattice();
-    for (const double voxel : {0.5, 0.3, 0.24}) {  // one, two and three samples along a pixel
+    for (const double voxel : {0.5, 0.3, 0.24}) {  // one, two and three samples per pixel
         const std::vector<SliceContour> contours = outline_slices(*ball(26, g.index_to_world({25, 22, 10}), voxel), g);
         REQUIRE(contours.size() == 20);
         for (const SliceContour& contour : contours)
@@ -100,7 +100,7 @@ TEST_CASE("A part with holes becomes one curve of the area that is left, which p
         if (is_hole) std::reverse(curve.begin(), curve.end());
         return curve;
     };
-    // A part with two holes, in one of which lies another part; a part elsewhere.
+    // A part with two holes, another part within one of the holes, and a separate part.
     const std::vector<Curve> joined =
         detail::join_holes({square(0, 0, 10, false), square(-5, 0, 3, true), square(5, 0, 2, true),
                             square(-5, 0, 1, false), square(40, 0, 2, false)});

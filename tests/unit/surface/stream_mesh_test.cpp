@@ -15,7 +15,7 @@ using namespace covol;
 
 namespace {
 
-/// The streamed file is the one that write_mesh() makes of extract_mesh()'s mesh, and so are the measures.
+/// The streamed file and the measures are the same as with write_mesh() and extract_mesh().
 void check_same(const FloatGrid& surface, double isovalue, const WriteMeshOptions& options = {}) {
     const Scratch scratch;
     const TriangleMesh mesh = extract_mesh(surface, {isovalue});
@@ -50,7 +50,7 @@ void check_same(const FloatGrid& surface, double isovalue, const WriteMeshOption
 }
 
 FloatGridPtr ring() {
-    // A torus, with a ball apart: genus 1, two pieces.
+    // A torus and a separate ball: genus 1, two pieces.
     const Domain domain{1.0, {0.3, 0.2, 0.1}, {-90, -90, -40}, {90, 90, 40}};
     const auto width = float(kHalfWidthVoxels);
     FloatGridPtr grid = make_grid(domain, width, "surface");
@@ -90,7 +90,7 @@ TEST_CASE("a mesh in pieces of a solid that the image's faces cut") {
 }
 
 TEST_CASE("meshes of many layers of leaves go in more than one piece") {
-    // 8192 leaves are one piece.
+    // 8192 leaves are processed as one piece.
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(150.F, {0.3F, -0.4F, 0.1F}, 1.F);
     REQUIRE(grid->tree().leafCount() > 9000);
     check_same(*grid, 0);

@@ -51,7 +51,7 @@ struct Point {
     [[nodiscard]] double dot(const Point& o) const { return x * o.x + y * o.y + z * o.z; }
 };
 
-/// Squared distance to a triangle, by the regions of its vertices, edges and inside (Ericson, Real-Time Collision
+/// Squared distance to a triangle, by its Voronoi regions: vertices, edges, face (Ericson, Real-Time Collision
 /// Detection, 5.1.5).
 double to_triangle(const Point& p, const Point& a, const Point& b, const Point& c) {
     const auto square = [&](const Point& q) { return (p - q).dot(p - q); };
@@ -67,7 +67,7 @@ double to_triangle(const Point& p, const Point& a, const Point& b, const Point& 
     return square(a + ab * (vb / (va + vb + vc)) + ac * (vc / (va + vb + vc)));
 }
 
-/// In voxels, over all triangles of the patches.
+/// Distance in voxels to the nearest of all triangles of the patches.
 double nearest_by_search(const detail::InterfacePatches& patches, const Coord& at) {
     double best = 1e9;
     for (const detail::Patch& patch : patches.patches) {
@@ -96,7 +96,7 @@ TEST_CASE("a plane's surface is its distance, whatever the slope of u") {
     CHECK(grid->background() == float(kHalfWidth));
     CHECK(domain_of(*grid) == kDomain);
     openvdb::CoordBBox inner = box_of(kDomain);
-    inner.expand(-8);  // at the domain's end the solid is closed
+    inner.expand(-8);  // the solid is closed at the domain's end
     double worst = 0;
     for (auto at = inner.begin(); at; ++at) {
         const double exact = std::clamp(distance(world_of(kDomain, *at)), -kHalfWidth, kHalfWidth);
@@ -123,7 +123,7 @@ TEST_CASE("distances are those to the nearest of all patches, between sheets and
             REQUIRE((grid->tree().getValue(*at) < 0) == (u->tree().getValue(*at) < 0));
     }
     CHECK(voxels > 20000);
-    // Neighbour to neighbour a patch may fail to get through where sheets meet.
+    // Propagation from neighbour to neighbour may miss the nearest patch where sheets meet.
     CHECK(off < voxels / 1000);
     CHECK(worst < 0.05);
 }
@@ -137,7 +137,7 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
         std::array<float, 3> center{}, axis{unit(random), unit(random), unit(random)};
         const float length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
         for (float& a : axis) a /= length;
-        // Two directions across the axis.
+        // Two directions perpendicular to the axis.
         const std::size_t minimum = std::abs(axis[0]) < 0.6F ? 0 : 1;
         std::array<float, 3> e{}, f{};
         for (std::size_t a = 0; a < 3; ++a) e[a] = (a == minimum ? 1.0F : 0.0F) - axis[minimum] * axis[a];
@@ -180,7 +180,7 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
             const detail::PatchHit hit = detail::nearest_on(fan, arm);
             REQUIRE(std::sqrt(hit.squared) == Approx(std::sqrt(exact)).margin(1e-4));
             const bool above = std::sqrt(exact) < 2.99 && hit.is_interior;
-            if (above) {  // of the inside of the patch, and so in the cylinder
+            if (above) {  // within the patch, and therefore in the cylinder
                 ++reached;
                 REQUIRE(patch[std::size_t(p)] == 7);
             }

@@ -55,7 +55,7 @@ TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
                     worst = std::max(worst, std::abs(exact - result.grid->tree().getValue({i, j, k})));
                     if (std::abs(exact) < 2.9 && !result.grid->tree().isValueOn({i, j, k})) ++inactive_in_band;
                 }
-        CHECK(worst <= 0.25);  // the cloud is random: the tagged surface is that far from the sphere
+        CHECK(worst <= 0.25);  // the cloud is random: the tagged surface is up to this far from the sphere
         CHECK(inactive_in_band == 0);
     }
     SECTION("the enclosed core next to d = D is deep inside") {
@@ -71,7 +71,7 @@ TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
 }
 
 TEST_CASE("the tagged surface of a plane of points is exact to a hundredth of a voxel") {
-    // A closed box of a lattice of points, denser than the voxels: its faces are planes.
+    // The faces of a closed box, sampled by a lattice of points denser than the voxels, are planes.
     std::vector<Vec3> points;
     for (double s = -20; s <= 20; s += 0.25)
         for (double t = -20; t <= 20; t += 0.25)
@@ -141,7 +141,7 @@ TEST_CASE("a leak is reported with the distance that holds") {
 }
 
 TEST_CASE("a solid body without a core does not leak") {
-    // D is larger than the sphere: a smaller D still finds the core.
+    // D is larger than the sphere's radius: a smaller D still finds the core.
     const std::vector<Vec3> points = sphere_cloud(3000, 4, 1);
     const BandResult result = tag_interior(*tube(points, kDomain, 9), {5.0, {}});
     CHECK(result.report.core_volume == 0);
@@ -149,14 +149,14 @@ TEST_CASE("a solid body without a core does not leak") {
 }
 
 TEST_CASE("what lies beyond the domain is outside") {
-    // The domain cuts the sphere; its wall reaches the boundary.
+    // The domain cuts the sphere, whose wall reaches the domain's end.
     const Domain half = make_domain({{-32, -32, 0}, {32, 32, 32}}, 1.0);
     const BandResult result = tag_interior(*tube(sphere_cloud(40000, 20, 1), half, 8), {2.5, {}});
     int inside_beyond = 0;
     for (auto value = result.grid->tree().cbeginValueAll(); value; ++value)
         if (value.getCoord().z() < half.min[2] && *value < 0) ++inside_beyond;
     CHECK(inside_beyond == 0);
-    CHECK(result.report.core_volume == 0);  // the flood comes in where the domain ends
+    CHECK(result.report.core_volume == 0);  // the flood enters at the domain's end
 }
 
 TEST_CASE("a large empty domain costs nothing") {
@@ -235,7 +235,7 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         const TagDistanceChoice choice =
             choose_tag_distance(box_cloud(4000, {{-25, -25, 0}, {25, 25, 0.01}}, 6), kDomain, {});
         CHECK(choice.reason.find("spacing") != std::string::npos);
-        CHECK(choice.tag_distance == Approx(1.5));  // at least; 1.8 times 0.4 is less
+        CHECK(choice.tag_distance == Approx(1.5));  // the minimum; 1.8 times 0.4 is less
     }
     SECTION("one point") { CHECK(choose_tag_distance({{1, 1, 1}}, kDomain, {}).tag_distance >= 1.5); }
 }

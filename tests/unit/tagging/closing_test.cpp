@@ -37,11 +37,11 @@ TEST_CASE("the closing of a tagged cloud touches its points and stays near the b
     const TriangleMesh mesh = extract_mesh(*solid);
     CHECK(measure(mesh).genus == 0);
     CHECK(measure(mesh).closed);
-    // The closing has a cusp at each point, which a grid rounds off by less than a voxel.
+    // The closing has a cusp at each point, which the grid rounds by less than a voxel.
     const FitStatistics fit = measure_fit(points, mesh);
     CHECK(fit.max < h);
     CHECK(fit.mean < 0.5 * h);
-    // Between its contacts the ball dips in by at most its own sagitta over the gap, D - sqrt(D^2 - gap^2).
+    // Between its contact points the ball intrudes by at most its sagitta over the gap, D - sqrt(D^2 - gap^2).
     const double gap = 0.5 * 3.545 / std::sqrt(120.0) * std::sqrt(2.0), dip = D - std::sqrt(D * D - gap * gap);
     for (const auto& v : mesh.vertices) {
         const double r = std::hypot(v[0], v[1], v[2]);
@@ -53,7 +53,7 @@ TEST_CASE("the closing of a tagged cloud touches its points and stays near the b
 TEST_CASE("a ball too large for the body leaves no closing") {
     const double h = 0.05;
     const Domain domain = make_domain({{-2, -2, -2}, {2, 2, 2}}, h);
-    // One point: the tagged body is the ball of radius D around it, its closing the point itself.
+    // A single point: the tagged body is the ball of radius D around it, and its closing is the point itself.
     const FloatGridPtr d = compute_distance({{0.01, 0.02, 0.015}}, domain, {0.5 + 5 * h}).grid;
     const BandResult tagged = tag_interior(*d, {0.5, {}});
     const FloatGridPtr closed = close_by_ball(*tagged.grid, 0.5 + h);

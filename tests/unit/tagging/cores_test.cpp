@@ -18,8 +18,7 @@ using openvdb::Coord;
 
 namespace {
 
-/// {d > level} without a tree: its components through faces, that of all that reaches the domain's end being the
-/// exterior.
+/// The face-connected components of {d > level} by brute force; all that reach the domain's end form the exterior.
 class Flooded {
 public:
     struct Component {
@@ -106,7 +105,7 @@ std::vector<Vec3> points_on_balls(const std::vector<std::array<double, 4>>& ball
 }  // namespace
 
 TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with runs between leaves and without") {
-    // The second ball is cut by the domain's end; the radius leaves much beyond the tube, or nothing.
+    // The second ball is cut by the domain's end; the radius leaves a large part beyond the tube, or nothing.
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
     const double radius = GENERATE(6.0, 9.5, 40.0);
     const bool has_seed = GENERATE(false, true);
@@ -137,15 +136,15 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
         };
         const auto above = Flooded(*d, radius, core.saddle, seed_voxel).enclosed();
         CHECK(std::any_of(above.begin(), above.end(), is_it));
-        // A little below it has an opening: no enclosed component holds that peak. What goes beyond the tube has no
-        // own.
+        // Slightly below the saddle it has an opening: no enclosed component contains that peak. Components beyond the
+        // tube have no peak of their own.
         if (core.peak == radius) continue;
         const auto below = Flooded(*d, radius, std::nextafter(float(core.saddle), 0.0F), seed_voxel).enclosed();
         CHECK(std::none_of(below.begin(), below.end(), [&](const Flooded::Component& c) {
             return double(c.voxels) >= core.volume && std::abs(c.peak - core.peak) < 1e-6;
         }));
     }
-    // No larger one is enclosed where the largest opens, but for one that a seed opens.
+    // At the level at which the largest core opens, no larger one is enclosed, unless a seed opened it.
     if (has_seed) return;
     for (const auto& c : Flooded(*d, radius, cores.front().saddle, seed_voxel).enclosed())
         CHECK(double(c.voxels) <= main);

@@ -1,5 +1,5 @@
-"""covol in Blender: marks on an image's border become a surface, as a mesh and a volume that stay where they are when they are
-made again. In the sidebar of the 3D view, tab covol."""
+"""covol in Blender: computes a surface from marks on the border of a structure, as a mesh and a volume, which keep their place in
+the scene when they are recomputed. In the sidebar of the 3D view, tab covol."""
 import os
 
 import bpy
@@ -18,11 +18,11 @@ bl_info = {
     "description": "Surfaces in 3D images and of point clouds from a few marks",
     "category": "Import-Export",
 }
-ROLE = "covol_role"  # what an object below the space is: "surface" or "volume"
-MESHES = "covol_meshes"  # of a surface: names of its meshes, one for each frame
-START = "covol_start"    # and the frame of Blender that shows the first
+ROLE = "covol_role"  # role of an object below the space: "surface" or "volume"
+MESHES = "covol_meshes"  # names of a surface's meshes, one for each frame
+START = "covol_start"    # frame of Blender that shows the first of them
 FIGURES = ("volume", "area", "genus")
-TICK = 0.1           # seconds between two looks at a run
+TICK = 0.1           # seconds between two checks of a run
 
 
 def is_marks(_, candidate):
@@ -63,7 +63,7 @@ def program_of(context):
 
 
 def space_of(context):
-    """The object in whose space the image lies, made where there is none."""
+    """The object that defines the coordinate system of the image; created if there is none."""
     settings = context.scene.covol
     if settings.space is None:
         space = bpy.data.objects.new("covol space", None)
@@ -75,7 +75,7 @@ def space_of(context):
 
 
 def places_of(marks, space):
-    """(n, 3), x, y, z, of marks in the image's world."""
+    """(n, 3), x, y, z, positions of the marks in the image's world."""
     if marks is None:
         return np.zeros((0, 3))
     if marks.type == "MESH":
@@ -90,7 +90,7 @@ def places_of(marks, space):
 
 
 def child_of(space, role, make, context):
-    """The object below the space that has this role, made where there is none."""
+    """The object below the space that has this role; created if there is none."""
     for child in space.children:
         if child.get(ROLE) == role:
             return child
@@ -110,12 +110,12 @@ def fill(mesh, vertices, faces):
 
 
 def meshes_of(surface, count):
-    """The surface's meshes, one for each frame, those of the last result first, with the materials of the one that is seen; others go."""
+    """The surface's meshes, one for each frame: reuses those of the last result, copies the visible one's materials, removes others."""
     shown = surface.data
     kept = [mesh for mesh in (bpy.data.meshes.get(name) for name in surface.get(MESHES, "").splitlines()) if mesh is not None] or [shown]
     made = kept[:count] + [shown.copy() for _ in range(count - len(kept))]
     for mesh in made:
-        mesh.use_fake_user = count > 1  # one that no object shows now is saved, too
+        mesh.use_fake_user = count > 1  # meshes of other frames are saved, too
         if mesh is not shown:
             mesh.materials.clear()
             for material in shown.materials:
@@ -129,7 +129,7 @@ def meshes_of(surface, count):
 
 @persistent
 def show_frame(scene, _=None):
-    """The surfaces of time-lapses as they are in the scene's frame; before the first and after the last as they are there."""
+    """Shows the surfaces of time-lapses at the scene's frame; outside of the time-lapse, those of its first or last frame."""
     for surface in scene.objects:
         names = surface.get(MESHES, "").splitlines()
         if len(names) > 1:
@@ -142,12 +142,12 @@ def show_frame(scene, _=None):
 
 
 def show(context, space, run, found):
-    """Puts what a run found into the scene: in the objects of the last one, with their materials and modifiers."""
+    """Adds the results of a run to the scene: to the objects of the last run, which keep their materials and modifiers."""
     start = context.scene.frame_current
     surface = child_of(space, "surface", lambda: bpy.data.meshes.new("covol surface"), context)
     known = next(each for each in found if each is not None)
     for mesh, each in zip(meshes_of(surface, len(found)), found):
-        known = each or known  # a frame that failed shows the one before
+        known = each or known  # a frame that failed shows the previous one
         fill(mesh, *known[:2])
         for key in FIGURES:
             mesh[f"covol_{key}"] = surface[f"covol_{key}"] = known[2]["surface"][key]
@@ -156,12 +156,12 @@ def show(context, space, run, found):
     before = volume.get("covol_files", "").splitlines()
     data, first = volume.data, run.at(run.vdb, next(n for n, each in enumerate(found) if each is not None))
     data.filepath, data.is_sequence = str(first), run.is_lapse
-    if run.is_lapse:  # its files are counted from 0, Blender's frames of a sequence from 1
+    if run.is_lapse:  # files are numbered from 0, Blender's frames of a sequence from 1
         data.frame_start, data.frame_duration, data.frame_offset, data.sequence_mode = start, len(found), -1, "EXTEND"
     if not data.grids.load():
         raise _process.Failed(4, f"{first}: {data.grids.error_message}")
     volume["covol_files"] = "\n".join(map(str, run.files()))
-    for path in before:  # of the last result, which nothing shows now
+    for path in before:  # files of the last result, which are not used any more
         if os.path.exists(path):
             os.remove(path)
     show_frame(context.scene)
@@ -169,7 +169,7 @@ def show(context, space, run, found):
 
 
 class Segment(bpy.types.Operator):
-    """Finds the surface through the marks, in the image or of the marks alone"""
+    """Computes the surface through the marks, with the image or from the marks alone"""
     bl_idname = "covol.segment"
     bl_label = "Find the surface"
     bl_options = {"REGISTER"}
@@ -191,7 +191,7 @@ class Segment(bpy.types.Operator):
         self._run = job.Job(program_of(context), folder, name, image, places_of(settings.marks, self._space), settings.voxel_size,
                             settings.options, settings.is_lapse)
 
-    def tell(self, event):
+    def show_event(self, event):
         kind, value = event
         if kind == "warning":
             self.report({"WARNING"}, value)
@@ -209,17 +209,17 @@ class Segment(bpy.types.Operator):
         return {"CANCELLED"}
 
     def execute(self, context):
-        """To its end, for scripts."""
+        """Runs to the end, for scripts."""
         try:
             self.start(context)
             for event in self._run.process.follow():
-                self.tell(event)
+                self.show_event(event)
             return self.finish(context)
         except _process.Failed as error:
             return self.fail(context, error)
 
     def invoke(self, context, _):
-        """Beside the work of the person; Escape cancels."""
+        """Runs in the background; Escape cancels."""
         try:
             self.start(context)
         except _process.Failed as error:
@@ -235,7 +235,7 @@ class Segment(bpy.types.Operator):
             return {"PASS_THROUGH"}
         events = self._run.process.poll()
         for found in events or []:
-            self.tell(found)
+            self.show_event(found)
         for area in context.screen.areas:
             area.tag_redraw()
         if events is not None:
@@ -248,7 +248,7 @@ class Segment(bpy.types.Operator):
 
 
 class AddMark(bpy.types.Operator):
-    """Adds a mark at the 3D cursor, to the empty that has the marks"""
+    """Adds a mark at the 3D cursor, below the empty that contains the marks"""
     bl_idname = "covol.add_mark"
     bl_label = "Mark at the cursor"
     bl_options = {"REGISTER", "UNDO"}

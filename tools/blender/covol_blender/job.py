@@ -1,4 +1,4 @@
-"""A run of covol for Blender: the command line and its files. Nothing here needs Blender."""
+"""A run of covol for Blender: the command line and its files. This module does not need Blender."""
 import json
 import os
 import pathlib
@@ -11,27 +11,27 @@ import numpy as np
 from . import _files, _process
 
 
-FRAME = "_{frame:04}"  # of a time-lapse, in the names of its files: the program's pattern, and Python's
+FRAME = "_{frame:04}"  # in file names of a time-lapse: a pattern of the program, and of Python's format()
 
 
 class Job:
-    """A run in a folder, whose outputs have names that no earlier run there has: Blender keeps volumes by their file's name.
+    """A run in a folder. Its outputs have new names, because Blender caches volumes by file name.
 
     Attributes:
-        vdb, ply, report: paths of the outputs; of a time-lapse vdb and ply are patterns.
+        vdb, ply, report: paths of the outputs; for a time-lapse, vdb and ply are patterns.
         is_lapse: whether all frames of the image are segmented.
     """
 
     def __init__(self, program, folder, name, image, places, voxel_size="", options="", is_lapse=False):
         """
         Args:
-            image: path, or empty: the places alone, as a cloud.
-            places: (n, 3), x, y, z, in the image's world; of a time-lapse in its first frame.
-            options: further options, as a shell would have them.
-            is_lapse: all frames of the image, not one.
+            image: path; if it is empty, the places are used alone, as a cloud.
+            places: (n, 3), x, y, z, in the image's world; for a time-lapse, in its first frame.
+            options: further options, in shell syntax.
+            is_lapse: whether all frames of the image are segmented.
 
         Raises:
-            Failed: what cannot be run is said before anything is started.
+            Failed: invalid inputs, before the program is started.
         """
         if not len(places):
             raise _process.Failed(3, "no marks: choose an empty with children, or a mesh with vertices, on the border")
@@ -66,15 +66,15 @@ class Job:
         return pathlib.Path(str(path).replace(FRAME, FRAME.format(frame=frame)))
 
     def files(self):
-        """All that was written."""
+        """All files that were written."""
         return sorted(self.folder.glob(self.report.stem + "[_.]*"))
 
     def result(self):
-        """Waits for the end: [(vertices, faces, report) of each frame], of one image one; None of a frame that failed. Raises Failed."""
+        """Waits for the end. Returns [(vertices, faces, report)] with one entry per frame, None for frames that failed. Raises Failed."""
         try:
             self.process.result()
         except _process.Failed:
-            if not self.is_lapse or not self.report.exists():  # else some frames succeeded
+            if not self.is_lapse or not self.report.exists():  # otherwise some frames succeeded
                 raise
         finally:
             self._marks.cleanup()
@@ -88,7 +88,7 @@ class Job:
 
 
 def summary(found):
-    """What a panel says of result(), in one line: of the last frame, and how many failed."""
+    """Summary of result() for a panel, in one line: the last frame, and the number of failed ones."""
     whole = [each for each in found if each is not None]
     surface = whole[-1][2]["surface"]
     state = f"closed, genus {surface['genus']}" if surface["closed"] else "not closed"

@@ -4,8 +4,8 @@
 #include <charconv>
 #include <set>
 
-#include "cli/arguments.h"
-#include "cli/job_options.h"
+#include "cli/options/arguments.h"
+#include "cli/options/job_options.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
 
@@ -18,7 +18,7 @@ bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '
 
 std::string name_of(const std::string& option) { return option.substr(0, option.find('=')); }
 
-/// Takes an option and its value off. @return the value; empty when it is not there
+/// Removes an option and its value. @return the value; empty if the option is absent
 std::string take_option(Words& words, const std::set<std::string>& names) {
     for (auto word = words.begin(); word != words.end(); ++word) {
         if (!is_option(*word) || !names.contains(name_of(*word))) continue;
@@ -42,7 +42,7 @@ bool parse_whole(const std::string& text, Number& value) {
     return error == std::errc() && end == text.data() + text.size();
 }
 
-/// The job of a plan. It may be a stranger's: what it asks for beyond settings and inputs is refused.
+/// The job of a plan. Plans may come from untrusted sources: anything other than settings and inputs is refused.
 JobOptions job_of_plan(const std::string& folder, const CLI::App& program, const CLI::App*& command) {
     const std::string path = plan_file(folder);
     const Json plan = read_plan_file(folder);
@@ -89,7 +89,7 @@ BrickCall run_call(Words& words, const CLI::App& program) {
     const JobOptions job = job_of_plan(call.folder, program, command);
     words.erase(words.begin(), words.begin() + std::ptrdiff_t(end));
     words.push_back("--output=" + call.folder);
-    words = words_of(job, *command, plan_file(call.folder), words);
+    words = command_line_of(job, *command, plan_file(call.folder), words);
     return call;
 }
 
@@ -103,14 +103,14 @@ BrickCall join_call(Words& words, const CLI::App& program) {
     if (output.empty()) throw UsageError("brick join: expected -o OUT.vdb");
     const CLI::App* command = nullptr;
     JobOptions job = job_of_plan(call.folder, program, command);
-    // What is said now goes first.
+    // Options of the current command line replace those of the plan.
     for (const std::string& word : words) {
         const CLI::Option* option = is_option(word) ? command->get_option_no_throw(name_of(word)) : nullptr;
         if (option == nullptr) continue;
         std::erase_if(job.values, [&](const auto& own) { return own.first == option->get_single_name(); });
     }
     words.push_back("--output=" + output);
-    words = words_of(job, *command, plan_file(call.folder), words);
+    words = command_line_of(job, *command, plan_file(call.folder), words);
     return call;
 }
 

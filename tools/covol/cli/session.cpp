@@ -2,22 +2,17 @@
 
 #include <unistd.h>
 
-#include <cmath>
-#include <csignal>
-#include <filesystem>
 #include <iostream>
 
-#include "cli/arguments.h"
-#include "cli/config_file.h"
-#include "cli/first_steps.h"
-#include "cli/grid_metadata.h"
-#include "cli/job_options.h"
-#include "cli/nearest.h"
-#include "cli/option_names.h"
-#include "cli/process.h"
-#include "cli/profile.h"
-#include "cli/provenance.h"
-#include "cli/thread_limit.h"
+#include "cli/options/arguments.h"
+#include "cli/options/config_file.h"
+#include "cli/options/first_steps.h"
+#include "cli/options/nearest.h"
+#include "cli/options/option_names.h"
+#include "cli/output/profile.h"
+#include "cli/system/cancel_signals.h"
+#include "cli/system/process.h"
+#include "cli/system/thread_limit.h"
 #include "covol/checkpoints.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
@@ -27,107 +22,11 @@
 namespace covol::tool {
 namespace {
 
-// The only state that a signal handler may touch.
-std::atomic<bool> cancel_requested = false;
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-extern "C" void on_signal(int signal) {
-    interrupted = true;
-    cancel_requested = true;
-    std::signal(signal, SIG_DFL);  // a second one ends the program at once
-}
-
-/// A page of a mapped file is gone: another program cut the file short. What is in place stays; the next run clears
-/// what this one had begun.
-extern "C" void on_bus_error(int) {
-    constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
-    static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
-    ::_exit(kIo);
-}
-
-/// Names of the options that have this role.
-std::vector<std::string> names_of(const CLI::App& command, OptionRole role) {
-    std::vector<std::string> names;
-    for (const CLI::Option* option : command.get_options())
-        if (role_of(*option) == role) names.push_back(option->get_single_name());
-    return names;
-}
-
 /// One line for a terminal: messages that list several problems are joined.
 std::string one_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, "; ");
     return safe_text(text);
-}
-
-Json to_value(const std::string& text) {
-    if (text == "true") return true;
-    if (text == "false") return false;
-    char* end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    if (!text.empty() && *end == '\0' && std::isfinite(value)) {
-        if (value == std::floor(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
-        return value;
-    }
-    return text;
-}
-
-/// The options as the user gave them, else their defaults; names as on the command line.
-Json values_of_options(const CLI::App& command) {
-    Json options = Json::object();
-    for (const CLI::Option* option : command.get_options()) {
-        std::string name = option->get_single_name();
-        if (name == "help" || name.empty()) continue;
-        if (option->count() == 0) {
-            if (!option->get_default_str().empty()) options[name] = to_value(option->get_default_str());
-            continue;
-        }
-        const std::vector<std::string>& given = option->results();
-        if (option->get_expected_max() > 1) {
-            Json list = Json::array();
-            for (const std::string& text : given) list.push_back(text);
-            options[name] = list;
-        } else {
-            options[name] = to_value(given.back());
-        }
-    }
-    return options;
-}
-
-/// Files and folders that the command line names to be read: whatever exists under the value of an option that is no
-/// output, with a structure's name or a kind of start before it (NAME=FILE, mesh:FILE), or the name of a grid or the
-/// place of a dataset behind it.
-std::vector<std::string> inputs_of(const CLI::App& command) {
-    std::vector<std::string> inputs;
-    for (const CLI::Option* option : command.get_options()) {
-        if (const OptionRole role = role_of(*option); role == OptionRole::Output || role == OptionRole::Conduct)
-            continue;
-        for (const std::string& text : option->results()) {
-            const std::vector<std::string> frames = files_of_frames(text);
-            inputs.insert(inputs.end(), frames.begin(), frames.end());
-            for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1})
-                for (const std::size_t end : {text.size(), text.rfind(':'), text.find(":/")}) {
-                    if (end == std::string::npos || end <= begin) continue;
-                    std::error_code status;
-                    const std::string path = text.substr(begin, end - begin);
-                    if ((std::filesystem::is_regular_file(path, status) ||
-                         std::filesystem::is_directory(path, status)) &&
-                        std::find(inputs.begin(), inputs.end(), path) == inputs.end())
-                        inputs.push_back(path);
-                }
-        }
-    }
-    return inputs;
-}
-
-/// A value that is empty, as from a shell's unset variable, is never meant.
-void expect_values(const CLI::App& app) {
-    for (const CLI::Option* option : app.get_options()) {
-        const std::vector<std::string>& given = option->results();
-        if (option->get_expected_min() > 0 && std::find(given.begin(), given.end(), "") != given.end())
-            throw UsageError(option->get_name() + ": expected a value, got ''");
-    }
 }
 
 /// `covol help segment` is `covol segment --help`. @throws UsageError
@@ -142,22 +41,10 @@ std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI
     return words;
 }
 
-constexpr int kReportSchema = 1;   // grows when a field of the report goes or means something else
-constexpr int kMaxThreads = 1024;  // TBB runs out of stacks long after
+constexpr int kReportSchema = 1;   // is incremented when a field of the report is removed or changes its meaning
+constexpr int kMaxThreads = 1024;  // TBB runs out of stacks far above this
 
 }  // namespace
-
-int exit_code_of(Errc code) {
-    switch (code) {
-        case Errc::InvalidOptions:
-        case Errc::InvalidInput:
-        case Errc::Unsupported: return kBadInput;
-        case Errc::Io: return kIo;
-        case Errc::Numerical: return kNumerical;
-        case Errc::Cancelled: return kInterrupted;
-    }
-    return kDefect;
-}
 
 Session::Session() : app_("covol: segment 3D images with the help of a point cloud, on sparse OpenVDB grids") {
     app_.name("covol");
@@ -166,7 +53,7 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
     app_.footer("covol COMMAND --help, or covol help COMMAND, shows the options of a command.");
     add_help_flags(app_);
     app_.set_version_flag("--version", std::string("covol ") + version() + "\n" + build_text(),
-                          "print the version, and what it was built with");
+                          "print the version and what it was built with");
     app_.add_flag_callback("--describe-options", [this] { throw CLI::CallForVersion(help_->describe(app_), kDone); })
         ->configurable(false)
         ->group("");
@@ -175,26 +62,27 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
 
 void Session::add_help_flags(CLI::App& app) {
     in_group(app, Group::Help);
-    app.set_help_flag("-h,--help", "print the options that people need first");
+    app.set_help_flag("-h,--help", "print the options that are needed most often");
     app.set_help_all_flag("--help-all", "print all options");
 }
 
 void Session::add_common_flags() {
     app_.option_defaults()->group("Options");
-    app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
-    app_.add_flag("--profile", profile_, "print at the end where time and memory went");
-    app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
+    app_.add_option("--threads", threads_, "number of threads, 0 uses all cores");
+    app_.add_flag("--profile", profile_, "print the time and memory of each stage at the end");
+    app_.add_flag("--quiet", quiet_, "print only results, warnings and errors");
     app_.add_flag("--strict", strict_,
-                  "exit code 5 where anything was warned of, a flow that is not steady or a surface off its marks");
-    app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
+                  "exit code 5 if there was a warning, for example about a flow that is not steady or a surface that "
+                  "misses its marks");
+    app_.add_option("--json", json_path_, "write the report to this file; - is standard output")->type_name("FILE|-");
     app_.add_option("--memory-limit", memory_limit_text_,
-                    "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [80 % of "
-                    "what is free]")
+                    "stop if more memory than this is needed, for example 8G; segment and reconstruct continue in "
+                    "bricks [80 % of the free memory]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")
         ->configurable(false);
-    app_.set_config("--config", "", "read options from a TOML or INI file; the command line goes first")
+    app_.set_config("--config", "", "read options from a TOML or INI file; the command line takes precedence")
         ->type_name("FILE")
         ->configurable(false);
     app_.allow_config_extras(CLI::config_extras_mode::error);
@@ -212,23 +100,22 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
 }
 
 void Session::add_grid(const std::string& path, const FloatGridPtr& grid, WriteVdbOptions options) {
-    options.metadata = metadata();
+    options.metadata = provenance_->metadata();
     outputs_.add(path, [grid, options](const std::string& to) { write_vdb(to, {grid}, options); });
 }
 
 int Session::main(int argc, char** argv) {
     const int code = run_command_line(argc, argv);
     std::cout.flush();
-    if (!std::cout && !has_last_word_.test()) return fail(kIo, "standard output: cannot write");
+    if (!std::cout && !is_reporting_end_.test()) return fail(kIo, "standard output: cannot write");
     return code;
 }
 
 int Session::run_command_line(int argc, char** argv) {
-    std::signal(SIGBUS, on_bus_error);
-    std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file's size is an error
+    catch_file_signals();
     keep_standard_streams();
     if (const std::string few = too_few_files(); !few.empty()) return fail(exit_code_of(Errc::Io), few);
-    // What follows `plan` and `brick` is a whole command line, with the options of its command.
+    // The arguments after `plan` and `brick` are a complete command line, with the options of its command.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
     for (const std::string& word : words) command_line_ += " " + shell_quoted(word);
@@ -245,7 +132,7 @@ int Session::run_command_line(int argc, char** argv) {
         check_blanks(words);
         brick_ = take_brick_call(words, app_);
         given = words;
-        std::reverse(words.begin(), words.end());  // as CLI11 wants them
+        std::reverse(words.begin(), words.end());  // CLI11 expects reverse order
         app_.parse(std::move(words));
         expect_values(app_);
         expect_values(*app_.get_subcommands().front());
@@ -264,7 +151,7 @@ int Session::run_command_line(int argc, char** argv) {
 }
 
 int Session::execute() {
-    catch_signals(on_signal);
+    catch_cancel_signals();
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
@@ -272,22 +159,22 @@ int Session::execute() {
             throw Error(Errc::InvalidOptions, "--threads: expected 0 to " + std::to_string(kMaxThreads) + ", got " +
                                                   std::to_string(threads_));
         run_.threads = threads_;
-        run_.cancel = &cancel_requested;
+        run_.cancel = &cancel_flag();
         run_.progress = [this](const std::string& stage, double fraction) { progress_->update(stage, fraction); };
         run_.log = [this](LogLevel level, const std::string& line) {
             level == LogLevel::Warning ? warn(line) : note(line);
         };
         memory_bound_ = choose_memory_bound(memory_limit_text_);
         run_.memory_budget = memory_bound_.bytes;
-        guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_requested, [this] {
-            if (has_last_word_.test_and_set()) return;  // the process ends by itself
+        guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_flag(), [this] {
+            if (is_reporting_end_.test_and_set()) return;  // the main thread is already reporting the end
             const int code = report_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
         });
-        const ThreadCount threads = limit_threads(threads_);  // when the guard has its own
-        inputs_ = inputs_of(*command_);
-        outputs_.protect(inputs_);
+        const ThreadCount threads = limit_threads(threads_);  // after the guard has created its thread
+        provenance_.emplace(*command_, inputs_of(*command_), report_);
+        outputs_.protect(provenance_->inputs());
         outputs_.protect(app_.get_config_ptr()->results());
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
@@ -303,7 +190,7 @@ int Session::execute() {
     } catch (const UsageError& error) {
         return fail(kUsage, error.what());
     } catch (const Error& error) {
-        if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
+        if (error.code() == Errc::Cancelled && guard && guard->tripped() && !is_interrupted())
             return fail(kBadInput, memory_text());
         return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
@@ -312,10 +199,6 @@ int Session::execute() {
         if (is_missing_thread(error)) return fail(kIo, kNoThread);
         return fail(kDefect, std::string("internal error: ") + error.what());
     }
-}
-
-void Session::take_interrupt() {
-    if (interrupted) cancel_requested = false;
 }
 
 void Session::start_report() {
@@ -338,7 +221,7 @@ void Session::finish() {
         });
     outputs_.write_queued();
     add_seconds("write", watch.seconds());
-    report_["seconds"].erase("total");  // the last, and of all that was done
+    report_["seconds"].erase("total");  // moved to the end, and measured over the whole run
     add_seconds("total", since_start_.seconds());
     report_["peak_rss_bytes"] = peak_rss();
     write_report();
@@ -350,13 +233,6 @@ void Session::finish() {
         for (const std::string& line : profile_lines(report_)) progress_->line(line);
     progress_->clear();
     if (strict_ && exit_code_ == kDone && report_.contains("warnings")) exit_code_ = kWarned;
-}
-
-std::vector<std::string> Session::given() const {
-    std::vector<std::string> names;
-    for (const CLI::Option* option : command_->get_options())
-        if (option->count() > 0) names.push_back(option->get_single_name());
-    return names;
 }
 
 bool Session::has_role(const std::string& option, OptionRole role) const {
@@ -384,7 +260,7 @@ std::string Session::interrupted_text() const {
 }
 
 int Session::fail(int code, const std::string& message) {
-    while (has_last_word_.test_and_set()) ::pause();  // the memory guard ends the process
+    while (is_reporting_end_.test_and_set()) ::pause();  // wait: the memory guard ends the process
     return report_failure(code, message);
 }
 
@@ -399,7 +275,7 @@ void Session::note(const std::string& line) {
 }
 
 void Session::print(const std::string& line) {
-    if (json_path_ == "-") return progress_->line(safe_lines(line));  // standard output is the report's
+    if (json_path_ == "-") return progress_->line(safe_lines(line));  // standard output is reserved for the report
     progress_->clear();
     std::cout << safe_lines(line) << std::endl;
     if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
@@ -407,84 +283,16 @@ void Session::print(const std::string& line) {
 
 void Session::warn(const std::string& message) {
     const std::string line = outputs_.shown(with_flags(message));
-    // A file that is opened twice says the same twice.
+    // A file that is opened twice causes the same warning twice.
     for (const Json& warning : report_["warnings"])
         if (warning == line) return;
     progress_->line("covol: warning: " + one_line(line));
     report_["warnings"].push_back(line);
 }
 
-void Session::set_world(const ImageGeometry& geometry) {
-    unit_ = geometry.unit.empty() ? "not stated" : geometry.unit;
-    space_ = "LPS";
-}
-
-void Session::set_world_of_points() {
-    unit_ = "not stated";
-    space_ = "none";
-}
-
-void Session::set_world(const FloatGrid& grid) {
-    const std::map<std::string, std::string> facts = text_metadata(grid);
-    const auto fact = [&](const char* name) { return facts.contains(name) ? facts.at(name) : ""; };
-    unit_ = fact("covol_unit");
-    space_ = fact("covol_space");
-}
-
-std::map<std::string, std::string> Session::metadata() const {
-    std::vector<std::string> own = given();
-    for (const std::string& name : names_of(*command_, OptionRole::Conduct)) std::erase(own, name);
-    const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
-    std::map<std::string, std::string> facts{{"covol_version", version()},
-                                             {"covol_instruction_set", instruction_set()},
-                                             {"covol_options", text(options_of_result())},
-                                             {"covol_given", text(own)},
-                                             {"covol_inputs", text(described_inputs())}};
-    if (report_.contains("bricks")) facts["covol_bricks"] = text(report_.at("bricks").at("count"));
-    if (!unit_.empty()) facts["covol_unit"] = unit_;
-    if (!space_.empty()) facts["covol_space"] = space_;
-    if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
-    return facts;
-}
-
-Json Session::options_of_result() const {
-    Json options = without_folders(report_.at("options"));
-    options["command"] = report_.at("command");
-    for (const std::string& name : names_of(*command_, OptionRole::Conduct)) options.erase(name);
-    return options;
-}
-
-std::string Session::job_text() const {
-    Json options = options_of_result();
-    for (const std::string& name : names_of(*command_, OptionRole::Output)) options.erase(name);
-    return Json{{"version", version()},
-                {"instruction_set", instruction_set()},
-                {"options", options},
-                {"inputs", described_inputs()}}
-               .dump(2, ' ', false, Json::error_handler_t::replace) +
-           "\n";
-}
-
 const CLI::App* Session::command(const std::string& name) const {
     const auto found = app_.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
     return found.empty() ? nullptr : found.front();
-}
-
-const Json& Session::described_inputs() const {
-    if (inputs_described_.is_null()) inputs_described_ = describe_inputs(inputs_);
-    return inputs_described_;
-}
-
-std::vector<std::string> Session::comments() const {
-    std::vector<std::string> lines;
-    for (const auto& [key, value] : metadata()) lines.push_back(safe_text(key + " " + value));
-    return lines;
-}
-
-std::string Session::comment() const {
-    std::string text;
-    for (const std::string& line : comments()) text += (text.empty() ? "" : "\n") + line;
-    return text;
 }
 
 std::optional<std::uint64_t> Session::memory_limit() const {

@@ -7,7 +7,7 @@
 
 namespace covol::tool {
 
-/// By how much the angles between an image's axes differ from right ones, degrees; 0 where that is a file's rounding.
+/// Deviation of the angles between an image's axes from 90 degrees, degrees; 0 if it is within a file's rounding.
 [[nodiscard]] inline double shear_of(const ImageGeometry& geometry) {
     constexpr double kRounding = 1e-3;
     const Matrix3& d = geometry.direction;

@@ -1,4 +1,4 @@
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/band.h"
 #include "covol/error.h"
@@ -30,7 +30,7 @@ struct BandJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
         const FloatGridPtr d = read_vdb(distance_path);
-        session.set_world(*d);
+        session.provenance().set_world(*d);
         const double D = choose_distance(domain_of(*d), session);
         const Stopwatch watch;
         const BandResult result = tag_interior(*d, {D, tag.options.exterior_seeds}, session.run());
@@ -47,9 +47,9 @@ struct BandJob {
 
 void add_band(Session& session) {
     const auto [job, command] =
-        session.add_job<BandJob>("band", "Step 2: tag the inside, make the narrow band and the initial values");
+        session.add_job<BandJob>("band", "Step 2: tag the inside, and make the narrow band with its initial values");
     in_group(*command, Group::Input);
-    command->add_option("distance", job->distance_path, "what `covol distance` wrote")
+    command->add_option("distance", job->distance_path, "output of `covol distance`")
         ->required()
         ->type_name("DISTANCE.vdb");
     in_group(*command, Group::Output);

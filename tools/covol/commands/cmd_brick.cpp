@@ -1,14 +1,14 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "commands/commands.h"
 
 namespace covol::tool {
 namespace {
 
-/// `brick plan ...`, `brick run ...` and `brick join ...` are segment and reconstruct (see Session::main); this is the
-/// help, and the error for all else.
+/// `brick plan ...`, `brick run ...` and `brick join ...` are handled as segment and reconstruct (see Session::main);
+/// this class provides the help, and the error for everything else.
 struct BrickHelp {
     std::vector<std::string> words;
     void run(Session&) const { throw UsageError("brick: expected plan, run or join, got " + words.front()); }
@@ -19,12 +19,13 @@ struct BrickHelp {
 void add_brick(Session& session) {
     const auto [job, command] = session.add_job<BrickHelp>(
         "brick",
-        "A segment or reconstruct in bricks: plan it, run them on any number of machines, join what they found");
+        "Run segment or reconstruct in bricks: plan them, run them on any number of machines, join their results");
     in_group(*command, Group::Input);
     command
-        ->add_option("step", job->words,
-                     "plan segment|reconstruct ... -o FOLDER, with all of its options; run FOLDER [BRICK...] [--sweep "
-                     "N], all bricks and sweeps where none is named; join FOLDER -o OUT.vdb [--mesh ...]")
+        ->add_option(
+            "step", job->words,
+            "plan segment|reconstruct ... -o FOLDER, with all options of that command; run FOLDER [BRICK...] [--sweep "
+            "N], by default all bricks and sweeps; join FOLDER -o OUT.vdb, with --mesh and the other outputs")
         ->required()
         ->type_name("plan|run|join ...");
 }

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <set>
 
-#include "cli/option_names.h"
-#include "cli/report.h"
+#include "cli/options/option_names.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
@@ -17,12 +17,12 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kLargeScene = 10000;  // beyond it Blender's default clipping hides an object
-constexpr double kSmallScene = 0.01;   // below it the default view shows a dot
-constexpr double kFlatVoxels = 3;      // an image whose spacings differ more is mostly interpolation along one axis
-constexpr double kFarPoint = 20;       // a nearest neighbour this many medians away is an outlier
+constexpr double kLargeScene = 10000;  // above it, Blender's default clipping hides an object
+constexpr double kSmallScene = 0.01;   // below it, the default view shows a dot
+constexpr double kFlatVoxels = 3;      // ratio of spacings above which an image is mostly interpolated along one axis
+constexpr double kFarPoint = 20;       // distance to the nearest neighbour in medians; beyond it a point is an outlier
 
-/// What would go wrong with a file elsewhere. Problems fail the check, remarks do not.
+/// Problems that a file would cause in other programs. Problems fail the check, remarks do not.
 class Findings {
 public:
     Findings(Session& session, Program program) : facts{}, session_(session), program_(program) {
@@ -30,7 +30,7 @@ public:
     }
     FileFacts facts;  ///< for the rules of one program
     [[nodiscard]] Program program() const { return program_; }
-    /// What a remark on programs in general would say, the rules of one say better.
+    /// Remarks on programs in general are omitted if one program is checked, because its rules are more specific.
     [[nodiscard]] bool in_general() const { return program_ == Program::Any; }
     void problem(const std::string& text) {
         add("problem", text);
@@ -38,16 +38,16 @@ public:
     }
     void remark(const std::string& text) { add("remark", text); }
     void advise(const Advice& advice) {
-        add(advice.is_problem ? "problem" : "remark", advice.text, advice.mend);
+        add(advice.is_problem ? "problem" : "remark", advice.text, advice.remedy);
         if (advice.is_problem) ++problems_;
     }
     [[nodiscard]] int problems() const { return problems_; }
 
 private:
-    void add(const char* severity, const std::string& text, const std::string& mend = {}) {
-        session_.print(std::string(severity) + ": " + safe_text(text) + (mend.empty() ? "" : "; " + mend));
+    void add(const char* severity, const std::string& text, const std::string& remedy = {}) {
+        session_.print(std::string(severity) + ": " + safe_text(text) + (remedy.empty() ? "" : "; " + remedy));
         Json finding{{"severity", severity}, {"text", text}};
-        if (!mend.empty()) finding["mend"] = mend;
+        if (!remedy.empty()) finding["mend"] = remedy;
         session_.report()["findings"].push_back(finding);
     }
     Session& session_;
@@ -71,7 +71,7 @@ void check_extent(double extent, const std::string& what, Findings& findings) {
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
     const MeshMeasures m = measure(mesh);
     findings.facts.is_closed = m.closed;
-    // Its rule says what mends it.
+    // The rule for printing includes the remedy.
     if (!m.closed && findings.program() != Program::Print)
         findings.problem(what + " is not closed: printing, volumes and Boolean operations fail");
     if (!m.manifold) findings.problem(what + " is not manifold: subdivision and simulation fail");
@@ -134,9 +134,9 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
     }
 }
 
-/// Whether an image is labels that ImageJ would show black.
+/// Whether ImageJ would show an image; it would show labels without a display range as black.
 bool has_display_range(const std::string& path, const FileFacts& facts, double maximum) {
-    constexpr double kLabels = 32;  // grey values of an image reach further
+    constexpr double kLabels = 32;  // grey values of an image exceed this
     return facts.format != "ImageJ TIFF" || maximum > kLabels || header_holds(path, "\nmax=");
 }
 
@@ -155,7 +155,7 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool of_chunks = chunks && chunks->read < chunks->total;
-    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of a mapped file some slices
+    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of a mapped file, only some slices
     if (of_chunks)
         findings.remark("of " + std::to_string(chunks->total) + " chunks " + std::to_string(chunks->read) +
                         " were read: what is wrong with the others is found when they are");
@@ -179,7 +179,7 @@ void check_mesh_file(const std::string& path, const RunContext& run, Findings& f
     const std::string unit = word_in_header(path, "covol_unit");
     if (unit != "not") findings.facts.unit = unit;  // "not stated"
     check_measures(mesh, "the mesh", findings);
-    // Objects of one file are solids of their own: those that share a border touch.
+    // Objects of one file are separate solids: those with a common border touch, and do not intersect themselves.
     const Crossings crossings = count_crossings(mesh);
     const bool apart = holds_several_meshes(path);
     const int own = crossings.within + (apart ? 0 : crossings.between);
@@ -255,17 +255,17 @@ void add_check(Session& session) {
     const auto flags = std::make_shared<ImageFlags>();
     const auto program = std::make_shared<Program>(Program::Any);
     CLI::App* command =
-        session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
+        session.add_command("check", "Report the problems that a file would cause in Blender, Houdini, Slicer or covol",
                             [=, &session] { check(*path, *program, *image, *flags, session); });
     in_group(*command, Group::Input);
-    command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
+    command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 if there is a problem")
         ->required()
         ->type_name("FILE");
-    add_words(*command, {"for", {}, {}, "what goes wrong in this program or in 3D printing, and what mends it"},
+    add_words(*command, {"for", {}, {}, "report problems in this program or in 3D printing, and how to solve them"},
               {"", "blender", "houdini", "slicer", "fiji", "print"},
               [program](std::size_t n) { *program = Program(n); })
         ->default_str("no program in particular");
-    command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
+    command->add_option("--image", *image, "for points: the image to which they belong")->type_name("IMAGE");
     flags->bind(*command);
 }
 

@@ -1,7 +1,7 @@
 #include <iomanip>
 #include <sstream>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/compare.h"
 #include "covol/error.h"
@@ -18,7 +18,7 @@ struct CompareJob {
     int label = 0, label_b = -1;
     ImageFlags image;
 
-    /// Masks may need a spacing that their file does not know.
+    /// Masks may need a spacing, if their file does not have one.
     [[nodiscard]] Solid read(const std::string& path, int wanted, const RunContext& run) const {
         if (kind_of_file(path) != FileKind::Image) {
             if (image.options.roi)
@@ -56,7 +56,7 @@ struct CompareJob {
         session.print(text.str());
     }
 
-    /// Of a level set the mesh that the other commands write.
+    /// For a level set, the mesh that the other commands write.
     static TriangleMesh mesh_of(const FloatGrid& level_set, const RunContext& run) {
         TriangleMesh mesh = extract_mesh(level_set, {}, run);
         relax_mesh(mesh, level_set, {}, run);
@@ -71,7 +71,7 @@ struct CompareJob {
         throw Error(Errc::Unsupported, "compare: " + path + ": points can be compared with a .vdb or a mesh");
     }
 
-    /// Points are no solid: how far they lie from the other's surface.
+    /// Points are not a solid: their distance from the other's surface is measured.
     static void measure_points(const std::string& points_path, const std::string& solid_path, Session& session) {
         const std::vector<Vec3> points = to_world(read_points(points_path));
         const FitStatistics fit = measure_fit(points, surface_of(solid_path, session.run()), session.run());
@@ -87,16 +87,17 @@ struct CompareJob {
 
 void add_compare(Session& session) {
     const auto [job, command] = session.add_job<CompareJob>(
-        "compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix; or points and a surface");
+        "compare",
+        "Compute overlap and distances of two solids (masks, meshes, .vdb, in any mix), or of points and a surface");
     in_group(*command, Group::Input);
-    command->add_option("a", job->a, "label image, mesh, .vdb (:NAME picks a grid) or points")
+    command->add_option("a", job->a, "label image, mesh, .vdb (:NAME selects a grid) or points")
         ->required()
         ->type_name("A");
-    command->add_option("b", job->b, "label image, mesh, .vdb (:NAME picks a grid) or points")
+    command->add_option("b", job->b, "label image, mesh, .vdb (:NAME selects a grid) or points")
         ->required()
         ->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();
-    command->add_option("--label-b", job->label_b, "label of B, where it differs");
+    command->add_option("--label-b", job->label_b, "label of B, if it is not the same");
     job->image.bind(*command);
 }
 

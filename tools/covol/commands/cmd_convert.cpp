@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
@@ -26,7 +26,7 @@ OutputKind output_kind(FileKind kind) {
     return OutputKind::Points;
 }
 
-/// The voxels of an image, in its own type.
+/// The voxels of an image in their original type.
 class SameVoxels : public PixelSource {
 public:
     explicit SameVoxels(const Image& image) : PixelSource(image.geometry(), image.pixel_type(), false), image_(image) {}
@@ -44,7 +44,7 @@ public:
     }
 
 private:
-    /// Of types whose values a float holds.
+    /// For types whose values fit into a float.
     template <typename T>
     void fill_through_floats(const VoxelBox& box, T* out) const {
         const Index3 n = box.size();
@@ -67,13 +67,13 @@ struct ConvertJob {
     Length voxel_size;
     ImageFlags image;
     MeshFlags mesh;
-    PointFlags points;  ///< its options alone
+    PointFlags points;  ///< only its options are used
     CloudFlags cloud_flags;
     VdbFlags vdb;
 
     void image_to_vdb(Session& session) const {
         const Image pixels = image.read(input, session.run());
-        session.set_world(pixels.geometry());
+        session.provenance().set_world(pixels.geometry());
         const double finest = choose_voxel_size(pixels).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
         session.require_memory(bytes_of_grid(pixels.geometry(), h),
@@ -105,7 +105,7 @@ struct ConvertJob {
         });
     }
 
-    /// The file's float grids, or the one that is named, packed as the options say.
+    /// Writes the file's float grids, or the named one, with the compression of the options.
     void vdb_to_vdb(Session& session) const {
         std::vector<FloatGridPtr> grids;
         const VdbGridName file = split_grid_name(input);
@@ -117,12 +117,12 @@ struct ConvertJob {
             else
                 session.warn(input + ": grid '" + info.name + "' holds " + info.type + ", and is left out");
         }
-        if (grids.empty()) grids.push_back(read_vdb(file.path, name));  // says which there are
-        session.set_world(*grids.front());
+        if (grids.empty()) grids.push_back(read_vdb(file.path, name));  // throws an error that lists the grids
+        session.provenance().set_world(*grids.front());
         if (is_nanovdb_name(output))
             return session.outputs().add(output, [grids](const std::string& path) { write_nvdb(path, grids); });
         session.outputs().add(output, [grids, write = vdb.options](const std::string& path) {
-            write_vdb(path, grids, write);  // their provenance stays
+            write_vdb(path, grids, write);  // their provenance is kept
         });
     }
 
@@ -131,7 +131,7 @@ struct ConvertJob {
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const PointCloud cloud = read_points(input, points.options);
         std::vector<Vec3> world = geometry ? to_world(cloud, *geometry) : to_world(cloud);
-        geometry ? session.set_world(*geometry) : session.set_world_of_points();
+        geometry ? session.provenance().set_world(*geometry) : session.provenance().set_world_of_points();
         if (geometry) check_inside(cloud, *geometry, session.run());
         session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
         Json& report = session.report()["points"];
@@ -144,7 +144,7 @@ struct ConvertJob {
             world = clean_cloud(world, cleanup, session.run(), &done);
             report["cleanup"] = to_json(done);
         }
-        session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
+        session.outputs().add(output, [world, comment = session.provenance().comment()](const std::string& path) {
             write_points(path, world, comment);
         });
     }
@@ -182,17 +182,20 @@ struct ConvertJob {
 
 void add_convert(Session& session) {
     const auto [job, command] = session.add_job<ConvertJob>(
-        "convert", "Image to .vdb and back, image to image, .vdb to .vdb or .nvdb, points to points, mesh to mesh");
+        "convert",
+        "Convert an image to .vdb and back, image to image, .vdb to .vdb or .nvdb, points to points, mesh to mesh");
     in_group(*command, Group::Input);
     command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
     in_group(*command, Group::Output);
     command->add_option("output", job->output, "the file to write")->required()->type_name("OUT");
     in_group(*command, Group::Input);
-    command->add_option("--like", job->like, "image whose lattice the result gets, or that index points belong to")
+    command
+        ->add_option("--like", job->like,
+                     "image whose lattice the result gets, or to which points in voxel indices belong")
         ->type_name("IMAGE");
     command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
     in_group(*command, Group::Output);
-    add_length(*command, {"voxel_size", kPositiveLength, {}, "edge of the voxels of a .vdb file"},
+    add_length(*command, {"voxel_size", kPositiveLength, {}, "edge length of the voxels of a .vdb file"},
                [job = job](const Length& length) { job->voxel_size = length; })
         ->default_str("smallest spacing");
     job->points.bind_options(*command);

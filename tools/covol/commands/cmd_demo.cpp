@@ -16,7 +16,7 @@ constexpr const char* kImage = "celegans_embryo.tif";
 constexpr const char* kMarks = "celegans_marks.csv";
 constexpr std::array kFiles{kImage, kMarks, "README.md"};
 
-/// What is installed with the program, in a folder that lies the same from it everywhere.
+/// The installed samples, in a folder with a fixed position relative to the program.
 fs::path folder_of_samples() {
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path();
     return (program / COVOL_TO_DATA / "covol" / "demo").lexically_normal();
@@ -38,7 +38,7 @@ struct DemoJob {
     }
 
 private:
-    /// A folder that has them already goes on with its study.
+    /// If the folder already contains the samples, its study is continued.
     void copy_samples(const RunContext& run) const {
         std::error_code failed;
         fs::create_directories(folder, failed);
@@ -73,9 +73,9 @@ private:
 
 void add_demo(Session& session) {
     const auto [job, command] =
-        session.add_job<DemoJob>("demo", "Write a sample image and its marks, and open the page of covol mark on them");
+        session.add_job<DemoJob>("demo", "Write a sample image and its marks, and open them in the page of covol mark");
     in_group(*command, Group::Output);
-    command->add_option("folder", job->folder, "where they are written, made if it is not there")
+    command->add_option("folder", job->folder, "folder to which they are written, created if it does not exist")
         ->capture_default_str()
         ->type_name("OUT_FOLDER");
     bind_page(*command, job->without_browser, job->port);

@@ -1,4 +1,4 @@
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/distance.h"
 #include "covol/error.h"
@@ -8,7 +8,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr int kTubeVoxels = 10;  // radius where none is given
+constexpr int kTubeVoxels = 10;  // radius if none is given
 
 struct DistanceJob {
     PointFlags points;
@@ -40,7 +40,7 @@ struct DistanceJob {
         std::optional<ImageGeometry> geometry;
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
-        geometry ? session.set_world(*geometry) : session.set_world_of_points();
+        geometry ? session.provenance().set_world(*geometry) : session.provenance().set_world_of_points();
         const std::vector<Vec3> cloud = read_world_points(points, geometry, session.run());
         const double h = voxel_size(pointer, cloud, session);
         const double radius = tube.length("max_distance").resolve(h, kTubeVoxels * h);
@@ -66,7 +66,8 @@ void add_distance(Session& session) {
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'distance', .vdb")->required()->type_name("OUT.vdb");
     bind_options(*command, job->tube, Offered::SingleStep);
-    command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
+    command->add_option("--like", job->like, "image whose box is the domain [the bounding box of the points]")
+        ->type_name("IMAGE");
     bind_options(*command, job->domain, Offered::SingleStep, {}, Group::Domain);
     job->image.bind(*command, {"roi"});
     job->vdb.bind(*command);

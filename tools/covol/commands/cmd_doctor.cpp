@@ -7,8 +7,8 @@
 #include <set>
 #include <thread>
 
-#include "cli/bytes_text.h"
-#include "cli/free_memory.h"
+#include "cli/output/bytes_text.h"
+#include "cli/system/free_memory.h"
 #include "commands/commands.h"
 #include "covol/evolve.h"
 #include "covol/reader_parts.h"
@@ -25,7 +25,7 @@ std::string variable(const char* name) {
     return value == nullptr ? "" : value;
 }
 
-/// The shared libraries that are loaded now, as their files are called behind all links.
+/// The shared libraries that are loaded now, with symbolic links resolved.
 std::set<fs::path> loaded_libraries() {
     std::set<fs::path> found;
     const auto add = [](dl_phdr_info* info, std::size_t, void* to) {
@@ -38,7 +38,7 @@ std::set<fs::path> loaded_libraries() {
     return found;
 }
 
-/// How many files each folder holds; those of a folder within another one count there.
+/// The number of files in each folder; files in subfolders are counted for the outermost folder of the list.
 std::map<std::string, int> count_by_folder(const std::set<fs::path>& files) {
     std::set<fs::path> folders;
     for (const fs::path& file : files) folders.insert(file.parent_path());
@@ -68,7 +68,7 @@ struct DoctorJob {
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         session.print("program: " + program);
         report = {{"build", build_text()}, {"program", program}};
-        report["readers"] = readers(session);  // before libraries(): their own are then loaded
+        report["readers"] = readers(session);  // before libraries(), so that the readers' libraries are loaded
         report["libraries"] = libraries(session);
         const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
         session.print(std::string("processor: ") + std::to_string(cores) + " cores, instruction set " +
@@ -153,7 +153,8 @@ private:
 }  // namespace
 
 void add_doctor(Session& session) {
-    session.add_job<DoctorJob>("doctor", "What this covol is and finds here: libraries, readers, memory, browser");
+    session.add_job<DoctorJob>(
+        "doctor", "Report the version of covol and what it finds on this machine: libraries, readers, memory, browser");
 }
 
 }  // namespace covol::tool

@@ -1,4 +1,4 @@
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/edge.h"
 #include "covol/vdb_io.h"
@@ -22,7 +22,7 @@ struct EdgeJob {
         ReadImageOptions reading = image.options;
         reading.roi = sampled_box(domain.world_box(), h);
         const Image pixels = read_image(image_path, reading, session.run());
-        session.set_world(pixels.geometry());
+        session.provenance().set_world(pixels.geometry());
         const Stopwatch watch;
         const EdgeResult result = detect_edges(pixels, *topology, edge.resolve(h), session.run());
         session.add_seconds("edge", watch.seconds());
@@ -40,7 +40,7 @@ void add_edge(Session& session) {
     const auto [job, command] = session.add_job<EdgeJob>("edge", "Step 3: the image's edge detector g on the band");
     in_group(*command, Group::Input);
     command->add_option("image", job->image_path, "3D image")->required()->type_name("IMAGE");
-    command->add_option("--band", job->band_path, "a grid whose active voxels get g")
+    command->add_option("--band", job->band_path, "grid on whose active voxels g is computed")
         ->required()
         ->type_name("BAND.vdb");
     in_group(*command, Group::Output);

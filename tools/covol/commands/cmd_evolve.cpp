@@ -1,6 +1,6 @@
 #include <openvdb/openvdb.h>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
@@ -18,7 +18,7 @@ struct EvolveJob {
     CheckpointFlags checkpoint;
     VdbFlags vdb;
 
-    /// A field that is not given has no weight.
+    /// Fields that are not given have no weight.
     EvolveOptions resolve(double h, Session& session) const {
         EvolveOptions options = given.resolve(h);
         if (distance_path.empty() && options.theta > 0) {
@@ -36,7 +36,7 @@ struct EvolveJob {
         session.outputs().check("-o", output, OutputKind::Vdb);
         checkpoint.begin(session);
         const FloatGridPtr u = read_vdb(band_path);
-        session.set_world(*u);
+        session.provenance().set_world(*u);
         const FloatGridPtr d = distance_path.empty() ? nullptr : read_vdb(distance_path);
         const FloatGridPtr g = edge_path.empty() ? nullptr : read_vdb(edge_path);
         const EvolveOptions options = resolve(domain_of(*u).voxel_size, session);
@@ -68,14 +68,14 @@ void add_evolve(Session& session) {
     const auto [job, command] =
         session.add_job<EvolveJob>("evolve", "Step 4: move the level set to the structure's boundary");
     in_group(*command, Group::Input);
-    command->add_option("band", job->band_path, "what `covol band` wrote, or the u of an earlier run")
+    command->add_option("band", job->band_path, "output of `covol band`, or the grid u of an earlier run")
         ->required()
         ->type_name("BAND.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid u, .vdb")->required()->type_name("OUT.vdb");
     in_group(*command, Group::Input);
-    command->add_option("--distance", job->distance_path, "what `covol distance` wrote")->type_name("DISTANCE.vdb");
-    command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
+    command->add_option("--distance", job->distance_path, "output of `covol distance`")->type_name("DISTANCE.vdb");
+    command->add_option("--edge", job->edge_path, "output of `covol edge`")->type_name("EDGE.vdb");
     bind_options(*command, job->given, Offered::SingleStep);
     job->checkpoint.bind(*command);
     job->vdb.bind(*command);

@@ -3,7 +3,7 @@
 #include <iomanip>
 #include <sstream>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "cli/shear.h"
 #include "commands/commands.h"
 #include "covol/file_kind.h"
@@ -47,7 +47,7 @@ void describe_vdb(const std::string& path, Session& session) {
     }
 }
 
-/// Which way an axis of the image runs in the world: "+x", or its cosines.
+/// The direction of an image axis in the world: "+x", or its cosines.
 std::string axis_text(const ImageGeometry& g, int axis) {
     for (int w = 0; w < 3; ++w)
         if (std::abs(g.direction[w][axis]) > 1 - 1e-6)
@@ -58,10 +58,10 @@ std::string axis_text(const ImageGeometry& g, int axis) {
     return text.str();
 }
 
-/// A large file that is mapped: not all of it is read for the range of its values.
+/// Large mapped files: only some slices are read to find the range of values.
 bool is_range_of_slices(const ImageInfo& info) { return info.bytes_to_hold == 0 && info.chunk_size[0] == 0; }
 
-/// Smallest and largest value of one channel, of a large file an estimate.
+/// Minimum and maximum value of one channel; an estimate for large files.
 Json range_of(const std::string& path, ReadImageOptions options, int channel, const ImageInfo& info, Session& session) {
     options.channel = channel;
     const int frame = options.frame.value_or(0);
@@ -85,7 +85,7 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
 }
 
 void describe_image(const std::string& path, const ImageFlags& flags, Session& session) {
-    constexpr int kMaxChannels = 16;  // for which the pixels are read
+    constexpr int kMaxChannels = 16;  // up to this number the pixels are read
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
@@ -161,7 +161,7 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
 }
 
 void describe(const std::string& path, const ImageFlags& flags, const PointFlags& points, Session& session) {
-    // A grid that is named is shown as the image that --image and the others would read.
+    // A named grid is shown as the image that --image and other options would read.
     const FileKind kind = split_grid_name(path).grid.empty() ? kind_of_file(path) : FileKind::Image;
     session.report()["kind"] = to_string(kind);
     switch (kind) {
@@ -179,7 +179,7 @@ void add_info(Session& session) {
     const auto flags = std::make_shared<ImageFlags>();
     const auto points = std::make_shared<PointFlags>();
     CLI::App* command =
-        session.add_command("info", "What is in a file: .vdb, image, mesh or points",
+        session.add_command("info", "Show what a file contains: .vdb, image, mesh or points",
                             [path, flags, points, &session] { describe(*path, *flags, *points, session); });
     in_group(*command, Group::Input);
     command->add_option("file", *path, "the file")->required()->type_name("FILE");

@@ -8,6 +8,7 @@
 #include <optional>
 #include <thread>
 
+#include "cli/system/cancel_signals.h"
 #include "commands/commands.h"
 #include "commands/mark_call.h"
 #include "covol/digest.h"
@@ -29,7 +30,7 @@
 namespace covol::tool {
 namespace {
 
-/// The page's own script and style are named in it by their digests; beside these it may ask this server alone.
+/// The page's policy allows only its own script and style, by their digests, and connections to this server.
 constexpr const char* kPolicyBegins = "<meta http-equiv=\"Content-Security-Policy\" content=\"";
 
 std::string policy_of(const std::string& page) {
@@ -37,23 +38,23 @@ std::string policy_of(const std::string& page) {
     return page.substr(begin, page.find('"', begin) - begin);
 }
 
-/// Decoded chunks that are kept for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in chunks of 128 takes
-/// 128 MiB where two voxels make a pixel.
+/// Maximum size of decoded chunks in the cache for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in
+/// chunks of 128 takes 128 MiB if two voxels are combined into one pixel.
 constexpr std::uint64_t kMaxSliceBytes = std::uint64_t(512) << 20;
 
-/// Decoded chunks that surfaces were made from, before they are given up.
+/// Maximum size of decoded chunks that surfaces were computed from, before they are released.
 constexpr std::uint64_t kMaxJobBytes = std::uint64_t(768) << 20;
 
-/// "scan.nii.gz" of a path that may end in a slash.
+/// Without the slash that a path may end with: "scan.nii.gz/" becomes "scan.nii.gz".
 std::filesystem::path without_slash(const std::string& path) {
     const std::filesystem::path given(path);
     return given.has_filename() ? given : given.parent_path();
 }
 
-/// The same port for the same study, as long as it is free: a browser keeps views, and actions that were not sent, by
-/// the address.
+/// The same port for the same study, as long as it is free: browsers store views, and actions that have not been sent,
+/// by address.
 std::uint16_t usual_port(const std::string& study) {
-    constexpr std::uint32_t kFirst = 20000, kCount = 12000;  // below those that systems give to connections
+    constexpr std::uint32_t kFirst = 20000, kCount = 12000;  // below the range of ephemeral ports
     std::error_code ignored;
     std::uint32_t hash = 2166136261U;  // FNV-1a
     for (const char c : std::filesystem::absolute(study, ignored).lexically_normal().string())
@@ -102,13 +103,13 @@ struct MarkJob {
         options.authorities = authorities;
         options.frame_origins = frame_origins;
         options.page_policy = policy_of(view.page);
-        // A page that comes back sends what was done meanwhile as fast as it is kept, a millisecond or less each.
+        // When a page reconnects, it sends pending actions as fast as they are stored, in at most a millisecond each.
         options.max_body_bytes = kMaxFileBytes;
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
         const ImageLevels levels = open_image_levels(pixels, image.options, kMaxSliceBytes, session.run());
-        // A packed stream, which takes long to open, is opened once.
+        // A compressed stream is slow to open, and is therefore opened only once.
         const bool is_bounded = levels.is_in_chunks();
         BoundedImage for_jobs(is_bounded ? open() : pixels, open,
                               is_bounded ? kMaxJobBytes : std::numeric_limits<std::uint64_t>::max());
@@ -117,7 +118,7 @@ struct MarkJob {
                                         channels(info, session), quiet(session.run()));
         MarkSession mark(
             std::move(opened), std::move(seen), [&] { return for_jobs.get(); }, std::move(view), session.run());
-        std::latch started(1);  // a browser may be there before the study is
+        std::latch started(1);  // a browser may connect before the study is loaded
         serve::Handlers handlers;
         handlers.get = [&](const serve::Request& request) {
             started.wait();
@@ -143,11 +144,11 @@ struct MarkJob {
         session.note("the study is " + folder + "; every action is on the disk at once. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
         server->stop();
-        session.take_interrupt();
+        accept_interrupt();
     }
 
 private:
-    /// The others are read when a page asks for them.
+    /// Other channels are read when a page requests them.
     [[nodiscard]] PageChannels channels(const ImageInfo& info, Session& session) const {
         PageChannels all;
         if (info.channels < 2) return all;
@@ -167,7 +168,7 @@ private:
         return all;
     }
 
-    /// The file, what is read of it, and the program that makes surfaces from it.
+    /// Identifies the file, the options it is read with, and the program version that computes surfaces.
     [[nodiscard]] std::string identity_of_image() const {
         const ReadImageOptions& how = image.options;
         std::string identity = digest_of(image_path) + " " + version() + " channel " +
@@ -187,7 +188,7 @@ private:
             const StudyId id = structure_of(study, "--points", file);
             auto action = std::get<StudyActions::AddMarks>(marks);
             action.structure = id;
-            // The same command line tomorrow does not add them twice.
+            // Running the same command line again does not add them twice.
             const std::string key = "points-" + std::to_string(id) + "-" + digest_of(file.value);
             if (!study.apply({key, action}).is_new)
                 session.note(file.value + ": its marks were added to this structure before, and are not added again");
@@ -213,7 +214,7 @@ private:
         }
     }
 
-    /// The structure of that name, made where there is none; without a name the only one.
+    /// The structure of that name, which is added if there is none; without a name, the only structure.
     static StudyId structure_of(Study& study, const std::string& flag, const Named& file) {
         const StudyState& all = study.state();
         if (file.name.empty() && all.size() > 1)
@@ -240,44 +241,53 @@ void run_mark(Session& session, const MarkCall& call) {
 
 void bind_page(CLI::App& command, bool& without_browser, int& port) {
     command.add_flag("--no-browser", without_browser,
-                     "print the address alone; from another machine: ssh -L PORT:127.0.0.1:PORT, with --port PORT");
-    command.add_option("--port", port, "of the address, 0 takes the study's own, or one that is free")->type_name("N");
+                     "print the address without opening a browser; from another machine: ssh -L PORT:127.0.0.1:PORT, "
+                     "with --port PORT");
+    command.add_option("--port", port, "port of the address; 0 selects the study's own port, or a free one")
+        ->type_name("N");
 }
 
 void add_mark(Session& session) {
     const auto [job, command] =
-        session.add_job<MarkJob>("mark", "Click marks on an image in the browser, and see the surface");
+        session.add_job<MarkJob>("mark", "Set marks on an image in the browser, and see the surface");
     in_group(*command, Group::Input);
-    command->add_option("image", job->image_path, "3D image, as of covol segment")->required()->type_name("IMAGE");
-    command->add_option("study", job->study, "folder of marks and structures, made if it is not there [IMAGE.covol]")
+    command->add_option("image", job->image_path, "3D image, in any format that covol segment reads")
+        ->required()
+        ->type_name("IMAGE");
+    command
+        ->add_option("study", job->study,
+                     "folder with the marks and structures, created if it does not exist [IMAGE.covol]")
         ->type_name("STUDY");
     job->image.bind(*command, {"roi"});
     in_group(*command, Group::Marks);
     command
         ->add_option("--points", job->points,
-                     "marks on the surface that are added to a structure, of any format that covol segment reads")
+                     "marks on the surface that are added to a structure, in any format that covol segment reads")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
     command
         ->add_option("--guess", job->guesses,
-                     "another tool's result, a mask, mesh or level set, that the marks of a structure correct")
+                     "result of another tool (a mask, mesh or level set) that the marks of a structure correct")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
-    command->add_option("--guess-label", job->guess_label, "label of a guess that has several")->type_name("N");
+    command->add_option("--guess-label", job->guess_label, "label to use from a guess with several labels")
+        ->type_name("N");
     command
         ->add_option("--labels", job->labels,
-                     "another tool's label image: each label becomes a structure, with it as the guess")
+                     "label image of another tool: each label becomes a structure and is its guess")
         ->type_name("FILE")
         ->allow_extra_args(false);
     in_group(*command, Group::Output);
     bind_page(*command, job->without_browser, job->port);
     command
         ->add_option("--also-at", job->authorities,
-                     "a further address that the page is loaded from, localhost:9000 where ssh -L 9000:127.0.0.1:PORT")
+                     "a further address from which the page may be loaded, for example localhost:9000 with ssh -L "
+                     "9000:127.0.0.1:PORT")
         ->type_name("HOST:PORT");
     command
         ->add_option("--in-frame-of", job->frame_origins,
-                     "a notebook on this machine that may show the page in a frame, http://localhost:8888")
+                     "address of a notebook on this machine that may show the page in a frame, for example "
+                     "http://localhost:8888")
         ->type_name("ORIGIN")
         ->allow_extra_args(false);
 }

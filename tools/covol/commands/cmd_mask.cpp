@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
@@ -37,18 +37,20 @@ struct MaskJob {
 }  // namespace
 
 void add_mask(Session& session) {
-    const auto [job, command] = session.add_job<MaskJob>("mask", "Label image of a level set");
+    const auto [job, command] = session.add_job<MaskJob>("mask", "Make a label image of a level set");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")
+    command->add_option("level_set", job->input, "a level set; :NAME selects one of several in a file")
         ->required()
         ->type_name("IN.vdb[:NAME]");
-    command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
+    command->add_option("--like", job->like, "image whose lattice is used for the mask")
+        ->required()
+        ->type_name("IMAGE");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "label image")
         ->required()
         ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.npy|.zarr|.dcm");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
-    command->add_flag("--raw", job->raw, "leave the voxels of .nrrd and .mha unpacked");
+    command->add_flag("--raw", job->raw, "write the voxels of .nrrd and .mha without compression");
     job->image.bind(*command);
 }
 

@@ -1,5 +1,5 @@
-#include "cli/arguments.h"
-#include "cli/report.h"
+#include "cli/options/arguments.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/mesh_cleanup.h"
 #include "covol/mesh_relax.h"
@@ -39,7 +39,7 @@ struct MeshJob {
         record("smoothing", done.smoothing);
     }
 
-    /// Marching cubes as they are, from the tree to the file.
+    /// Unmodified marching cubes, streamed from the tree to the file.
     void stream(const FloatGridPtr& level_set, double h, Session& session) const {
         session.outputs().add(output, [this, level_set, h, &session](const std::string& path) {
             const StreamedMesh made =
@@ -64,7 +64,7 @@ struct MeshJob {
         session.outputs().check("-o", output, OutputKind::Mesh);
         check_plain();
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
-        session.set_world(*level_set);
+        session.provenance().set_world(*level_set);
         const double h = domain_of(*level_set).voxel_size;
         if (flags.plain) return stream(level_set, h, session);
         const Stopwatch watch;
@@ -91,13 +91,14 @@ struct MeshJob {
 }  // namespace
 
 void add_mesh(Session& session) {
-    const auto [job, command] = session.add_job<MeshJob>("mesh", "Triangles of a level set, and their cleanup");
+    const auto [job, command] =
+        session.add_job<MeshJob>("mesh", "Make a triangle mesh of a level set, and clean it up");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")
+    command->add_option("level_set", job->input, "a level set; :NAME selects one of several in a file")
         ->required()
         ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
+    command->add_option("-o,--output", job->output, "closed, manifold mesh with outward normals")
         ->required()
         ->type_name("OUT.ply|.obj|.stl|.off|.glb");
     job->cleanup.options.repair = false;

@@ -1,4 +1,4 @@
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/phantom.h"
@@ -7,7 +7,7 @@
 namespace covol::tool {
 namespace {
 
-/// The phantom's image as floats; its bytes survive that exactly.
+/// The phantom's image as bytes; its values are whole numbers, so the conversion is exact.
 std::vector<std::uint8_t> bytes_of(const Image& image) {
     const Index3 n = image.geometry().size;
     std::vector<std::uint8_t> values;
@@ -32,7 +32,7 @@ struct PhantomJob {
         session.outputs().add(output, [made](const std::string& path) {
             write_image(path, made->image.geometry(), bytes_of(made->image).data());
         });
-        session.outputs().add(points_path, [made, comment = session.comment()](const std::string& path) {
+        session.outputs().add(points_path, [made, comment = session.provenance().comment()](const std::string& path) {
             write_points(path, made->points, comment);
         });
         session.outputs().add(labels_path, [made](const std::string& path) {
@@ -44,7 +44,8 @@ struct PhantomJob {
 }  // namespace
 
 void add_phantom(Session& session) {
-    const auto [job, command] = session.add_job<PhantomJob>("phantom", "Test shapes with known truth");
+    const auto [job, command] =
+        session.add_job<PhantomJob>("phantom", "Make test images of shapes whose true surface is known");
     std::string kinds;
     for (const std::string& kind : list_phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
     in_group(*command, Group::Input);

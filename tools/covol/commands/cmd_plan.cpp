@@ -1,14 +1,14 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "commands/commands.h"
 
 namespace covol::tool {
 namespace {
 
-/// `plan segment ...` and `plan reconstruct ...` are these commands (see Session::main); this is the help, and the
-/// error for the others.
+/// `plan segment ...` and `plan reconstruct ...` are handled as these commands (see Session::main); this class provides
+/// the help, and the error for other commands.
 struct PlanJob {
     std::vector<std::string> words;
     void run(Session&) const {
@@ -19,8 +19,8 @@ struct PlanJob {
 }  // namespace
 
 void add_plan(Session& session) {
-    const auto [job, command] =
-        session.add_job<PlanJob>("plan", "What a segment or reconstruct would read, hold and take, before it starts");
+    const auto [job, command] = session.add_job<PlanJob>(
+        "plan", "Estimate what a segment or reconstruct run would read, and the memory and time that it would need");
     in_group(*command, Group::Input);
     command->add_option("command", job->words, "segment or reconstruct, with all its options")
         ->required()

@@ -5,7 +5,7 @@ namespace covol::tool {
 
 void add_reconstruct(Session& session) {
     const auto [job, command] =
-        session.add_job<SegmentJob>("reconstruct", "Points alone: the surface behind a point cloud");
+        session.add_job<SegmentJob>("reconstruct", "Find the surface behind a point cloud, without an image");
     job->given.options.evolve.rho = 0;
     job->points.bind(*command, "points");
     job->bind(*command, false);

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "cli/option_names.h"
+#include "cli/options/option_names.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/render.h"
@@ -64,7 +64,7 @@ struct RenderJob {
     }
 
 private:
-    /// Frames are written as they are made: many large ones would not fit into memory.
+    /// Frames are written one by one: many large ones would not fit into memory.
     void write_frames(const RenderScene& scene, RenderOptions chosen, Session& session) const {
         chosen.whole_turn = true;
         const double first = chosen.view.azimuth;
@@ -76,13 +76,13 @@ private:
         }
     }
 
-    /// "turn_0001.png" of "turn.png"; the name as it is where there is one picture.
+    /// "turn_0001.png" for "turn.png"; the unchanged name if there is only one picture.
     [[nodiscard]] std::string frame_path(int n) const {
         if (turntable == 0) return output;
         return with_suffix(output, "_" + padded(n + 1, 4));
     }
 
-    /// What the .vdb says of its lengths.
+    /// The unit of length that the .vdb states.
     [[nodiscard]] std::string stated_unit() const {
         for (const VdbGridInfo& grid : list_vdb(input))
             if (const auto found = grid.metadata.find("covol_unit"); found != grid.metadata.end())
@@ -137,10 +137,10 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
                 job.given.options.width = size[0];
                 job.given.options.height = size[1];
             },
-            "of the picture, in pixels")
+            "size of the picture in pixels")
         ->type_name("WIDTHxHEIGHT")
         ->default_str(to_text(job.given.options.width) + "x" + to_text(job.given.options.height));
-    add_words(command, {"figure", {}, {}, "the surfaces beside slices of the image, or either alone"},
+    add_words(command, {"figure", {}, {}, "the surfaces beside slices of the image, or only one of the two"},
               {"composed", "surface", "slices"}, [&job](std::size_t n) { job.figure = FigureKind(n); })
         ->default_str("composed; surface for a turntable");
     command
@@ -152,14 +152,14 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
         ->capture_default_str();
     command
         .add_option("--opacity", job.opacities,
-                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 "
-                    "with --volume]")
+                    "opacity of the surfaces, 0 to 1, for all of them or for one by its name [1; 0.35 around other "
+                    "structures; 0.16 with --volume]")
         ->type_name("[NAME=]SHARE...");
     bind_options(command, job.given, Offered::Always);
-    add_words(command, {"slice_axis", {}, {}, "the image's axis that slices are taken along"}, {"x", "y", "z"},
+    add_words(command, {"slice_axis", {}, {}, "axis of the image along which slices are taken"}, {"x", "y", "z"},
               [&job](std::size_t n) { job.given.options.slice_axis = int(n); })
-        ->default_str("the one across marked slices, else z");
-    add_words(command, {"background", {}, {}, "around the pictures"}, {"black", "white"}, [&job](std::size_t n) {
+        ->default_str("the axis across the marked slices, else z");
+    add_words(command, {"background", {}, {}, "colour of the background"}, {"black", "white"}, [&job](std::size_t n) {
         job.given.options.white_background = n == 1;
     })->default_str("white");
     command
@@ -172,9 +172,12 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
 
 void add_render(Session& session) {
     const auto [job, command] = session.add_job<RenderJob>(
-        "render", "A figure: shaded surfaces with marks and scale, slices of the image with their outlines");
+        "render",
+        "Draw a figure: shaded surfaces with marks and a scale bar, and slices of the image with their outlines");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "level sets; of several in a file all are shown, :NAME picks one")
+    command
+        ->add_option("level_set", job->input,
+                     "level sets; if a file has several, all are shown, or the one that :NAME selects")
         ->required()
         ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
@@ -182,7 +185,7 @@ void add_render(Session& session) {
     in_group(*command, Group::Input);
     command->add_option("--image", job->image_path, "image for slices and the volume view")->type_name("IMAGE");
     job->points.bind(*command, "--points")
-        ->description("marks to show; with names of level sets, ve=FILE exe=FILE")
+        ->description("marks to show; for several level sets with their names, ve=FILE exe=FILE")
         ->type_name("[NAME=]FILE...");
     add_picture_options(*command, *job);
     job->image.bind(*command);

@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "commands/commands.h"
 #include "covol/edge.h"
 #include "covol/error.h"
@@ -16,9 +16,9 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kReachVoxels = 5.0;  // of marks, as where their attraction is unlimited
+constexpr double kReachVoxels = 5.0;  // reach of marks, as for attraction without a limit
 
-/// One level set of the file, and what it is judged by.
+/// One level set of the file, and the marks and evidence that it is compared with.
 struct Shown {
     std::string grid;
     FloatGridPtr surface;
@@ -73,7 +73,7 @@ struct ReportPageJob {
     }
 
 private:
-    /// The run's own report where it is given, else what the .vdb says of it.
+    /// The given report of the run, or the facts that are stored in the .vdb.
     [[nodiscard]] Json read_facts(const Session& session) const {
         Json facts = page_facts(session);
         if (!run_report.empty()) return with_run(std::move(facts));
@@ -86,7 +86,7 @@ private:
         return facts;
     }
 
-    /// What the run's report tells; fields that are not what covol writes are left out.
+    /// Adds the run's report; fields that covol does not write are omitted.
     [[nodiscard]] Json with_run(Json facts) const {
         std::ifstream file = open_regular_file(run_report);
         if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");
@@ -104,7 +104,7 @@ private:
         return facts;
     }
 
-    /// Whether a run's report on a structure is about this level set.
+    /// Whether a run's report on a structure belongs to this level set.
     [[nodiscard]] static bool is_about(const Json& loaded, const std::string& grid) {
         for (const char* name : {"vdb_grid", "name"})
             if (loaded.contains(name) && loaded[name] == grid) return true;
@@ -181,26 +181,31 @@ private:
 
 void add_report(Session& session) {
     const auto [job, command] = session.add_job<ReportPageJob>(
-        "report", "One page for the browser: surfaces in 3D, slices with outlines and marks, figures, options");
+        "report",
+        "Write a page for the browser: surfaces in 3D, slices with outlines and marks, measurements, options");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "level sets; of several in a file all are shown, :NAME picks one")
+    command
+        ->add_option("level_set", job->input,
+                     "level sets; if a file has several, all are shown, or the one that :NAME selects")
         ->required()
         ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "the page; it needs no network")->required()->type_name("OUT.html");
+    command->add_option("-o,--output", job->output, "the page, which needs no network")
+        ->required()
+        ->type_name("OUT.html");
     in_group(*command, Group::Input);
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
     command
         ->add_option("--run-report", job->run_report,
-                     "the report that the run wrote with --json: its time, options and automatic choices")
+                     "report that the run wrote with --json, with its times, options and automatic choices")
         ->type_name("REPORT.json");
     job->points.bind(*command, "--points")
-        ->description("marks on the surface; with names of level sets, ve=FILE exe=FILE")
+        ->description("marks on the surface; for several level sets with their names, ve=FILE exe=FILE")
         ->type_name("[NAME=]FILE...");
     in_group(*command, Group::Output);
     command
         ->add_option("--suggest", job->suggestions,
-                     "name the N slices where new marks would help most, and where in them")
+                     "suggest the N slices in which new marks would help most, and a position in each")
         ->type_name("N")
         ->capture_default_str();
     job->contours.bind(*command, true);

@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <map>
 
-#include "cli/arguments.h"
-#include "cli/child_run.h"
-#include "cli/job_options.h"
-#include "cli/json.h"
-#include "cli/provenance.h"
+#include "cli/options/arguments.h"
+#include "cli/options/job_options.h"
+#include "cli/output/json.h"
+#include "cli/output/provenance.h"
+#include "cli/system/child_run.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
@@ -25,12 +25,12 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-constexpr int kOneBrick = 1'000'000'000;  // voxels, more than any band that a run holds at once
+constexpr int kUnlimitedBrickVoxels = 1'000'000'000;  // voxels; more than any band that a run can hold
 
-/// What a file says of the run that made it. Anybody may have written it.
+/// What a file states about the run that made it. The file may come from an untrusted source.
 struct Provenance {
     std::string version, instruction_set;
-    JobOptions job;                                           ///< what was given
+    JobOptions job;                                           ///< settings and inputs
     std::vector<std::pair<std::string, std::string>> inputs;  ///< name, digest
 };
 
@@ -38,7 +38,7 @@ struct Provenance {
     throw Error(Errc::Unsupported, path + ": " + why);
 }
 
-/// The words of a value, which is a text, a number, a truth value, or a list of these.
+/// The value as a list of arguments; it is a text, a number, a Boolean, or a list of these.
 Words values_of(const std::string& path, const std::string& name, const Json& value) {
     const auto is_one = [](const Json& one) { return one.is_string() || one.is_number() || one.is_boolean(); };
     const bool is_list = value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one);
@@ -50,7 +50,7 @@ Words values_of(const std::string& path, const std::string& name, const Json& va
     return words;
 }
 
-/// A name without a folder, which no option is taken for: it stands behind a folder or `--name=` everywhere.
+/// A name without a folder. It cannot be mistaken for an option: it always follows a folder or `--name=`.
 bool is_file_name(const std::string& name) {
     return !name.empty() && name != "." && name != ".." &&
            name.find_first_of(std::string("/\0", 2)) == std::string::npos;
@@ -91,7 +91,7 @@ Provenance read_provenance(const std::string& path) {
     return all;
 }
 
-/// Where the inputs of a run are now.
+/// The current locations of a run's inputs.
 class Inputs {
 public:
     Inputs(std::string source, const Provenance& run, std::vector<std::string> folders)
@@ -99,7 +99,7 @@ public:
         for (const auto& [name, digest] : run.inputs) found_.emplace_back(name, find(name, digest));
     }
 
-    /// The value of an option with the path of the file that it names. @throws Error where that is none of the inputs
+    /// The value of an option with the current path of its file. @throws Error if it is none of the inputs
     [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
         if (value == "-") refuse(source_, "an input of that run came through a pipe");
         const std::size_t begin = path_within(value).first;
@@ -123,12 +123,12 @@ public:
     }
 
 private:
-    /// A grid's name or a dataset's place, or the slash of a folder.
+    /// The name of a grid, the path of a dataset, or the slash of a folder.
     static bool is_within_file(const std::string& rest) {
         return rest.empty() || rest == "/" || (rest.front() == ':' && rest.find("..") == std::string::npos);
     }
 
-    /// A position, or a word or shape to start from.
+    /// A position, or the name or shape of a start.
     static bool names_no_file(const std::string& value) {
         try {
             return parse_start("", value).path.empty();
@@ -142,7 +142,7 @@ private:
         }
     }
 
-    /// NAME=marks_{frame}.csv where inputs with such names lie in one folder; else nothing.
+    /// NAME=marks_{frame}.csv if inputs with such names are in one folder; otherwise empty.
     [[nodiscard]] std::string placed_frames(const std::string& value, std::size_t begin) const {
         const auto parts = around_frame(value.substr(begin));
         std::string folder;
@@ -160,7 +160,7 @@ private:
     [[nodiscard]] std::string find(const std::string& name, const std::string& digest) const {
         std::string seen;
         for (const std::string& folder : folders_) {
-            // Behind a slash no part of a folder's name is taken for a structure's (NAME=FILE).
+            // After a slash, no part of a folder's name is read as the name of a structure (NAME=FILE).
             const fs::path path = fs::absolute(folder) / name;
             std::error_code status;
             if (!fs::is_regular_file(path, status) && !fs::is_directory(path, status)) continue;
@@ -180,8 +180,8 @@ private:
     std::vector<std::pair<std::string, std::string>> found_;
 };
 
-/// The job with its inputs where they are now, and those of its outputs that are .vdb in that folder; the others are
-/// left out. @throws Error for what no file may ask for
+/// The job with the current locations of its inputs. Its .vdb outputs are placed in `folder`; the others are omitted.
+/// @throws Error for options that a file may not set
 JobOptions job_here(const std::string& path, const JobOptions& given, const CLI::App& command, const Inputs& inputs,
                     const fs::path& folder) {
     JobOptions job{given.command, {}};
@@ -193,7 +193,7 @@ JobOptions job_here(const std::string& path, const JobOptions& given, const CLI:
             if (role == OptionRole::Input) placed.push_back(inputs.placed(name, value));
             if (role == OptionRole::Setting) placed.push_back(value);
             if (role != OptionRole::Output || fs::path(value).extension() != ".vdb") continue;
-            // Only a file's name is written down; that of a stranger's file may be a path.
+            // Provenance stores file names only; a file from an untrusted source may contain a path here.
             const std::string file = fs::path(value).filename().string();
             if (!is_file_name(file)) refuse(path, "'" + name + "': expected a file's name, got " + value);
             placed.push_back((folder / file).string());
@@ -215,7 +215,7 @@ fs::path temporary_folder() {
                               "; name another one, or keep the result with -o");
 }
 
-/// Where two grids of one name differ.
+/// Differences between two grids of the same name.
 struct Difference {
     bool same_layout = true;  ///< transform, background, tree of nodes and active voxels
     std::uint64_t voxels = 0;
@@ -266,8 +266,8 @@ struct RerunJob {
         session.outputs().check("-o", kept, OutputKind::Vdb);
         const auto scratch =
             std::make_shared<KeptFolder>(kept.empty() ? temporary_folder() : fs::path(kept).parent_path());
-        const Words words = words_of(job_here(path, made.job, *command, inputs, scratch->path()), *command, path,
-                                     how_it_runs(made.job, *command, session));
+        const Words words = command_line_of(job_here(path, made.job, *command, inputs, scratch->path()), *command, path,
+                                            run_options(made.job, *command, session));
         std::string shown = "covol";
         for (const std::string& word : words) shown += " " + shell_quoted(word);
         session.note("running " + shown);
@@ -282,21 +282,21 @@ struct RerunJob {
     }
 
 private:
-    static Words how_it_runs(const JobOptions& job, const CLI::App& command, const Session& session) {
+    static Words run_options(const JobOptions& job, const CLI::App& command, const Session& session) {
         Words words{"--quiet"};
         if (session.run().threads > 0) words.push_back("--threads=" + std::to_string(session.run().threads));
         if (const auto limit = session.memory_limit()) {
             words.push_back("--memory-limit=" + std::to_string(*limit));
-            // a run that went on in bricks would end with other bits
+            // a run that switched to bricks would not give bitwise identical results
             const bool given = std::any_of(job.values.begin(), job.values.end(),
                                            [](const auto& option) { return option.first == "brick-voxels"; });
             if (!given && command.get_option_no_throw("--brick-voxels") != nullptr)
-                words.push_back("--brick-voxels=" + std::to_string(kOneBrick));
+                words.push_back("--brick-voxels=" + std::to_string(kUnlimitedBrickVoxels));
         }
         return words;
     }
 
-    /// The file of that name; of a run with one .vdb that was renamed since, that one.
+    /// The file of that name; if the run has one .vdb output that has been renamed since, that one.
     [[nodiscard]] std::string result_in(const KeptFolder& scratch) const {
         std::vector<fs::path> made;
         for (const fs::directory_entry& entry : fs::directory_iterator(scratch.path()))
@@ -337,17 +337,18 @@ private:
 
 void add_rerun(Session& session) {
     const auto [job, command] = session.add_job<RerunJob>(
-        "rerun", "Repeat the run that made a .vdb, from what the file says of it, and compare");
+        "rerun", "Repeat the run that made a .vdb, with the settings that the file contains, and compare the results");
     in_group(*command, Group::Input);
-    command->add_option("file", job->path, "a .vdb that covol wrote; exit code 3 where the bits differ now")
+    command
+        ->add_option("file", job->path, "a .vdb that covol wrote; exit code 3 if the new result is not bit-identical")
         ->required()
         ->type_name("FILE.vdb");
     command
         ->add_option("--inputs", job->folders,
-                     "folders with the files that the run read [the folder of FILE.vdb, and where the command runs]")
+                     "folders with the files that the run read [the folder of FILE.vdb, and the current folder]")
         ->type_name("FOLDER...");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->kept, "keep what the run makes now")->type_name("OUT.vdb");
+    command->add_option("-o,--output", job->kept, "keep the result of the new run in this file")->type_name("OUT.vdb");
 }
 
 }  // namespace covol::tool

@@ -5,7 +5,7 @@ namespace covol::tool {
 
 void add_segment(Session& session) {
     const auto [job, command] =
-        session.add_job<SegmentJob>("segment", "Image and points together: the surface of a structure");
+        session.add_job<SegmentJob>("segment", "Find the surface of a structure in an image, with the help of marks");
     in_group(*command, Group::Input);
     command
         ->add_option(
@@ -15,10 +15,11 @@ void add_segment(Session& session) {
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
         ->description(
-            "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, ve=FILE "
-            "exe=FILE, several structures")
+            "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, point clouds; for several "
+            "structures with names, ve=FILE exe=FILE")
         ->type_name("[NAME=]FILE...");
-    command->add_option("--study", job->study, "structures and marks of covol mark")->type_name("STUDY");
+    command->add_option("--study", job->study, "folder with the structures and marks of covol mark")
+        ->type_name("STUDY");
     job->bind(*command, true);
     session.help().show_first(
         *command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess", "--mask", "--mesh",

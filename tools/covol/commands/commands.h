@@ -1,7 +1,7 @@
 #pragma once
 #include "cli/session.h"
 
-// One function for each subcommand: declares its flags and what it runs.
+// One function for each subcommand: declares its options and its body.
 namespace covol::tool {
 
 void add_segment(Session& session);

@@ -4,12 +4,12 @@
 
 #include "cli/session.h"
 
-// The page of `covol mark`, for another command.
+// The page of `covol mark`, for use by another command.
 namespace covol::tool {
 
-/// What `covol mark` is called with.
+/// Arguments of `covol mark`.
 struct MarkCall {
-    std::string image;                ///< the study lies beside it
+    std::string image;                ///< the study is beside it
     std::vector<std::string> points;  ///< [NAME=]FILE
     bool without_browser = false;
     int port = 0;

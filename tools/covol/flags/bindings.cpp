@@ -90,7 +90,7 @@ ImageGeometry ImageFlags::read_geometry(const std::string& path, const RunContex
 }
 
 WorldBox sampled_box(const WorldBox& box, double h) {
-    constexpr double kReach = 9;  // a leaf's 7 voxels, one for rounding the box up to voxels, one to spare
+    constexpr double kReach = 9;  // 7 voxels of a leaf, one for rounding the box to voxels, one as reserve
     WorldBox grown = box;
     for (int a = 0; a < 3; ++a) {
         grown.min[a] -= kReach * h;
@@ -112,7 +112,7 @@ CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
 
 namespace {
 
-/// All of it; it is there once. Whoever writes it may take long.
+/// Reads all of standard input, once. The writing program may be slow.
 const std::string& standard_input(const RunContext& run) {
     static std::string text;
     static bool done = false;
@@ -120,7 +120,7 @@ const std::string& standard_input(const RunContext& run) {
     while (!done) {
         pollfd ready{STDIN_FILENO, POLLIN, 0};
         constexpr int kPause = 50;                          // milliseconds
-        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal came
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal arrived
         run.check();
         if (waits) continue;
         const ssize_t got = ::read(STDIN_FILENO, piece.data(), piece.size());
@@ -170,7 +170,7 @@ void MeshFlags::bind(CLI::App& command) {
     command
         .add_option_function<std::string>(
             "--up", [this](const std::string& text) { options.y_up = text == "y"; },
-            "the mesh's axis that points up [z; in .glb y, which glTF prescribes]")
+            "axis of the mesh that points up [z; in .glb y, as glTF requires]")
         ->check(CLI::IsMember({"y", "z"}).description(""))
         ->type_name("y|z");
     tool::bind_options(command, *this, Offered::SingleStep);
@@ -179,8 +179,8 @@ void MeshFlags::bind(CLI::App& command) {
 void MeshFlags::bind_plain(CLI::App& command) {
     in_group(command, Group::MeshFiles);
     command.add_flag("--plain", plain,
-                     "triangles as marching cubes leave them, neither relaxed nor held in memory: for surfaces of tens "
-                     "of millions of triangles; .ply, .stl, .obj");
+                     "triangles of marching cubes, neither relaxed nor held in memory: for surfaces of tens of "
+                     "millions of triangles; .ply, .stl, .obj");
 }
 
 void MeshFlags::check_plain(const std::string& path) const {
@@ -196,7 +196,7 @@ void MeshFlags::check_used(bool writes) const {
 
 WriteMeshOptions MeshFlags::write_options(const Session& session) const {
     WriteMeshOptions write = options;
-    write.comments = session.comments();
+    write.comments = session.provenance().comments();
     write.warn = [run = session.run()](const std::string& line) { run.warn(line); };
     return write;
 }

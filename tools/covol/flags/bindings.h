@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
-#include "cli/help.h"
-#include "cli/option_names.h"
+#include "cli/options/arguments.h"
+#include "cli/options/help.h"
+#include "cli/options/option_names.h"
 #include "cli/session.h"
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
@@ -18,10 +18,11 @@
 #include "covol/vdb_io.h"
 #include "flags/given.h"
 
-// Options of the library's structs, by their tables, and groups of flags that several subcommands share.
+// Command-line options for the fields of the library's structs, from their tables, and groups of flags that several
+// subcommands share.
 namespace covol::tool {
 
-/// A number as help and messages show it.
+/// A number as shown in help and messages.
 template <typename Number>
 [[nodiscard]] std::string to_text(Number value) {
     std::ostringstream text;
@@ -29,10 +30,10 @@ template <typename Number>
     return text.str();
 }
 
-/// Whether a job has the option; SingleStep has all of its struct.
+/// Whether a job offers the option; SingleStep offers all options of its struct.
 [[nodiscard]] bool is_offered(const OptionInfo& option, Offered job);
 
-// An option of each kind. What is out of the option's range is an Error where it is read.
+// Adds an option of each kind. Values out of range throw an Error when they are parsed.
 CLI::Option* add_length(CLI::App& command, const OptionInfo& option, const std::function<void(const Length&)>& take);
 CLI::Option* add_vec3(CLI::App& command, const OptionInfo& option, const std::function<void(const Vec3&)>& take);
 CLI::Option* add_box(CLI::App& command, const OptionInfo& option, const std::function<void(const WorldBox&)>& take);
@@ -54,7 +55,7 @@ CLI::Option* add_number(CLI::App& command, const OptionInfo& option, const std::
                                                       : "NUMBER");
 }
 
-/// One for a field, of the field's type; null for a type that has none. A length goes into `given` until h is known.
+/// Adds an option of the field's type; null for types without one. Lengths are stored in `given` until h is known.
 template <typename Options, typename Value>
 CLI::Option* add_option(CLI::App& command, const OptionInfo& option, Value& target, Given<Options>& given) {
     using T = PlainOf<Value>;
@@ -85,8 +86,8 @@ CLI::Option* add_option(CLI::App& command, const OptionInfo& option, Value& targ
     }
 }
 
-/// An option for each row of the table that `job` has, in a group if one is named, but for those that are bound by
-/// hand. `given` has to stay where it is until the command line is read.
+/// Adds an option for each row of the table that `job` offers, of one group if it is given, except for those that are
+/// bound separately. `given` must not be moved until the command line has been parsed.
 template <typename Options>
 void bind_options(CLI::App& command, Given<Options>& given, Offered job,
                   std::initializer_list<std::string_view> by_hand = {}, Group only = Group::None) {
@@ -97,7 +98,7 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
         in_group(command, option.place.group);
         CLI::Option* made = add_option(command, option, value, given);
         if (made == nullptr) return;
-        // Help shows what stands in brackets as the default; in reports automatic choices are no values of options.
+        // The help shows the text in brackets as the default; automatic choices are not values, so reports omit them.
         const bool is_automatic = *option.automatic != 0;
         made->description(with_flags(option.text) +
                           (is_automatic ? " [" + with_flags(option.automatic) + "]" : std::string()));
@@ -106,26 +107,27 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
     });
 }
 
-/// The image's own facts that the user corrects.
+/// Properties of the image that the user corrects.
 struct ImageFlags : Given<ReadImageOptions> {
-    /// @param by_hand  "roi" crops the image, "frame" takes one time point: commands may have their own
+    /// @param by_hand  options that are not bound: "roi" crops the image, "frame" selects one time point; commands may
+    /// have their own
     void bind(CLI::App& command, std::initializer_list<std::string_view> by_hand = {}) {
         bind_options(command, *this, Offered::SingleStep, by_hand);
     }
-    /// The image, or the part of it that --roi names.
+    /// The image, or the part of it that --roi selects.
     [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
     /// The lattice of read()'s image.
     [[nodiscard]] ImageGeometry read_geometry(const std::string& path, const RunContext& run) const;
 };
 
-/// `box` and what voxels of edge h around it may sample: leaves reach beyond a domain.
+/// `box`, extended by what voxels of edge h may sample: leaves extend beyond a domain.
 [[nodiscard]] WorldBox sampled_box(const WorldBox& box, double h);
 
 struct PointFlags : Given<ReadPointsOptions> {
     std::vector<std::string> paths;
-    /// `flag` is "--points", or a positional's name.
+    /// @param flag  "--points", or the name of a positional
     CLI::Option* bind(CLI::App& command, const std::string& flag);
-    /// How files are understood, without the files.
+    /// Options for reading files, without the files.
     void bind_options(CLI::App& command) { tool::bind_options(command, *this, Offered::SingleStep); }
 };
 
@@ -135,18 +137,18 @@ struct PointFlags : Given<ReadPointsOptions> {
 [[nodiscard]] std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional<ImageGeometry>& geometry,
                                                   const RunContext& run);
 
-/// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
-/// @param tagged  of choose_voxel_size()
+/// The voxel size h; --voxel-size may be relative to the automatic one ("2vx"). Reports the value in `session`.
+/// @param tagged  as for choose_voxel_size()
 [[nodiscard]] double resolve_voxel_size(const Length& requested, const Image* image, const std::vector<Vec3>& points,
                                         bool tagged, Session& session);
 
 struct MeshFlags : Given<WriteMeshOptions> {
-    bool plain = false;  ///< stream_mesh()
+    bool plain = false;  ///< uses stream_mesh()
     void bind(CLI::App& command);
     void bind_plain(CLI::App& command);
-    /// @param path  of the mesh, or empty. @throws UsageError where its format can't be streamed.
+    /// @param path  of the mesh, or empty. @throws UsageError if its format cannot be streamed.
     void check_plain(const std::string& path) const;
-    /// @throws UsageError where an option of meshes is given, and `writes` none.
+    /// @throws UsageError if an option of meshes is given, but no mesh is written.
     void check_used(bool writes) const;
     [[nodiscard]] WriteMeshOptions write_options(const Session& session) const;
 };

@@ -7,11 +7,11 @@ namespace covol::tool {
 namespace {
 
 // Measured: docs/benchmarks.md, Bricks.
-constexpr double kBandBytes = 200;    ///< at the peak, for each voxel of a band that is solved on
-constexpr double kJoinBytes = 30;     ///< likewise, when bricks of it are joined
-constexpr double kMeshBytes = 80;     ///< likewise with the whole mesh
+constexpr double kBandBytes = 200;    ///< at the peak, for each voxel of a band that is solved
+constexpr double kJoinBytes = 30;     ///< likewise, when its bricks are joined
+constexpr double kMeshBytes = 80;     ///< likewise, including the whole mesh
 constexpr double kBaseBytes = 1.5e8;  ///< the program itself
-constexpr double kLayers = 1.3;       ///< with its neighbours' layers a brick has so much more of the band
+constexpr double kLayerFactor = 1.3;  ///< factor for the layers of neighbouring bricks
 constexpr double kMinVoxels = 2e5;
 
 }  // namespace
@@ -25,8 +25,8 @@ void BrickFlags::bind(CLI::App& command) {
     in_group(command, Group::Numerics);
     command
         .add_option("--brick-voxels", max_voxels,
-                    "band voxels of a brick, of covol brick or beyond --memory-limit [8000000, or what --memory-limit "
-                    "allows]")
+                    "maximum number of band voxels in a brick, for covol brick and for runs that exceed --memory-limit "
+                    "[8000000, or what --memory-limit allows]")
         ->check(CLI::Range(std::int64_t(1000), std::int64_t(1) << 40).description(""))
         ->type_name("N");
     bind_options(command, *this, Offered::Always);
@@ -36,7 +36,7 @@ BrickOptions BrickFlags::resolve(std::optional<std::uint64_t> memory) const {
     BrickOptions resolved = options;
     if (memory)
         resolved.max_voxels =
-            std::llround(std::max(kMinVoxels, (double(*memory) - kBaseBytes) / (kBandBytes * kLayers)));
+            std::llround(std::max(kMinVoxels, (double(*memory) - kBaseBytes) / (kBandBytes * kLayerFactor)));
     if (max_voxels) resolved.max_voxels = *max_voxels;
     return resolved;
 }

@@ -18,7 +18,8 @@ void CheckpointFlags::bind(CLI::App& command) {
         ->capture_default_str();
     command
         .add_option("--resume", resumed,
-                    "go on from the states in this folder, where it has any, to the same bits; it keeps new ones, too")
+                    "continue from the states in this folder, if there are any, with a bit-identical result; new "
+                    "states are kept there, too")
         ->type_name("OUT_FOLDER");
 }
 
@@ -28,7 +29,7 @@ void CheckpointFlags::begin(Session& session) const {
         throw UsageError("--checkpoint and --resume: expected one folder, got " + folder + " and " + resumed);
     const bool resumes = !resumed.empty();
     const std::string& path = resumes ? resumed : folder;
-    const auto checkpoints = std::make_shared<Checkpoints>(path, every, session.job_text(), resumes);
+    const auto checkpoints = std::make_shared<Checkpoints>(path, every, session.provenance().job_text(), resumes);
     if (resumes && !checkpoints->had_states()) session.note("--resume: " + path + " has no state yet: from the start");
     session.keep_states(checkpoints);
 }

@@ -12,7 +12,7 @@ struct CheckpointFlags {
 
     void bind(CLI::App& command);
     [[nodiscard]] bool given() const { return !folder.empty() || !resumed.empty(); }
-    /// From here on the session's runs keep their states. @throws UsageError; what Checkpoints() throws.
+    /// From here on the session's runs save their states. @throws UsageError; what Checkpoints() throws.
     void begin(Session& session) const;
 };
 

@@ -1,6 +1,6 @@
 #include "flags/cloud_flags.h"
 
-#include "cli/option_names.h"
+#include "cli/options/option_names.h"
 #include "covol/error.h"
 #include "flags/bindings.h"
 

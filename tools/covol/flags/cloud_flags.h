@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "cli/session.h"
 #include "covol/cloud_cleanup.h"
 #include "flags/given.h"
@@ -10,16 +10,16 @@
 
 namespace covol::tool {
 
-/// What is done to a cloud before it is used.
+/// Cleaning of a cloud before it is used.
 struct CloudFlags : Given<CloudCleanupOptions> {
-    std::string outlier_factor;  ///< a number; empty: outliers stay
+    std::string outlier_factor;  ///< a number; empty: outliers are kept
     Given<InputOptions> inputs;
 
-    /// @param with_inputs  --most-points, too
+    /// @param with_inputs  includes --most-points
     void bind(CLI::App& command, bool with_inputs);
-    /// @throws Error InvalidOptions for what is wrong whatever h is.
+    /// @throws Error InvalidOptions for values that are invalid for every h.
     void check() const;
-    /// @throws UsageError where an option is given, and there is no cloud.
+    /// @throws UsageError if an option is given, but there is no cloud.
     void check_used(bool has_cloud) const;
     [[nodiscard]] CloudCleanupOptions cleanup(double h) const;
 };

@@ -11,7 +11,7 @@ namespace covol::tool {
 struct ContourFlags : Given<ContourOptions> {
     std::vector<std::string> paths;
 
-    /// @param names  files may be NAME=FILE: of one structure among several
+    /// @param names  files may be NAME=FILE, for one of several structures
     void bind(CLI::App& command, bool names);
 };
 

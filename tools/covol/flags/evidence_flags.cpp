@@ -3,8 +3,8 @@
 #include <iomanip>
 #include <sstream>
 
-#include "cli/report.h"
-#include "cli/table.h"
+#include "cli/output/report.h"
+#include "cli/output/table.h"
 #include "covol/error.h"
 #include "covol/segment_structures.h"
 
@@ -22,17 +22,18 @@ std::string text_of(const Vec3& v, int decimals) {
 void EvidenceFlags::bind(CLI::App& command) {
     in_group(command, Group::Output);
     command
-        .add_option(
-            "--evidence", path,
-            "table of the slices: distances between surface and marks, surface that rests on neither marks nor edges")
+        .add_option("--evidence", path,
+                    "table of the slices: distances between surface and marks, and the area that neither marks nor "
+                    "edges support")
         ->type_name("OUT.csv");
     command
-        .add_option("--suggest", suggestions, "name the N slices where new marks would help most, and where in them")
+        .add_option("--suggest", suggestions,
+                    "suggest the N slices in which new marks would help most, and a position in each")
         ->type_name("N");
     command
         .add_option("--suggestions", marks_path,
-                    "the suggested places (3, or as many as --suggest says), for the program that you mark in: napari, "
-                    "3D Slicer, Fiji")
+                    "the suggested positions (3, or the number given by --suggest), for the program in which you set "
+                    "marks: napari, 3D Slicer, Fiji")
         ->type_name("OUT.csv|.mrk.json|.roi");
 }
 

@@ -12,10 +12,10 @@
 
 namespace covol::tool {
 
-/// Slices that a report page, or a file of suggestions, names where the command line does not say how many.
+/// Number of suggested slices in a report page or a file of suggestions if the command line does not give it.
 inline constexpr int kPageSuggestions = 3;
 
-/// What the surface rests on: --evidence and --suggest; a report page has it, too.
+/// Support of the surface by marks and image: --evidence and --suggest; also shown by a report page.
 struct EvidenceFlags {
     std::string path;        ///< a table of the slices, .csv
     std::string marks_path;  ///< the suggestions, for write_program_marks()
@@ -23,12 +23,12 @@ struct EvidenceFlags {
     bool for_page = false;
 
     void bind(CLI::App& command);
-    /// @param tagged  a path, as that of this run
+    /// @param tagged  maps a path to the name for this run
     void check(Outputs& outputs, const std::function<std::string(const std::string&)>& tagged) const;
     [[nodiscard]] bool wanted() const {
         return !path.empty() || !marks_path.empty() || suggestions.value_or(0) > 0 || for_page;
     }
-    /// assess_evidence(), of as many suggestions as were asked for.
+    /// assess_evidence(), with the requested number of suggestions.
     [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                                  const RunContext& run) const;
 };
@@ -39,7 +39,7 @@ struct EvidenceFlags {
 /// distance_to_marks and edge_strength, those that are known; nothing without evidence.
 [[nodiscard]] std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& evidence);
 
-/// Prints what share is unsupported, and the suggestions; `who` begins the lines.
+/// Prints the unsupported fraction, and the suggestions; each line begins with `who`.
 void print_evidence(Session& session, const Evidence& evidence, const std::string& who = {});
 
 /// One surface in the table of slices.
@@ -48,7 +48,7 @@ struct EvidenceOf {
     const Evidence* evidence;
 };
 [[nodiscard]] std::string evidence_csv(const std::vector<EvidenceOf>& surfaces);
-/// All suggestions, named by structure and slice.
+/// All suggestions, named after structure and slice.
 [[nodiscard]] std::vector<NamedMark> suggested_marks(const std::vector<EvidenceOf>& surfaces);
 
 }  // namespace covol::tool

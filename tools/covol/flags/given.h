@@ -9,7 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "covol/options_table.h"
 
 namespace covol::tool {
@@ -26,11 +26,11 @@ struct Plain<std::optional<T>> {
 template <typename T>
 using PlainOf = typename Plain<T>::type;
 
-/// Options as people give them: lengths in voxels wait for the voxel size.
+/// Options as given by the user: lengths in voxels are resolved once the voxel size is known.
 template <typename Options>
 struct Given {
-    Options options;                                     ///< all but the lengths that were given
-    std::map<std::string, Length, std::less<>> lengths;  ///< those; of a volume the edge of a cube
+    Options options;                                     ///< all but the given lengths
+    std::map<std::string, Length, std::less<>> lengths;  ///< the given lengths; for a volume, the edge of a cube
     std::set<std::string, std::less<>> names;            ///< of all options that were given
 
     [[nodiscard]] bool has(std::string_view name) const { return names.contains(name); }
@@ -44,7 +44,8 @@ struct Given {
             if constexpr (std::is_same_v<PlainOf<std::remove_cvref_t<decltype(value)>>, double>)
                 if (const Length found = length(option.name); found.given) {
                     const double a = found.resolve(h, 0);
-                    // Of a cube that no number holds none is large enough, which its user says.
+                    // A volume that exceeds the range of double is limited to its maximum; the option's validation
+                    // rejects it.
                     value =
                         option.range.unit == Unit::Volume ? std::min(a * a * a, std::numeric_limits<double>::max()) : a;
                 }

@@ -6,8 +6,8 @@ void GuessFlags::bind(CLI::App& command) {
     in_group(command, Group::Marks);
     command
         .add_option("--guess", paths,
-                    "another tool's result, a mask, mesh or level set, that marks and seeds correct near them; what is "
-                    "farther away stays as it is")
+                    "result of another tool (a mask, mesh or level set) that marks and seeds correct in their "
+                    "neighbourhood; farther away it stays unchanged")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
     bind_options(command, inputs, Offered::WithImage);

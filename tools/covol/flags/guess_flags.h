@@ -8,9 +8,9 @@
 
 namespace covol::tool {
 
-/// Another tool's result that marks correct: --guess and what belongs to it.
+/// Another tool's result to be corrected by marks: --guess and related options.
 struct GuessFlags {
-    std::vector<std::string> paths;  ///< with NAME= of one structure
+    std::vector<std::string> paths;  ///< with NAME= for one structure
     Given<InputOptions> inputs;
 
     void bind(CLI::App& command);

@@ -8,7 +8,7 @@
 
 namespace covol::tool {
 
-/// --painted and what belongs to it.
+/// --painted and related options.
 struct PaintedFlags : Given<PaintedOptions> {
     std::vector<std::string> paths;
 
@@ -17,7 +17,7 @@ struct PaintedFlags : Given<PaintedOptions> {
     [[nodiscard]] std::vector<std::shared_ptr<const PaintedImage>> read(const RunContext& run) const;
 };
 
-/// What the report tells of one label.
+/// The report's entry for one label.
 [[nodiscard]] Json to_json(const PaintedLabel& label);
 
 }  // namespace covol::tool

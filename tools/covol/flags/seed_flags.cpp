@@ -6,7 +6,7 @@
 namespace covol::tool {
 namespace {
 
-/// "1.5,-2,3e1" and the like, which is no file.
+/// Texts such as "1.5,-2,3e1" that are not the name of a file.
 bool is_position(const std::string& text) {
     std::error_code status;
     return text.find_first_not_of("0123456789+-.eE, ") == std::string::npos &&
@@ -22,7 +22,7 @@ void SeedFlags::bind(CLI::App& command, bool names) {
     command.add_option("--inside", inside, "seeds inside the structure" + more)
         ->type_name(type)
         ->allow_extra_args(false);
-    command.add_option("--outside", outside, "seeds outside of it, in cavities too" + more)
+    command.add_option("--outside", outside, "seeds outside the structure, also in cavities" + more)
         ->type_name(type)
         ->allow_extra_args(false);
 }

@@ -6,14 +6,14 @@
 
 namespace covol::tool {
 
-/// Positions whose side is known: --inside and --outside.
+/// Positions that are known to be inside or outside: --inside and --outside.
 struct SeedFlags {
-    std::vector<std::string> inside, outside;  ///< files, or x,y,z in the world; with NAME= of one structure
+    std::vector<std::string> inside, outside;  ///< files, or x,y,z in the world; with NAME= for one structure
 
     void bind(CLI::App& command, bool names);
 };
 
-/// Adds what --inside or --outside names: a position, or a file.
+/// Adds the argument of --inside or --outside: a position, or a file.
 void add_seed(const std::string& flag, const std::string& text, std::vector<std::string>& files,
               std::vector<PointCloud>& clouds);
 

@@ -7,14 +7,14 @@
 
 namespace covol::tool {
 
-/// Of --density.
+/// Help text of --density.
 inline constexpr const char* kDensityHelp =
-    "the solid as a fog volume, 0 to 1; with the name that -o has, both grids are in that file";
+    "the solid as a fog volume, 0 to 1; with the same name as -o, that file contains both grids";
 
 /// How .vdb files are written.
 struct VdbFlags : Given<WriteVdbOptions> {
     void bind(CLI::App& command) { bind_options(command, *this, Offered::Always); }
-    /// @throws UsageError where an option of .vdb files is given, and `writes` none.
+    /// @throws UsageError if an option of .vdb files is given, but none is written.
     void check_used(bool writes) const {
         if (!writes && !names.empty())
             throw UsageError(flag_of(*names.begin()) + ": it is about .vdb files, and this run writes none");

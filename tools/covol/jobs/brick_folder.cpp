@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMaxFactsBytes = 1 << 20;  // of what a sweep says of a brick
+constexpr std::uintmax_t kMaxFactsBytes = 1 << 20;  // for the facts that a sweep stores about a brick
 constexpr std::int64_t kMaxVoxels = std::int64_t(1) << 40;
 
-/// A whole number of JSON, in a range. @throws std::out_of_range, as Json does for what is missing
+/// A whole number of JSON in a given range. @throws std::out_of_range, as Json does for missing fields
 template <typename Number = int>
 Number whole(const Json& json, const char* name, std::int64_t low, std::int64_t high) {
     const Json& value = json.at(name);
@@ -40,7 +40,7 @@ double real(const Json& json, const char* name) {
     return value.get<double>();
 }
 
-/// One for each axis.
+/// An array of three numbers, one for each axis.
 const Json& three(const Json& json, const char* name) {
     const Json& value = json.at(name);
     if (!value.is_array() || value.size() != 3)
@@ -49,10 +49,10 @@ const Json& three(const Json& json, const char* name) {
 }
 
 Index3 index_of(const Json& json, const char* name) {
-    constexpr std::int64_t kFarthest = 1 << 24;  // lattices reach half as far
+    constexpr std::int64_t kMaxIndex = 1 << 24;  // lattices extend half as far
     Index3 index{};
     for (int a = 0; a < 3; ++a)
-        index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kFarthest, kFarthest);
+        index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kMaxIndex, kMaxIndex);
     return index;
 }
 
@@ -107,7 +107,7 @@ Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
     return brick;
 }
 
-/// A lattice that grids can have, and voxels that lie on it. @throws Error
+/// A valid lattice of grids, and voxels on it. @throws Error
 Domain domain_of_plan(const Json& json) {
     const Domain domain{real(json, "voxel_size"), place_of(json, "origin"), index_of(json, "min"),
                         index_of(json, "max")};
@@ -120,7 +120,7 @@ Domain domain_of_plan(const Json& json) {
     return domain;
 }
 
-/// Of a folder, such as a Zarr store, 0.
+/// 0 for a folder, such as a Zarr store.
 std::uintmax_t bytes_of(const std::string& path, std::error_code& status) {
     return fs::is_directory(path, status) ? 0 : fs::file_size(path, status);
 }
@@ -132,7 +132,7 @@ Json input_of(const std::string& path) {
     return {{"path", path}, {"bytes", bytes}};
 }
 
-/// What a sweep says of a brick.
+/// The facts that a sweep stores about a brick.
 struct BrickFacts {
     bool same = false;
     int steps = 0;
@@ -154,7 +154,7 @@ BrickFacts read_facts(const std::string& path) {
     }
 }
 
-/// A plan that came with links in it must not lead elsewhere.
+/// Symbolic links in a plan from an untrusted source must not lead to other folders.
 void make_folder_of(const std::string& file) {
     const fs::path folder = fs::path(file).parent_path();
     std::error_code status;

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "cli/bytes_text.h"
+#include "cli/output/bytes_text.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
 #include "covol/mesh_stream.h"
@@ -17,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kSmallJob = 64;  // voxels across: never worth a look
+constexpr double kSmallJob = 64;  // voxels across: smaller jobs are never split
 
 std::unique_ptr<BrickJob> make_job(const std::optional<Image>& image, const StructureInput& structure,
                                    const RunContext& run) {
@@ -31,7 +31,7 @@ public:
     BrickRunner(const BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, const RunContext& run)
         : job_(job), plan_(plan), folder_(folder), run_(run) {}
 
-    /// @return how many moved
+    /// @return the number of bricks whose state changed
     [[nodiscard]] std::size_t run_sweep(int sweep, const std::vector<std::size_t>& bricks) const {
         std::size_t moved = 0;
         const auto total = double(std::max<std::int64_t>(1, plan_.active_voxels()));
@@ -61,7 +61,7 @@ public:
     }
 
 private:
-    /// @return whether it was solved; false where it is as after the sweep before
+    /// @return whether it was solved; false if the state is the same as after the previous sweep
     [[nodiscard]] bool solve(int sweep, std::size_t brick) const {
         if (folder_.is_done(sweep, brick)) return folder_.moved(sweep, brick);
         const BrickStates states = folder_.states(sweep - 1);
@@ -80,7 +80,7 @@ private:
             }
         }
         const SolvedBrick solved = job_.solve(plan_, brick, states);
-        run_.check();  // what was cancelled is no state
+        run_.check();  // a cancelled solve has no valid state
         facts.update({{"steps", solved.steps},
                       {"stop_reason", to_string(solved.stop_reason)},
                       {"active_voxels", solved.active_voxels},
@@ -102,7 +102,7 @@ private:
     const RunContext& run_;
 };
 
-/// Only stages of the whole, and no remark of a brick's own.
+/// Without progress and remarks of single bricks; warnings are passed on.
 RunContext quiet(const RunContext& run) {
     RunContext inner = run;
     inner.progress = {};
@@ -112,7 +112,7 @@ RunContext quiet(const RunContext& run) {
     return inner;
 }
 
-/// Seams of less than that are averaged out.
+/// Larger gaps between neighbouring bricks cause a warning; smaller ones are averaged.
 constexpr double kWarnOfGap = 0.5;  // voxels
 
 void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
@@ -136,7 +136,7 @@ std::string about_voxels(std::int64_t count) {
     return "about " + (count < kThousand ? std::to_string(count) : rounded(kThousand) + "000") + " voxels";
 }
 
-/// Whether the mesh has to be streamed. @throws Error where the joined surface takes more than --memory-limit even so
+/// Whether the mesh has to be streamed. @throws Error if the joined surface exceeds --memory-limit even then
 bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
     if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;
@@ -188,7 +188,7 @@ void print_plan(const BrickPlan& plan, Session& session) {
                   ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
 }
 
-/// Outputs that were named where the job is planned, which is not where they are made.
+/// Outputs that were named when the job was planned, which does not write them.
 std::string outputs_of_join(const Session& session) {
     std::string names;
     for (const std::string& name : session.given())
@@ -220,7 +220,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
         const StructureInput structure = prepare_structure(job, structures, image, session, session.run());
         const BrickPlan plan =
             make_job(image, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
-        folder.write_plan(plan, session.job(), session.inputs(), {});
+        folder.write_plan(plan, session.job(), session.provenance().inputs(), {});
         if (const std::string outputs = outputs_of_join(session); !outputs.empty())
             session.note("the plan keeps settings and inputs alone; name what is to be written behind brick join: " +
                          outputs);
@@ -261,7 +261,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         plan = solver->plan(job.bricks.resolve(limit));
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return in_one();  // which says what is wrong with the job, if anything is
+        return in_one();  // reports what is wrong with the job, if anything
     }
     if (memory_of_band(double(plan.active_voxels())) < double(*limit)) {
         solver.reset();
@@ -273,7 +273,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
             Errc::InvalidOptions,
             "--checkpoint: the band is larger than --memory-limit allows at once, and bricks keep states of their "
             "own: see covol brick");
-    (void)streams_mesh(job, plan, session);  // before the work rather than after it
+    (void)streams_mesh(job, plan, session);  // to fail before the computation rather than after it
     run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
     const ScratchFolder scratch(std::filesystem::path(job.any_output()).parent_path());

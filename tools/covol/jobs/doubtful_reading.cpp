@@ -6,8 +6,7 @@
 namespace covol::tool {
 namespace {
 
-/// The largest difference between a voxel and the ones beside it, for its distance to them; nothing near the border of
-/// what is held.
+/// Magnitude of the gradient by central differences; nullopt near the border of the loaded part of the image.
 std::optional<double> edge_at(const Image& image, const Vec3& index) {
     Index3 voxel{};
     for (int a = 0; a < 3; ++a) {

@@ -2,10 +2,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "covol/vdb_io.h"
 
-// Commands that show all level sets of a file.
+// Input of commands that show all level sets of a file.
 namespace covol::tool {
 
 struct NamedLevelSet {
@@ -13,11 +13,11 @@ struct NamedLevelSet {
     FloatGridPtr surface;
 };
 
-/// All level sets of "FILE.vdb", or the one that "FILE.vdb:name" names. @throws Error as read_vdb_level_set.
+/// All level sets of "FILE.vdb", or the one named by "FILE.vdb:name". @throws Error as read_vdb_level_set.
 [[nodiscard]] std::vector<NamedLevelSet> read_level_sets(const std::string& input, const RunContext& run);
 
-/// Which of the level sets NAME=VALUE is for; a value without a name is for the only one.
-/// @param value  what VALUE is: "FILE" @throws UsageError, with their names.
+/// The level set that NAME=VALUE is for; a value without a name is for the only one.
+/// @param value  placeholder of VALUE in messages: "FILE" @throws UsageError, with the names of the level sets.
 [[nodiscard]] std::size_t owner_of(const std::vector<std::string>& level_sets, const std::string& flag,
                                    const Named& given, const std::string& value);
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "cli/arguments.h"
+#include "cli/options/arguments.h"
 #include "covol/file_kind.h"
 
 namespace covol::tool {
@@ -15,7 +15,7 @@ bool parse_int(std::string_view text, int& value) {
     return error == std::errc() && end == text.data() + text.size() && value >= 0;
 }
 
-/// The {frame...} in a path: where it is and how many digits it asks for.
+/// The {frame...} in a path: its position and number of digits.
 struct Placeholder {
     std::size_t begin = std::string::npos, length = 0;
     int digits = 0;
@@ -48,13 +48,13 @@ std::string padded(int number, int digits) {
 
 namespace {
 
-/// A path in front of its ending, and that ending: of "out.nii.gz" it is ".nii.gz".
+/// A path split before its ending: ".nii.gz" for "out.nii.gz".
 struct SplitPath {
     std::string before, ending;
 };
 
 SplitPath split_ending(std::string path) {
-    while (path.size() > 1 && path.back() == '/') path.pop_back();  // as a shell completes a folder
+    while (path.size() > 1 && path.back() == '/') path.pop_back();  // slashes that a shell appends to folders
     const std::size_t end = path.size() - long_ending(path).size();
     return {path.substr(0, end), path.substr(end)};
 }

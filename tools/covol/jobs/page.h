@@ -10,16 +10,16 @@
 // Report pages: `--report` of segment and reconstruct, and `covol report`.
 namespace covol::tool {
 
-/// Whether an image's world is a patient's: DICOM and NIfTI, NRRD and MetaImage in millimetres.
+/// Whether an image's world coordinates are anatomical: DICOM and NIfTI, NRRD and MetaImage in millimetres.
 [[nodiscard]] bool is_anatomical(const std::string& image_path, const ReadImageOptions& options, const RunContext& run);
 
-/// The facts that a page shows: the report so far, the command line, and which options it gave.
+/// The facts that a page shows: the report so far, the command line, and the options that it gave.
 [[nodiscard]] Json page_facts(const Session& session);
 
-/// Writes the page, and tells of it in the report and in a note.
+/// Writes the page, and mentions it in the report and in a note.
 void write_page(const std::string& path, const ReportPage& page, Session& session);
 
-/// What came out of a run; `page` has a title, and of a time-lapse its frames.
+/// Writes the results of a run; `page` has a title and, for a time-lapse, its frames.
 void write_page(const std::string& path, const StructuresOutput& output, ReportPage page, Session& session);
 
 }  // namespace covol::tool

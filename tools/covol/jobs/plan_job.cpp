@@ -10,8 +10,8 @@
 #include <set>
 #include <sstream>
 
-#include "cli/bytes_text.h"
-#include "cli/report.h"
+#include "cli/output/bytes_text.h"
+#include "cli/output/report.h"
 #include "covol/error.h"
 #include "jobs/structure_inputs.h"
 #include "jobs/timelapse_job.h"
@@ -20,20 +20,20 @@ namespace covol::tool {
 namespace {
 
 // Measured: docs/benchmarks.md, Plans.
-constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, mesh and files included
+constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, including mesh and files
 constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
 constexpr double kBaseBytes = 6.5e7;     ///< the program itself
-constexpr double kGuessBandBytes = 335;  ///< in place of kBandBytes while a guess learns from the image
-constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and of all
-constexpr double kFlowTime = 1.3;                                ///< a flow with an image over one without
-constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
+constexpr double kGuessBandBytes = 335;  ///< instead of kBandBytes if a guess is fitted to the image
+constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and the maximum for all
+constexpr double kFlowTime = 1.3;                                ///< factor for a flow with an image
+constexpr double kGuessTime = 2.8;    ///< the same for a guess with an image, which learns its appearance at the marks
 constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
-constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
-constexpr double kGuessVoxels = 25;   ///< the same of a guess, which smooths all of the image's part around it
+constexpr double kReachVoxels = 12;   ///< distance from the surface within which the image is sampled
+constexpr double kGuessVoxels = 25;   ///< the same for a guess, which smooths this part of the image
 constexpr double kGuessBytes = 8;     ///< for each voxel of that part: two copies
-constexpr std::int64_t kMappedBytes = 1 << 16;  ///< of a file that the system puts into memory at once
+constexpr std::int64_t kMappedBytes = 1 << 16;  ///< pages of a mapped file that the system loads at once
 
-/// What the marks alone came to on a coarse lattice.
+/// Result of a run with the marks alone on a coarse lattice.
 struct Pilot {
     double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
     bool is_guess = false, is_cloud = false;
@@ -43,9 +43,9 @@ struct Pilot {
 struct StructurePlan {
     std::string name;
     double active_voxels = 0, tube_voxels = 0, seconds = 0;
-    double bytes_while_solved = 0;   ///< beyond those of its band
+    double bytes_while_solved = 0;   ///< in addition to those of its band
     double smoothed_voxels = 0;      ///< of the image
-    std::set<std::uint64_t> blocks;  ///< that are read
+    std::set<std::uint64_t> blocks;  ///< blocks that are read
 };
 
 Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<ImageGeometry>& geometry, double h,
@@ -60,7 +60,7 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     Stopwatch watch;
     SegmentResult result = reconstruct(input.points, options, quiet);
     Start start = result.report.resolved.start;
-    if (geometry && is_any<CloudStart>(start)) {  // which points have without an image alone
+    if (geometry && is_any<CloudStart>(start)) {  // only points without an image have this start
         options.start = start = TagStart{};
         watch = {};
         result = reconstruct(input.points, options, quiet);
@@ -76,7 +76,7 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     return pilot;
 }
 
-/// What is read of a large image at once: a chunk, or the pages of a mapped file that come together. 0: all of it.
+/// The part of a large image that is read at once: a chunk, or consecutive pages of a mapped file. 0: the whole image.
 Index3 block_of(const ImageInfo& image) {
     if (image.bytes_to_hold > 0 || image.chunk_size[0] > 0) return image.chunk_size;
     const auto voxels = std::int32_t(kMappedBytes / std::int64_t(bytes_of(image.type)));
@@ -86,7 +86,7 @@ Index3 block_of(const ImageInfo& image) {
 
 double voxels_of(const Index3& size) { return double(size[0]) * size[1] * size[2]; }
 
-/// Blocks of an image that hold given places.
+/// The blocks of an image that contain given positions.
 class Blocks {
 public:
     explicit Blocks(const ImageInfo& image) : geometry_(image.geometry), block_(block_of(image)) {
@@ -94,7 +94,7 @@ public:
     }
     [[nodiscard]] double count() const { return voxels_of(counts_); }
 
-    /// Those with voxels from `low` to `high`, in indices.
+    /// Adds the blocks with voxels from `low` to `high`, in indices.
     void add(const Vec3& low, const Vec3& high) {
         Index3 first, last;
         for (int a = 0; a < 3; ++a) {
@@ -115,7 +115,7 @@ private:
     Index3 block_, counts_{};
 };
 
-/// Calls visit(low, high) with the image's indices within `reach` of each place of the surface.
+/// Calls visit(low, high) with the range of image indices within `reach` of each position on the surface.
 template <typename Visit>
 void for_each_place(const FloatGrid& surface, const ImageGeometry& g, double reach, const Visit& visit) {
     const double h = surface.voxelSize()[0];
@@ -132,7 +132,7 @@ void for_each_place(const FloatGrid& surface, const ImageGeometry& g, double rea
     }
 }
 
-/// What a flow reads: what lies within `reach` of the surface.
+/// Adds what a flow reads: the part of the image within `reach` of the surface.
 void plan_samples(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
     if (block_of(image)[0] == 0) return;
     Blocks blocks(image);
@@ -141,7 +141,7 @@ void plan_samples(const FloatGrid& surface, const ImageInfo& image, double reach
     plan.blocks = std::move(blocks.found);
 }
 
-/// What a guess reads and smooths: the part of the image within `reach` of the surface's box.
+/// Adds what a guess reads and smooths: the part of the image within `reach` of the surface's box.
 void plan_smoothing(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
     Vec3 lowest, highest;
     lowest.fill(1e300);

@@ -13,11 +13,11 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kFarAway = 1000;  // Blender's default view clips beyond it; units are metres there
-constexpr double kTooNear = 0.01;  // and nearer than this
-constexpr double kNozzle = 0.4;    // mm, of the usual printer: a thinner wall is not printed
-constexpr double kPrintBed = 300;  // mm
-constexpr double kCrumb = 1;       // mm
+constexpr double kFarClip = 1000;   // Blender's default view clips objects beyond it; its unit is metres
+constexpr double kNearClip = 0.01;  // and objects nearer than this
+constexpr double kNozzle = 0.4;     // mm, common nozzle of printers: thinner walls are not printed
+constexpr double kPrintBed = 300;   // mm
+constexpr double kSmallPart = 1;    // mm
 
 std::string number(double value) {
     std::ostringstream text;
@@ -26,7 +26,7 @@ std::string number(double value) {
     return text.str();
 }
 
-/// Millimetres in one unit of the file; 0 where that is not known.
+/// Millimetres in one unit of the file; 0 if the unit is not known.
 double millimetres(const FileFacts& f) { return f.unit == "mm" ? 1 : 1000 * metres_in(f.unit).value_or(0); }
 
 bool ends_in(const FileFacts& f, std::initializer_list<std::string_view> endings) {
@@ -52,14 +52,14 @@ struct Rule {
     bool is_problem;
     bool (*applies)(const FileFacts&);
     std::string (*text)(const FileFacts&);
-    std::string (*mend)(const FileFacts&);
+    std::string (*remedy)(const FileFacts&);
 };
 
 constexpr bool kProblem = true, kRemark = false;
 
-// One row for each thing that goes wrong: where, whether it fails the check, when, what happens, what mends it.
-// What is said of Blender was tried in Debian's 3.4 (tests/cli/blender_test.py); the rest is what is known of the other
-// programs' readers, and was not tried in them.
+// One row for each problem: program, whether it fails the check, condition, effect, remedy. The rules for Blender were
+// tested in Debian's 3.4 (tests/cli/blender_test.py); the others follow from what is known of the programs' readers,
+// and were not tested.
 const std::vector<Rule>& rules() {
     static const std::vector<Rule> table{
         {Program::Blender, kProblem, [](Facts f) { return is_vdb(f) && f.has_level_set && !f.has_density; },
@@ -74,15 +74,15 @@ const std::vector<Rule>& rules() {
         {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.has_blosc; },
          [](Facts) -> Text { return "it is packed by Blosc: builds without it do not open the file"; },
          [](Facts) -> Text { return "--compression none, or covol convert IN.vdb OUT.vdb --compression none"; }},
-        {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.extent > kFarAway; }, wide,
+        {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.extent > kFarClip; }, wide,
          [](Facts f) -> Text {
              return "scale the object by " + number(1 / f.extent) + ", or End of the view's clipping beyond it";
          }},
-        {Program::Blender, kRemark, [](Facts f) { return is_mesh(f) && f.extent > kFarAway; },
+        {Program::Blender, kRemark, [](Facts f) { return is_mesh(f) && f.extent > kFarClip; },
          [](Facts f) -> Text { return wide(f) + ": the view clips it"; },
          [](Facts f) -> Text { return "--unit-scale " + number(1 / f.extent); }},
         {Program::Blender, kRemark,
-         [](Facts f) { return (is_mesh(f) || is_vdb(f)) && f.extent > 0 && f.extent < kTooNear; },
+         [](Facts f) { return (is_mesh(f) || is_vdb(f)) && f.extent > 0 && f.extent < kNearClip; },
          [](Facts f) -> Text { return wide(f) + ": a dot"; },
          [](Facts f) -> Text {
              return is_mesh(f) ? "--unit-scale " + number(1 / f.extent) : "scale the object by " + number(1 / f.extent);
@@ -113,7 +113,7 @@ const std::vector<Rule>& rules() {
         {Program::Houdini, kRemark, [](Facts f) { return is_mesh(f) && f.ending != ".glb"; },
          [](Facts) -> Text { return "y is up there: a mesh that was written z up lies on its back"; },
          [](Facts) -> Text { return "--up y"; }},
-        {Program::Houdini, kRemark, [](Facts f) { return (is_vdb(f) || is_mesh(f)) && f.extent > kFarAway; }, wide,
+        {Program::Houdini, kRemark, [](Facts f) { return (is_vdb(f) || is_mesh(f)) && f.extent > kFarClip; }, wide,
          [](Facts f) -> Text {
              return is_mesh(f) ? "--unit-scale " + number(1 / f.extent) : "scale it by " + number(1 / f.extent);
          }},
@@ -203,7 +203,7 @@ const std::vector<Rule>& rules() {
         {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && millimetres(f) == 0; },
          [](Facts) -> Text { return "no unit is stated: lengths are taken for mm"; },
          [](Facts) -> Text { return "--unit-scale F makes them so"; }},
-        {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && (f.extent > kPrintBed || f.extent < kCrumb); },
+        {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && (f.extent > kPrintBed || f.extent < kSmallPart); },
          [](Facts f) -> Text { return "it is " + number(f.extent) + " mm wide as it stands"; },
          [](Facts f) -> Text { return "--unit-scale " + number(100 / f.extent) + " makes it 100 mm"; }},
         {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && f.wall >= 0 && f.wall < kNozzle; },
@@ -231,7 +231,7 @@ std::vector<Advice> advice_for(Program program, const FileFacts& facts) {
     std::vector<Advice> found;
     for (const Rule& rule : rules())
         if (rule.program == program && rule.applies(facts))
-            found.push_back({rule.is_problem, rule.text(facts), rule.mend(facts)});
+            found.push_back({rule.is_problem, rule.text(facts), rule.remedy(facts)});
     return found;
 }
 

@@ -4,16 +4,16 @@
 
 #include "covol/file_kind.h"
 
-// What goes wrong with a file in one program, and the option that mends it: the rules of covol check --for.
+// Problems of a file in one program, and the options that solve them: the rules of covol check --for.
 namespace covol::tool {
 
 enum class Program { Any, Blender, Houdini, Slicer, Fiji, Print };
 
-/// What the rules ask about a file.
+/// Properties of a file that the rules depend on.
 struct FileFacts {
     FileKind kind = FileKind::Image;
-    std::string ending;  ///< of the name, lower case, with its dot; as long_ending() has it
-    std::string unit;    ///< of length; empty: the file states none
+    std::string ending;  ///< of the name, in lower case, with its dot; as of long_ending()
+    std::string unit;    ///< of length; empty: the file does not state one
     double extent = 0;   ///< longest side of its box, world units
     // .vdb
     bool has_level_set = false, has_density = false, has_blosc = false;
@@ -21,23 +21,23 @@ struct FileFacts {
     // meshes
     bool is_closed = true;
     int crossings = 0;  ///< self-intersections
-    double wall = -1;   ///< thinnest, in the file's unit; < 0: not measured
+    double wall = -1;   ///< minimum, in the file's unit; < 0: not measured
     // images
-    std::string format;  ///< as covol info says it
+    std::string format;  ///< as printed by covol info
     bool is_rotated = false, has_spacing = true, is_big_tiff = false, has_segments = false;
-    bool has_display_range = true;  ///< false of ImageJ's TIFF of labels without min and max
+    bool has_display_range = true;  ///< false for a TIFF of labels of ImageJ without min and max
 };
 
 struct Advice {
-    bool is_problem = false;  ///< it does not open there, or is something else; else a remark
-    std::string text, mend;
+    bool is_problem = false;  ///< it cannot be opened there, or is read wrongly; otherwise a remark
+    std::string text, remedy;
 };
 
-/// What the program's rules say of the file, in the table's order.
+/// The program's rules that apply to the file, in the table's order.
 [[nodiscard]] std::vector<Advice> advice_for(Program program, const FileFacts& facts);
 
-/// What stands behind `key` in the first 64 KiB of a file, a word; empty where that does not occur. Headers of meshes
-/// and images are text at their beginning, and this is asked of files that have been read in full before.
+/// The text after `key`, up to the next blank, in the first 64 KiB of a file; empty if `key` does not occur. For
+/// headers of meshes and images, which are text at the beginning of files that have been read in full before.
 [[nodiscard]] std::string word_in_header(const std::string& path, const std::string& key);
 [[nodiscard]] bool header_holds(const std::string& path, const std::string& text);
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "cli/option_names.h"
-#include "cli/report.h"
+#include "cli/options/option_names.h"
+#include "cli/output/report.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
 #include "covol/study.h"
@@ -72,7 +72,7 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
 void SegmentJob::sort_output(bool with_image) {
     const FileKind kind = output.empty() ? FileKind::Vdb : kind_of_output(output, FileKind::Mesh);
     const bool is_mask = kind == FileKind::Image && with_image && is_image_name(output);
-    if (kind != FileKind::Mesh && !is_mask) return;  // what is none of these is not written as .vdb, either
+    if (kind != FileKind::Mesh && !is_mask) return;  // stays at -o, which accepts only .vdb
     std::string& alone = is_mask ? mask_path : mesh_path;
     if (!alone.empty())
         throw UsageError("-o " + output + " and " + (is_mask ? "--mask " : "--mesh ") + alone +
@@ -128,7 +128,7 @@ void SegmentJob::bind_named_seeds(CLI::App& command) {
                                                          parse_vec3(flag, text.substr(colon + 1)));
                         }
                     },
-                    option.text + std::string("; with NAME: of that structure alone"))
+                    option.text + std::string("; with NAME: only for that structure"))
                 ->type_name("[NAME:]X,Y,Z")
                 ->allow_extra_args(false);
     });
@@ -138,8 +138,8 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     in_group(command, Group::Output);
     command
         .add_option("-o,--output", output,
-                    std::string("the surface as a level set, .vdb; or ") +
-                        (with_image ? "a mesh or a label image" : "a mesh") + " alone, by the name's end")
+                    std::string("the surface as a level set, .vdb; or only ") +
+                        (with_image ? "a mesh or a label image" : "a mesh") + ", depending on the file extension")
         ->required()
         ->type_name("OUT.vdb|...");
     command.final_callback([this, with_image] {
@@ -151,7 +151,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         command
             .add_option(
                 "--mask", mask_path,
-                "label image in the image's own geometry; .seg.nrrd for 3D Slicer, .dcm as a DICOM segmentation")
+                "label image with the geometry of the image; .seg.nrrd for 3D Slicer, .dcm for a DICOM segmentation")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr|.dcm");
         command
             .add_option("--rtstruct", rtstruct_path,
@@ -164,35 +164,38 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         command
             .add_option_function<std::string>(
                 "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
-                "time points of the image, from 0; of several, each starts from the one before")
+                "time points of the image, counted from 0; each one after the first starts from the result of the "
+                "previous one")
             ->type_name("all|N|A-B");
         in_group(command, Group::Output);
     }
-    command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")
+    command.add_option("--mesh", mesh_path, "the surface as a closed, manifold mesh with outward normals")
         ->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, kDensityHelp)->type_name("OUT.vdb");
     command
         .add_option("--usda", scene_path,
-                    "a scene in USD's text form that refers to the .vdb files, of a time-lapse frame by frame")
+                    "scene in USD's text format that refers to the .vdb files, for a time-lapse frame by frame")
         ->type_name("OUT.usda");
-    command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")
+    command.add_option("--fields", fields_path, "the grid u, and the grids distance and edge if the flow used them")
         ->type_name("OUT.vdb");
     command
-        .add_option("--report", page_path,
-                    "one page for the browser: the surface in 3D, slices, figures, options, where new marks would help")
+        .add_option(
+            "--report", page_path,
+            "page for the browser: the surface in 3D, slices, measurements, options, and where new marks would help")
         ->type_name("OUT.html")
         ->each([this](const std::string&) { evidence.for_page = true; });
     command
-        .add_option("--keep-failed", failed_path,
-                    "where a run fails after its start was made: that start, u, distance and edge as far as they came")
+        .add_option(
+            "--keep-failed", failed_path,
+            "if the run fails after its start was computed: the start, u, distance and edge, as far as they exist")
         ->type_name("OUT.vdb");
     contours.bind(command, with_image);
     if (with_image) {
         in_group(command, Group::ReadingMarks);
         command
             .add_option("--structure-column", structure_column,
-                        "what names each mark's structure, of one file with several: a column, group or counter of "
-                        "Fiji, label or node of 3D Slicer")
+                        "what names the structure of each mark in a file with several structures: a column, a group or "
+                        "counter of Fiji, or a label or node of 3D Slicer")
             ->type_name("NAME");
     }
     if (with_image) painted.bind(command);
@@ -214,10 +217,10 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                 given.options.start = choice.start;
                 start_path = choice.path;
             },
-            "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points "
-            "without an image: their own surface), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1 (inside an object and "
-            "without marks these grow to its edges), mesh:F, mask:F or vdb:F (near its marks such a start is a guess "
-            "that they correct)")
+            "initial surface: auto, guess (surface of minimum bending energy through the marks), cloud (surface of "
+            "many points, without an image), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1 (inside an object and without "
+            "marks these grow to its edges), mesh:F, mask:F or vdb:F (with marks such a start is a guess that they "
+            "correct in their neighbourhood)")
         ->type_name("START")
         ->default_str("auto");
     bricks.bind(command);
@@ -237,7 +240,7 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
     }
     session.require_memory(double(read_image_info(path, needed, session.run()).bytes_to_hold), "the image");
     Image pixels = read_image(path, needed, session.run());
-    session.set_world(pixels.geometry());
+    session.provenance().set_world(pixels.geometry());
     Json& input = session.report()["input"]["image"];
     input = to_json(pixels.geometry());
     input["path"] = path;
@@ -260,8 +263,8 @@ void SegmentJob::run(Session& session) const {
         names = names || std::any_of(texts->begin(), texts->end(), has_name);
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
-    if (images.empty()) session.set_world_of_points();
-    session.outputs().protect(images);  // one may be the study's, which the command line does not name
+    if (images.empty()) session.provenance().set_world_of_points();
+    session.outputs().protect(images);  // one may belong to the study, and is not on the command line
     if (session.is_planning()) return run_plan(*this, session);
     if (checkpoint.given() && (session.brick() || is_timelapse(*this)))
         throw UsageError(

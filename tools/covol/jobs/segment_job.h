@@ -18,7 +18,7 @@
 
 namespace covol::tool {
 
-/// Files whose marks name their structures. They are asked for twice, for the names and for the marks, and read once.
+/// Files whose marks name their structures. They are needed twice, for the names and for the marks, but read once.
 class SharedMarks {
 public:
     /// @throws as read_structures_of_points()
@@ -29,62 +29,62 @@ private:
     std::map<std::string, std::vector<StructurePoints>> read_;
 };
 
-/// What `segment` and `reconstruct` share: they differ in the image alone.
+/// Shared by `segment` and `reconstruct`, which differ only in the image.
 struct SegmentJob {
-    std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
+    std::vector<std::string> images;  ///< none: points only; several: the frames of a time-lapse
     ImageFlags image;
     PointFlags points;
     ContourFlags contours;
-    std::string structure_column;  ///< what names each mark's structure, in files of several; empty: files are of one
+    std::string structure_column;  ///< column with each mark's structure, in files of several; empty: files are of one
     std::shared_ptr<SharedMarks> shared = std::make_shared<SharedMarks>();
     PaintedFlags painted;
     SeedFlags seeds;
     GuessFlags guess;
     CloudFlags cloud;
     Given<SegmentOptions> given;
-    std::string start_path;  ///< of the file that the start is read from; empty: it needs none
-    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside one structure among several
+    std::string start_path;  ///< of the file that the start is read from; empty: no file is needed
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside seeds of one structure among several
     MeshFlags mesh;
     EvidenceFlags evidence;
     BrickFlags bricks;
     CheckpointFlags checkpoint;
     FrameChoice frames;
-    std::string study;  ///< folder of a study, whose structures join those of the files; empty: none
+    std::string study;  ///< folder of a study whose structures are added to those of the files; empty: none
     std::string output, mask_path, rtstruct_path, mesh_path, density_path, fields_path, table_path, failed_path,
         page_path, scene_path;
     VdbFlags vdb;
 
     void bind(CLI::App& command, bool with_image);
-    /// Time-lapses by run_timelapse(), all else by run_structures(); behind `covol plan` run_plan(), behind `covol
-    /// brick` run_bricks().
+    /// Calls run_timelapse() for time-lapses, otherwise run_structures(); run_plan() after `covol plan`, and
+    /// run_bricks() after `covol brick`.
     void run(Session& session) const;
 
-    // For those.
-    /// --exterior-seed, whose places may belong to one structure.
+    // Used by these functions:
+    /// --exterior-seed, whose positions may belong to one structure.
     void bind_named_seeds(CLI::App& command);
-    /// Without an image it is the study's. @throws UsageError: there is none
+    /// Uses the study's image if the command line has none. @throws UsageError: there is none
     void find_image();
-    /// The study's, where the command line has none.
+    /// Uses the study's options that the command line does not give.
     void take_study_options();
-    /// A mesh or a label image that stands at -o goes where --mesh and --mask would have it.
+    /// Treats a mesh or a label image at -o as an argument of --mesh or --mask.
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;
     [[nodiscard]] SegmentOptions resolve(double h) const;
     [[nodiscard]] MarksOptions marks_options(double h) const;
     [[nodiscard]] ReadMarksOptions reading(const RunContext& run) const;
     /// resolve_voxel_size() for a structure with these marks.
-    /// @param geometry  that the marks belong to
+    /// @param geometry  the lattice that the marks refer to
     [[nodiscard]] double resolve_voxel_size(const Image* input_image, const Marks& marks,
                                             const std::optional<ImageGeometry>& geometry, Session& session) const;
-    /// Whether an output, or what is done to the surface, needs its relaxed mesh.
+    /// Whether an output, or the processing of the surface, needs its relaxed mesh.
     [[nodiscard]] bool needs_mesh() const;
-    /// Options that are wrong whatever h is are found before anything is read.
+    /// Detects options that are invalid for every h before any file is read.
     void check_options() const;
-    /// Which of the given flags had nothing to do; empty where all had.
+    /// The given flags that had no effect; empty if all had one.
     [[nodiscard]] std::string unused(const SegmentReport& report) const;
-    /// The image; the report tells of it.
+    /// Reads the image, and adds it to the report.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
-    /// How much of the image was read, once it has been segmented.
+    /// Reports how much of the image was read, after the segmentation.
     static void report_chunks(const Image& image, Session& session);
 };
 

@@ -16,15 +16,15 @@
 namespace covol::tool {
 namespace {
 
-/// The structure that a text NAME=... belongs to.
+/// The structure of a text NAME=...
 Marks& owner_of(std::vector<Marks>& structures, const std::string& flag, const std::string& name) {
     Marks* const found = find_structure(structures, name);
     if (found == nullptr) throw UsageError(flag + ": no structure is called '" + name + "'");
     return *found;
 }
 
-/// What names the structures of a file's marks: a column that was asked for, or the ROIs of a DICOM structure set that
-/// got no name; empty where all are of one structure.
+/// What names the structures of a file's marks: a given column, or the ROIs of a DICOM structure set that was given
+/// without a name; empty if all marks belong to one structure.
 std::string column_of(const SegmentJob& job, const std::string& text) {
     if (!job.structure_column.empty()) return job.structure_column;
     const bool names_itself = !job.images.empty() && split_name(text).name.empty() && long_ending(text) == ".dcm";
@@ -33,7 +33,7 @@ std::string column_of(const SegmentJob& job, const std::string& text) {
 
 using TakePoints = std::function<void(Marks& owner, const std::string& file, const KindedPoints& points)>;
 
-/// Files whose marks name their structures: hands the marks of each over.
+/// Files whose marks name their structures: passes on the marks of each structure.
 void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
                   const TakePoints& take) {
     for (const std::string& text : texts) {
@@ -46,7 +46,7 @@ void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, 
     }
 }
 
-/// Structures of files: those that name them, and those whose marks are of one.
+/// Adds the structures of files: those that name their structures, and those with marks of one structure.
 void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
                std::vector<std::string> MarkFiles::*kind) {
     for (const std::string& text : texts) {
@@ -77,7 +77,7 @@ std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::v
     return files;
 }
 
-/// Gives each seed to its structure; one without a name to all.
+/// Assigns each seed to its structure; seeds without a name are assigned to all.
 void assign_seeds(std::vector<Marks>& structures, const std::string& flag, const std::vector<std::string>& texts,
                   std::vector<std::string> MarkFiles::*files, std::vector<PointCloud> Marks::*clouds) {
     for (const std::string& text : texts) {
@@ -89,12 +89,13 @@ void assign_seeds(std::vector<Marks>& structures, const std::string& flag, const
     }
 }
 
-/// Marks that are voxels may lie inside the image by accident; its edges tell.
+/// Marks in voxels may be inside the image by chance if they are read as lengths; this is detected by the image's
+/// edges.
 void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const ReadPointsOptions& reading,
                     const RunContext& run) {
     if (!image || reading.space != PointSpace::Unstated || marks.points.empty()) return;
     const bool in_lengths = std::all_of(marks.rules.begin(), marks.rules.end(), [](const std::string& rule) {
-        return rule.ends_with("x, y, z in world units");  // and the file names no unit
+        return rule.ends_with("x, y, z in world units");  // and the file states no unit
     });
     if (!in_lengths) return;
     const std::optional<double> ratio = edges_if_voxels(marks.points, *image);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "covol/file_kind.h"
 #include "covol/mesh_stream.h"
 #include "covol/program_marks.h"
@@ -18,7 +18,7 @@
 namespace covol::tool {
 namespace {
 
-/// Whether a label image has a place for the structures' names.
+/// Whether a format of label images can store the structures' names.
 bool keeps_names(const std::string& path) {
     for (const char* end : {".nrrd", ".NRRD", ".zarr", ".zarr/", ".dcm", ".DCM"})
         if (path.ends_with(end)) return true;
@@ -32,7 +32,7 @@ FloatGridPtr named(FloatGridPtr grid, const std::string& name) {
     return grid;
 }
 
-/// u, distance and edge of each structure; with several, "u_ve" and so on.
+/// u, distance and edge of each structure; with several structures named "u_ve" and so on.
 std::vector<FloatGridPtr> fields_of(const StructuresOutput& output) {
     std::vector<FloatGridPtr> grids;
     for (const StructureOutput& s : output.structures) {
@@ -53,7 +53,7 @@ std::map<std::string, std::string> metadata_of(const StructuresOutput& output, c
         else
             resolved[s.name] = used;
     }
-    std::map<std::string, std::string> metadata = session.metadata();
+    std::map<std::string, std::string> metadata = session.provenance().metadata();
     if (output.structures.front().result.report.holes.policy == Holes::Open)
         metadata["covol_holes"] = "closed here; the mesh alone is open";
     metadata["covol_resolved"] = resolved.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -96,7 +96,7 @@ std::vector<NamedLabel> label_names(const StructuresOutput& output) {
     return labels;
 }
 
-/// A mask that was given and corrected: its own values, bytes where they hold all of them.
+/// A given mask with corrections: its own values, stored as bytes if they fit.
 class CorrectedLabels : public PixelSource {
 public:
     CorrectedLabels(std::shared_ptr<const StructuresOutput> output, bool has_names)
@@ -142,7 +142,7 @@ private:
                 for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = static_cast<T>(row[i]);
             }
     }
-    /// Of the structure's own voxels.
+    /// The extent of the structure's own voxels.
     [[nodiscard]] VoxelBox extent() const {
         const Index3 size = geometry().size;
         VoxelBox box{size, {-1, -1, -1}};
@@ -191,7 +191,7 @@ void hand_over_contours(const std::shared_ptr<const StructuresOutput>& output, c
     });
 }
 
-/// What the run is about: the image's name, or the output's.
+/// The subject of the run: the image's name, or the output's.
 std::string title_of(const SegmentJob& job) {
     const std::filesystem::path path(job.images.empty() ? job.output : job.images.front());
     return (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -205,7 +205,7 @@ Json input_of(const StructureOutput& s) {
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
         json["contours"] = {{"paths", s.files.contours}, {"rules", s.contour_rules}};
-        if (const auto& contours = s.result.report.resolved.contours)  // else a network, whose lines are marks
+        if (const auto& contours = s.result.report.resolved.contours)  // otherwise a network: its lines are marks
             json["contours"].update({{"closed", contours->closed},
                                      {"open", contours->open},
                                      {"slices", contours->slices},
@@ -287,8 +287,8 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
         outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
 }
 
-void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
-               Session& session, const Sink& sink) {
+void queue_outputs(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
+                   Session& session, const Sink& sink) {
     const bool in_one = is_density_in_output(job);
     const WriteVdbOptions vdb = job.vdb.with(metadata_of(*output, session));
     const auto fogs_of = [output] {
@@ -298,7 +298,7 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
         return grids;
     };
     sink(tagged(job.output), [output, vdb, fogs_of, in_one](const std::string& file) {
-        // Fog first: some programs take the first grid, and draw no level set.
+        // The fog volume comes first: some programs load only the first grid, and cannot draw level sets.
         std::vector<FloatGridPtr> grids = in_one ? fogs_of() : std::vector<FloatGridPtr>{};
         for (const StructureOutput& s : output->structures) grids.push_back(s.result.surface);
         write_vdb(file, grids, vdb);
@@ -321,7 +321,7 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     sink(tagged(job.evidence.marks_path), [output, evidence_of](const std::string& file) {
         write_program_marks(file, suggested_marks(evidence_of()), output->geometry);
     });
-    // The last one, so that it tells of as much as there is to tell.
+    // The page comes last, so that it contains the complete report.
     ReportPage page;
     page.title = title_of(job) + tagged.suffix;
     for (const NameTag& frame : tagged.series) {

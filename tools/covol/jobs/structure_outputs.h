@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/table.h"
+#include "cli/output/table.h"
 #include "covol/intensity.h"
 #include "covol/segment_structures.h"
 #include "flags/evidence_flags.h"
@@ -13,14 +13,14 @@
 #include "jobs/segment_job.h"
 #include "jobs/structure_inputs.h"
 
-// What came out for each structure, and the files and reports that it goes to.
+// The result of each structure, and the files and reports that it is written to.
 namespace covol::tool {
 
-/// What came out for one.
+/// The result of one structure.
 struct StructureOutput : StructureResult {
     std::optional<Evidence> evidence;
     std::optional<IntensityStatistics> intensity;  ///< inside the surface
-    std::optional<CorrectedMask> corrected;        ///< of a guess that is a mask in the image's geometry
+    std::optional<CorrectedMask> corrected;        ///< for a guess that is a mask in the image's geometry
     [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
 };
 
@@ -28,8 +28,8 @@ struct StructureOutput : StructureResult {
 struct StructuresOutput {
     ImageGeometry geometry;
     std::string image_path;      ///< empty: without an image
-    std::optional<int> frame;    ///< of that file, where it was chosen
-    std::optional<Image> image;  ///< where a report page shows it
+    std::optional<int> frame;    ///< of that file, if one was chosen
+    std::optional<Image> image;  ///< for the report page
     bool is_anatomical = false;  ///< of that image
     std::vector<StructureOutput> structures;
     std::vector<StructureOverlap> overlaps;
@@ -37,31 +37,31 @@ struct StructuresOutput {
     [[nodiscard]] std::vector<int> labels() const;
 };
 
-/// Their surfaces.
+/// The structures' surfaces.
 [[nodiscard]] std::vector<Structure> solids(const StructuresOutput& output);
 
-/// --density has the name of -o: one file holds both kinds of grids.
+/// --density and -o have the same name: one file contains both kinds of grids.
 [[nodiscard]] bool is_density_in_output(const SegmentJob& job);
 [[nodiscard]] std::string density_name(const StructuresOutput& output, const StructureOutput& structure);
 
-/// One file for each output that was asked for, under its tagged name.
+/// Takes each requested output with its tagged name.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
-void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
-               Session& session, const Sink& sink);
-/// Checks those names. @throws Error as Outputs::check().
+void queue_outputs(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
+                   Session& session, const Sink& sink);
+/// Checks these names. @throws Error as Outputs::check().
 void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs);
 
 /// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.
 [[nodiscard]] Json to_json(const StructuresOutput& output);
 
-/// The table's columns for a structure's result, and their values.
-/// @param unit  of lengths, which columns name in brackets: "volume (mm^3)"; empty: not known
+/// The table's columns for the result of a structure, and their values.
+/// @param unit  of lengths, appended to column names in brackets: "volume (mm^3)"; empty: not known
 [[nodiscard]] std::vector<std::string> result_columns(const std::string& unit);
 void add_result(Table& table, const std::string& name, int label, const SegmentResult& result,
                 const std::optional<IntensityStatistics>& intensity, const RunContext& run);
 
-/// Of an image in chunks none where more voxels than `max_read` would have to be read for it.
+/// For an image in chunks, nullopt if more than `max_read` voxels would have to be read.
 [[nodiscard]] std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface,
                                                                   double max_read, const RunContext& run);
 

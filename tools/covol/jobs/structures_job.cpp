@@ -7,7 +7,7 @@
 #include <optional>
 #include <sstream>
 
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "jobs/page.h"
@@ -16,9 +16,9 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // structures; of more there is a table
+constexpr std::size_t kMaxInLines = 4;  // structures; more are listed in a table
 
-/// Up to rounding in files.
+/// Compares lattices up to rounding in files.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
     const double slack = 1e-3 * b.smallest_spacing();
@@ -39,7 +39,7 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
     session.add_seconds("surface", seconds.surface);
 }
 
-/// What a failed run had goes to --keep-failed at once, and stays.
+/// Writes the state of a failed run to --keep-failed at once, independently of other outputs.
 void keep_failed(const SegmentJob& job, const StructureFacts& s, const SegmentFailed& failed, Session& session) {
     const std::string path = s.name.empty() ? job.failed_path : with_suffix(job.failed_path, "_" + s.grid);
     std::vector<FloatGridPtr> grids;
@@ -52,7 +52,7 @@ void keep_failed(const SegmentJob& job, const StructureFacts& s, const SegmentFa
     add(failed.u, "u");
     add(failed.distance, "distance");
     add(failed.edge, "edge");
-    std::map<std::string, std::string> metadata = session.metadata();
+    std::map<std::string, std::string> metadata = session.provenance().metadata();
     metadata["covol_failed"] = failed.what();
     if (session.outputs().write(path, [&](const std::string& file) { write_vdb(file, grids, job.vdb.with(metadata)); }))
         session.note("kept " + path);
@@ -118,7 +118,8 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
         }
         session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
-        // Of an image in chunks what marks and surface needed was read, and not all that lies inside.
+        // For an image in chunks, only the parts near marks and surface have been read; the interior is not read for
+        // this.
         if (image) s.intensity = intensity_within(*image, *s.result.surface, 0, run);
         if (image && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
     }
@@ -157,8 +158,8 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     const std::shared_ptr<const StructuresOutput> output = found;
     session.report().update(to_json(*output), true);
     if (image) SegmentJob::report_chunks(*image, session);
-    hand_over(job, output, {}, session,
-              [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
+    queue_outputs(job, output, {}, session,
+                  [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
     UsdScene scene;
     add_to_scene(scene, job, *output, {});
     write_scene(scene, job, session);

@@ -5,15 +5,15 @@
 #include "jobs/structure_inputs.h"
 #include "jobs/structure_outputs.h"
 
-// One image or a cloud without one; one or several structures.
+// Runs on one image or on a cloud without an image, with one or several structures.
 namespace covol::tool {
 
-/// The structures of one image as they go to files: with the evidence and the corrected mask that were asked for. Tells
-/// of them.
+/// Prepares the structures of one image for output: adds the requested evidence and corrected mask, and prints a
+/// summary.
 [[nodiscard]] StructuresOutput finish(const SegmentJob& job, StructuresResult result, const std::optional<Image>& image,
                                       Session& session, const RunContext& run);
 
-/// The job from files to files.
+/// Runs the job, from input files to output files.
 void run_structures(const SegmentJob& job, Session& session, const StructureSolver& solve = solve_structure);
 
 }  // namespace covol::tool

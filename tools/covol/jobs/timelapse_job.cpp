@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "cli/option_names.h"
+#include "cli/options/option_names.h"
 #include "covol/error.h"
 #include "jobs/name_tag.h"
 #include "jobs/structures_job.h"
@@ -41,7 +41,7 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
     return frames;
 }
 
-/// The series as it goes on.
+/// Processes the frames of the series one after the other.
 class FrameRunner {
 public:
     FrameRunner(const SegmentJob& job, Session& session)
@@ -107,8 +107,8 @@ private:
         job_.check_options();
     }
 
-    /// The structures with this frame's marks: a file of its own where the name has {frame}, else the first frame's
-    /// alone.
+    /// The structures with this frame's marks: from a file for each frame if the name contains {frame}; other files are
+    /// used for the first frame only.
     [[nodiscard]] std::vector<Marks> marks_at(const Frame& frame) const {
         std::vector<Marks> structures = structures_;
         for (Marks& marks : structures) {
@@ -127,7 +127,7 @@ private:
                 continue;
             }
             const std::string own = with_frame(path, frame.number);
-            // Marks may be missing once there is a surface to start from.
+            // Marks are optional once there is a surface to start from.
             if (!lapse_.started() || std::filesystem::exists(own)) paths.push_back(own);
         }
         return paths;
@@ -139,7 +139,7 @@ private:
         Json report{{"frame", frame.number}, {"image", frame.path}};
         try {
             const auto output = std::make_shared<StructuresOutput>(segment_frame(frame, who));
-            hand_over(job_, output, tag_in_series(frame), session_, [&](const std::string& path, auto write) {
+            queue_outputs(job_, output, tag_in_series(frame), session_, [&](const std::string& path, auto write) {
                 if (session_.outputs().write(path, write)) session_.note("wrote " + path);
             });
             add_to_scene(scene_, job_, *output, tag(frame));

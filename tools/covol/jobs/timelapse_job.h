@@ -1,7 +1,7 @@
 #pragma once
 #include "jobs/segment_job.h"
 
-// Time-lapse: each frame starts from the one before.
+// Time-lapse: each frame starts from the result of the previous one.
 namespace covol::tool {
 
 /// Several images, or several frames of one.

@@ -4,30 +4,31 @@
 
 #include "jobs/structure_outputs.h"
 
-// A scene in the text form of USD whose volumes are .vdb files: UsdVol's OpenVDBAsset.
+// A scene in the text format of USD whose volumes are .vdb files: UsdVol's OpenVDBAsset.
 // https://openusd.org/release/api/usd_vol_page_front.html
 namespace covol::tool {
 
-/// A grid of the scene, and the file that has it, frame by frame.
+/// A grid of the scene, and the file that contains it, for each frame.
 struct UsdField {
     bool is_fog = false;
-    std::map<int, std::string> files;  ///< paths as they were typed; of a single image one, at 0
+    std::map<int, std::string> files;  ///< paths as given by the user; for a single image one, at frame 0
 };
 
 struct UsdScene {
     bool is_timelapse = false;
-    std::map<std::string, UsdField> fields;  ///< by the grids' names
+    std::map<std::string, UsdField> fields;  ///< by grid name
 };
 
-/// Adds the .vdb files of one image, of which `tagged` makes the names.
+/// Adds the .vdb files of one image, whose names are made by `tagged`.
 void add_to_scene(UsdScene& scene, const SegmentJob& job, const StructuresOutput& output, const NameTag& tagged);
 
-/// The text; files are named as seen from the folder of `path`. @param unit  of length; other than those of metre: 1
+/// The text; files are referenced relative to the folder of `path`. @param unit  of length; unknown units count as
+/// metres
 [[nodiscard]] std::string to_usda(const UsdScene& scene, const std::string& path, const std::string& unit);
 
-/// @throws UsageError where --usda is given and no .vdb file that it could refer to; Error as Outputs::check().
+/// @throws UsageError if --usda is given without a .vdb output that it could refer to; Error as Outputs::check().
 void check_scene(const SegmentJob& job, Outputs& outputs);
-/// Queues it where it was asked for.
+/// Queues it if it was requested.
 void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session);
 
 }  // namespace covol::tool

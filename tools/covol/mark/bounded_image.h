@@ -7,14 +7,14 @@
 
 namespace covol::tool {
 
-/// An image that is computed with again and again. Of one in chunks all that was decoded is kept: when that has become
-/// too much, the next job gets the image opened anew, and the memory goes when the last job with the old one is done.
+/// An image for repeated computations. Images in chunks keep all decoded chunks: when these exceed the limit, the next
+/// job gets a newly opened image, and the memory is released when the last job with the old one ends.
 class BoundedImage {
 public:
-    /// @param open  opens it once more
+    /// @param open  opens the image again
     BoundedImage(Image image, std::function<Image()> open, std::uint64_t max_bytes);
 
-    /// For one job.
+    /// The image for one job.
     [[nodiscard]] Image get();
 
 private:

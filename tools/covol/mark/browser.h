@@ -4,19 +4,19 @@
 
 namespace covol::tool {
 
-/// The program of PATH that opens links, xdg-open or open; empty where there is none.
+/// The program in PATH that opens links, xdg-open or open; empty if there is none.
 [[nodiscard]] std::string find_opener();
 
-/// Opens a link in the person's browser. The link is a secret, which other users of the machine could read from a
-/// command line: the browser is given a file that leads there, and that only this user can read.
+/// Opens a link in the user's browser. The link is a secret, which other users of the machine could read from a command
+/// line: therefore the browser gets a file that redirects to it and that only this user can read.
 class BrowserLink {
 public:
-    /// @throws Error Io: the file cannot be made
+    /// @throws Error Io: the file cannot be created
     explicit BrowserLink(const std::string& url);
     ~BrowserLink();  ///< removes the file
     BrowserLink(const BrowserLink&) = delete;
     BrowserLink& operator=(const BrowserLink&) = delete;
-    /// False: there is no program that opens links, or it failed.
+    /// False if there is no program that opens links, or if it failed.
     [[nodiscard]] bool open() const;
 
 private:

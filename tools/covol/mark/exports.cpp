@@ -6,8 +6,8 @@
 #include <fstream>
 #include <utility>
 
-#include "cli/report.h"
-#include "cli/table.h"
+#include "cli/output/report.h"
+#include "cli/output/table.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
 #include "covol/image_stream.h"
@@ -20,7 +20,7 @@
 namespace covol::tool {
 namespace {
 
-/// A name of a file, whatever the structure is called.
+/// A valid file name, for any name of a structure.
 std::string file_name(const std::string& name, const std::string& ending) {
     std::string safe;
     for (const char c : name) safe += (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-') ? c : '_';

@@ -10,17 +10,17 @@
 
 namespace covol::tool {
 
-/// A file to be saved.
+/// A file that the page offers for download.
 struct Export {
     std::string name, bytes;
 };
 
 /// @param format  mask.nii.gz, mask.nrrd, mask.tif, mesh.ply, mesh.stl, surface.vdb, marks.csv, table.csv
-/// @param wanted  the structures that it is about; of a mesh one, or one file cannot hold them
-/// @param results  of all structures of the study: masks do not overlap, and labels do not depend on what is wanted
+/// @param wanted  the structures to export; for a mesh exactly one, because a file holds one mesh
+/// @param results  of all structures of the study, so that masks do not overlap, and labels do not depend on `wanted`
 /// @param intensity  of a structure's surface, for the table
-/// @param scratch  a folder that files are made in
-/// @throws Error InvalidInput (no such format); what making it throws.
+/// @param scratch  a folder for temporary files
+/// @throws Error InvalidInput (no such format); what the export throws.
 [[nodiscard]] Export make_export(
     const std::string& format, const StudyState& wanted, const std::function<StructuresResult()>& results,
     const std::function<std::optional<IntensityStatistics>(const StructureResult&)>& intensity, const Image& image,

@@ -44,10 +44,10 @@ std::uintmax_t bytes_in(const std::filesystem::path& folder) {
     return bytes;
 }
 
-/// None where the line lies on no slice of the image, or has too few corners.
+/// nullopt if the line is on no slice of the image, or has too few corners.
 std::optional<StudyOutline> outline_of(const std::vector<Vec3>& world, const MarkLine& line,
                                        const ImageGeometry& image) {
-    constexpr double kSlack = 0.01;  // voxels: what a text file's digits leave
+    constexpr double kSlack = 0.01;  // voxels: rounding in text files
     if (line.end - line.begin < (line.closed ? 3U : 2U)) return std::nullopt;
     Vec3 low{}, high{};
     for (std::size_t n = line.begin; n < line.end; ++n) {
@@ -61,7 +61,7 @@ std::optional<StudyOutline> outline_of(const std::vector<Vec3>& world, const Mar
         const auto a = std::size_t(axis);
         if (high[a] - low[a] > kSlack) continue;
         StudyOutline outline{0, axis, 0.5 * (low[a] + high[a]), line.closed, {}};
-        // The page draws it on a slice that it lies on up to these digits.
+        // Rounded, because the page draws an outline only on a slice with exactly this position.
         if (std::abs(outline.at - std::round(outline.at)) <= kSlack) outline.at = std::round(outline.at);
         outline.world.assign(world.begin() + std::ptrdiff_t(line.begin), world.begin() + std::ptrdiff_t(line.end));
         return outline;
@@ -97,7 +97,7 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
         throw Error(Errc::InvalidInput, "import: " + into.string() + ": holds 4 GiB; remove what no structure needs");
     const std::string digest = digest_of_bytes(bytes);
     const std::filesystem::path path = into / (digest.substr(digest.find(':') + 1) + ending);
-    // The same file again, of another structure perhaps, is there already, and stays.
+    // The file has been imported before, perhaps for another structure; it is not replaced.
     if (std::filesystem::exists(path, failed)) {
         GivenFile known(path.string());
         known.keep();
@@ -108,7 +108,7 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
     out.write(bytes.data(), std::streamsize(bytes.size()));
     out.close();
     if (!out) throw Error(Errc::Io, "import: " + path.string() + ": cannot be written");
-    // What a page sends may not have the program read other files.
+    // Data from a page must not cause the program to read other files.
     if (!is_marks && kind_of_file(path.string()) == FileKind::Image && !list_image_files(path.string(), run).empty())
         throw Error(Errc::InvalidInput, "import: expected an image in one file; this one names others");
     return file;
@@ -128,7 +128,7 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
     std::vector<bool> is_in_outline(world.size(), false);
     for (const MarkLine& line : cloud.lines) {
         std::optional<StudyOutline> outline = outline_of(world, line, image);
-        if (!outline) continue;  // its marks are good for themselves
+        if (!outline) continue;  // its marks are added one by one
         action.outlines.push_back(*std::move(outline));
         std::fill(is_in_outline.begin() + std::ptrdiff_t(line.begin), is_in_outline.begin() + std::ptrdiff_t(line.end),
                   true);

@@ -24,7 +24,7 @@ constexpr std::size_t kMaxHeadBytes = std::size_t(1) << 20;
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 30;
 static_assert(std::endian::native == std::endian::little);
 
-/// What a surface depends on of a structure and of the options; names, colours and locks are none of it.
+/// The parts of a structure and of the options that its surface depends on; not names, colours and locks.
 std::string made_from(const StudyStructure& structure, const StudyOptions& options, const std::string& of) {
     Json json{{"of", of}, {"marks", Json::array()}, {"outlines", Json::array()}, {"strokes", Json::array()}};
     for (const StudyMark& m : structure.marks) json["marks"].push_back({int(m.kind), m.world});
@@ -38,7 +38,7 @@ std::string made_from(const StudyStructure& structure, const StudyOptions& optio
 
 bool is_finite(const Json& json) { return json.is_number() && std::isfinite(json.get<double>()); }
 
-/// The figures of a file; throws where they are none.
+/// The figures of a file; throws if they are invalid.
 Json checked_figures(const Json& from) {
     const auto require = [](bool is_good) {
         if (!is_good) throw Error(Errc::InvalidInput, "kept surface: damaged");
@@ -77,7 +77,7 @@ const char* take(std::vector<Element>& list, const char* from) {
     return from + list.size() * sizeof(Element);
 }
 
-/// The mesh behind a file's head. Nothing is taken on trust.
+/// The mesh after a file's header. The content is not trusted, and is validated.
 TriangleMesh parse_mesh(const Json& head, std::string_view bytes) {
     using Vertex = decltype(TriangleMesh::vertices)::value_type;
     using Triangle = decltype(TriangleMesh::triangles)::value_type;

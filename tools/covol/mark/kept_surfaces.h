@@ -3,16 +3,17 @@
 #include <optional>
 #include <string>
 
-#include "cli/json.h"
+#include "cli/output/json.h"
 #include "covol/mesh.h"
 #include "covol/study.h"
 
 namespace covol::tool {
 
-/// Surfaces of a study, kept in its folder: when it is opened again they are there at once, until they are found anew.
+/// Surfaces of a study that are stored in its folder: when the study is opened again they are shown until they have
+/// been recomputed.
 class KeptSurfaces {
 public:
-    /// @param of  what they were made from beside the structures: the image, and the program
+    /// @param of  identifies what else they were computed from: the image, and the program
     KeptSurfaces(const std::string& folder, std::string of);
 
     struct Kept {
@@ -20,9 +21,9 @@ public:
             figures;  ///< of a message `result`: triangles, volume, area, extent, mean, sd, expected, warnings, seconds
         std::shared_ptr<const TriangleMesh> mesh;
     };
-    /// None where nothing is kept that was made from exactly this. The file may come from anywhere.
+    /// nullopt if no surface of exactly this input is stored. The file may come from an untrusted source.
     [[nodiscard]] std::optional<Kept> find(const StudyStructure& structure, const StudyOptions& options) const;
-    /// A folder that cannot be written keeps nothing: the surface is found anew then.
+    /// If the folder is not writable nothing is stored, and the surface is recomputed later.
     void keep(const StudyStructure& structure, const StudyOptions& options, const Json& result,
               const TriangleMesh& mesh) const;
 

@@ -8,7 +8,7 @@
 
 namespace covol::tool {
 
-const char* word_of(StudyResult::Stage stage) {
+const char* stage_name(StudyResult::Stage stage) {
     switch (stage) {
         case StudyResult::Stage::Empty: return "empty";
         case StudyResult::Stage::Working: return "working";
@@ -23,8 +23,8 @@ std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::e
 
 Json result_json(const StudyResult& result, std::uint64_t version,
                  const std::optional<IntensityStatistics>& intensity) {
-    Json json{{"structure", result.structure},  {"version", version},          {"seq", result.sequence},
-              {"stage", word_of(result.stage)}, {"progress", result.progress}, {"message", result.message},
+    Json json{{"structure", result.structure},     {"version", version},          {"seq", result.sequence},
+              {"stage", stage_name(result.stage)}, {"progress", result.progress}, {"message", result.message},
               {"seconds", result.seconds}};
     if (!result.surface) return json;
     const SegmentReport& report = result.surface->report;
@@ -78,7 +78,7 @@ Json structure_json(const StudyStructure& structure, const Json& result) {
               {"strokes", std::move(strokes)},
               {"guess", nullptr},
               {"result", result}};
-    if (structure.guess)  // pages need not know where it lies
+    if (structure.guess)  // its path is not sent to pages
         json["guess"] = {{"name", std::filesystem::path(structure.guess->path).filename().string()},
                          {"label", structure.guess->label}};
     return json;

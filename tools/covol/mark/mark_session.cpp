@@ -20,8 +20,8 @@ namespace covol::tool {
 namespace {
 
 constexpr int kSuggestions = 5;
-constexpr std::uint64_t kKeptVersion = 1;  // of surfaces from when the study was open before; later ones come after it
-constexpr double kMaxRead = double(1 << 27);  // voxels of an image in chunks, for a mean intensity
+constexpr std::uint64_t kKeptVersion = 1;     // of kept surfaces from an earlier session; later versions are larger
+constexpr double kMaxRead = double(1 << 27);  // voxels of an image in chunks that are read for a mean intensity
 
 serve::Response refused(int status, const std::string& why) {
     serve::Response response;
@@ -30,7 +30,8 @@ serve::Response refused(int status, const std::string& why) {
     return response;
 }
 
-/// Where marks and edges hold all of a surface: its places that lie farthest from marks, and from each other.
+/// For surfaces that are fully supported by marks and edges: the positions on them that are farthest from marks, and
+/// from each other.
 std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMesh& mesh, int count) {
     std::vector<Vec3> places;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) places.push_back(mesh.place(v));
@@ -63,9 +64,9 @@ RunContext quiet(RunContext run) {
 
 MarkSession::MarkSession(Study study, std::unique_ptr<PageImage> seen, std::function<Image()> image, MarkView view,
                          const RunContext& run)
-    : seen_(std::move(seen)),
+    : page_image_(std::move(seen)),
       image_(std::move(image)),
-      geometry_(seen_->image().geometry()),
+      geometry_(page_image_->image().geometry()),
       view_(std::move(view)),
       run_(quiet(run)),
       kept_(study.folder(), view_.image_digest),
@@ -79,11 +80,11 @@ void MarkSession::start(Send send, Broadcast broadcast) {
     const std::lock_guard lock(mutex_);
     std::vector<StudyId> unknown;
     for (const auto& structure : study_.state())
-        if (!take_kept(structure)) unknown.push_back(structure->id);
+        if (!show_kept(structure)) unknown.push_back(structure->id);
     follow(unknown);
 }
 
-bool MarkSession::take_kept(const std::shared_ptr<const StudyStructure>& structure) {
+bool MarkSession::show_kept(const std::shared_ptr<const StudyStructure>& structure) {
     std::optional<KeptSurfaces::Kept> kept = kept_.find(*structure, study_.history().options());
     if (!kept) return false;
     Solved& solved = solved_[structure->id];
@@ -92,18 +93,18 @@ bool MarkSession::take_kept(const std::shared_ptr<const StudyStructure>& structu
     solved.version = kKeptVersion;
     solved.kept = std::move(kept->mesh);
     solved.reported = std::move(kept->figures);
-    // It is a first one: the image may have changed where its digest does not look.
+    // Reported as the first stage only: the image may differ in parts that its digest does not cover.
     solved.reported.update({{"structure", structure->id},
                             {"version", solved.version},
                             {"seq", solved.requested},
-                            {"stage", word_of(StudyResult::Stage::First)},
+                            {"stage", stage_name(StudyResult::Stage::First)},
                             {"progress", 0},
                             {"message", ""}});
     solver_->confirm(structure, solved.requested);
     return true;
 }
 
-/// Solves what has other marks now. @pre locked
+/// Starts the solver for structures with changed marks. @pre locked
 void MarkSession::follow(const std::vector<StudyId>& structures) {
     for (const StudyId id : structures) {
         const auto structure = study_.history().find(id);
@@ -121,12 +122,12 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
     }
 }
 
-/// On the solver's thread.
+/// Called on the solver's thread.
 void MarkSession::receive(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
     Json reported;
-    std::shared_ptr<const StudyStructure> from;  // what is to be kept
+    std::shared_ptr<const StudyStructure> from;  // to be kept
     StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
         intensity = intensity_within(image_(), *result.surface->surface, kMaxRead, run_);
@@ -141,7 +142,7 @@ void MarkSession::receive(const StudyResult& result) {
             solved.version = 0;
         }
         if (result.surface) {
-            // Pages that have the same one do not ask for it again.
+            // Pages that already have the same mesh do not request it again.
             const bool is_same = solved.kept && is_same_mesh(*solved.kept, result.surface->mesh);
             if (!is_same) {
                 solved.kept = nullptr;
@@ -193,9 +194,9 @@ void MarkSession::message(serve::Client client, std::string_view text) {
     try {
         act(client, text);
     } catch (const Error& error) {
-        // Without a key nobody waits for an answer.
+        // Without a key, the page cannot assign the answer to an action.
         const Json sent = Json::parse(text, nullptr, false);
-        constexpr std::string_view kSource = "study: ";  // which goes without saying
+        constexpr std::string_view kSource = "study: ";  // a prefix that is redundant on the page
         std::string_view why = error.what();
         if (why.starts_with(kSource)) why.remove_prefix(kSource.size());
         Json answer{{"failed", nullptr}, {"why", why}};
@@ -231,7 +232,7 @@ void MarkSession::publish(const StudyHistory::Changed& changed) {
     if (changed.options) {
         solver_->set_options(options());
         for (auto& [id, solved] : solved_) {
-            solved.from = nullptr;  // with other options it has another surface
+            solved.from = nullptr;  // its surface depends on the options
             structures.push_back(id);
         }
     }
@@ -286,10 +287,10 @@ serve::Response MarkSession::get(const serve::Request& request) {
             response.body = view_.page;
             return response;
         }
-        if (request.path == "/image") return seen_->facts();
-        if (request.path == "/channel") return seen_->channel(request);
-        if (request.path == "/oblique") return seen_->oblique(request);
-        if (request.path == "/slice") return seen_->slice(request);
+        if (request.path == "/image") return page_image_->facts();
+        if (request.path == "/channel") return page_image_->channel(request);
+        if (request.path == "/oblique") return page_image_->oblique(request);
+        if (request.path == "/slice") return page_image_->slice(request);
         if (request.path == "/mesh") return mesh(request);
         if (request.path == "/export") return download(request);
     } catch (const Error& error) {
@@ -390,7 +391,7 @@ serve::Response MarkSession::download(const serve::Request& request) {
     Export made = make_export(
         format->second, state, [&] { return results(); },
         [&](const StructureResult& s) { return intensity_within(image_(), *s.result.surface, kMaxRead, run_); },
-        seen_->image(), study_.folder(), run_);
+        page_image_->image(), study_.folder(), run_);
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = std::move(made.bytes);

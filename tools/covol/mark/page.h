@@ -3,7 +3,7 @@
 
 namespace covol::detail {
 
-/// The page of `covol mark`, HTML: tools/covol/mark/mark.html, which tools/viewer makes; the build embeds it.
+/// The page of `covol mark`, HTML: tools/covol/mark/mark.html, which tools/viewer generates and the build embeds.
 [[nodiscard]] std::string_view mark_page();
 
 }  // namespace covol::detail

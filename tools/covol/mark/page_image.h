@@ -14,14 +14,14 @@
 
 namespace covol::tool {
 
-/// The channels of an image that has several: one is marked, the others are seen beside it.
+/// The channels of an image with several: one is marked, the others are displayed with it.
 struct PageChannels {
     std::vector<std::string> names;        ///< of all; empty: the image has one channel
-    int own = 0;                           ///< the one that is marked
-    std::function<ImageLevels(int)> open;  ///< another one, on the same lattice
+    int own = 0;                           ///< the marked one
+    std::function<ImageLevels(int)> open;  ///< opens another one, on the same lattice
 };
 
-/// What a page sees of an image. Its functions may be called from any thread.
+/// An image as displayed by a page. Its functions may be called from any thread.
 class PageImage {
 public:
     /// @param title  the image's name
@@ -37,7 +37,7 @@ public:
 private:
     struct Channel {
         ImageLevels levels;
-        std::array<double, 2> range{0, 1}, window{0, 1};  // of brightness: coded; shown at first
+        std::array<double, 2> range{0, 1}, window{0, 1};  // of brightness: for encoding, and shown initially
     };
     [[nodiscard]] Channel made_of(ImageLevels levels) const;
     [[nodiscard]] const Channel& channel_of(const serve::Request& request) const;
@@ -48,7 +48,7 @@ private:
     const PageChannels channels_;
     const Channel own_;
     mutable std::mutex mutex_;
-    mutable std::map<int, Channel> others_;  // those that were asked for
+    mutable std::map<int, Channel> others_;  // channels that were requested
 };
 
 }  // namespace covol::tool

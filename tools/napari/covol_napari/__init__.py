@@ -1,1 +1,1 @@
-"""A plugin of napari that segments with covol."""
+"""A napari plugin for segmentation with covol."""

@@ -1,6 +1,6 @@
-"""Between napari's layers and covol: what a layer holds, where it lies, and what goes back as layers.
+"""Converts napari's layers to inputs of covol, and results to layers.
 
-Nothing here needs napari: a layer is anything with `data` and the attributes of its transform, and results are napari's
+This module does not need napari: a layer is any object with `data` and the attributes of its transform, and results are napari's
 layer-data tuples. napari's world is z, y, x; covol's is x, y, z; otherwise they are the same.
 """
 import numpy as np
@@ -11,9 +11,9 @@ ELLIPSE_POINTS = 48
 
 
 def transform_of(layer):
-    """4 x 4, the last three axes of a layer's data (z, y, x) to napari's world.
+    """4 x 4 matrix from the last three axes of a layer's data (z, y, x) to napari's world.
 
-    The layer's scale, shear, rotation and translation in this order, then its affine, as napari composes them.
+    Composes the layer's scale, shear, rotation and translation in this order, then its affine, as napari does.
     """
     scale = _last(getattr(layer, "scale", None), 1.0)
     matrix = np.eye(4)
@@ -31,7 +31,7 @@ def transform_of(layer):
 
 
 def _last(values, missing):
-    """Of the last three axes."""
+    """The values of the last three axes."""
     if values is None:
         return np.full(3, missing)
     values = np.asarray(values, float)
@@ -47,7 +47,7 @@ def _square(matrix):
 
 
 def _shear(shear):
-    """A matrix, or the values above the diagonal row by row."""
+    """The shear matrix, given as a matrix, or as the values above the diagonal in row-major order."""
     if shear is None:
         return np.eye(3)
     given = np.asarray(shear, float)
@@ -59,7 +59,7 @@ def _shear(shear):
 
 
 def geometry_of(layer):
-    """spacing, origin and direction of an image layer, as covol.segment() takes them."""
+    """spacing, origin and direction of an image layer, as for covol.segment()."""
     matrix = transform_of(layer)
     turned = matrix[:3, :3][::-1, ::-1]
     spacing = np.linalg.norm(turned, axis=0)
@@ -67,7 +67,7 @@ def geometry_of(layer):
 
 
 def voxels_of(layer, step=()):
-    """(nz, ny, nx) of an image or labels layer; of one with more axes those at the viewer's `step`."""
+    """(nz, ny, nx) voxels of an image or labels layer; of layers with more axes, those at the viewer's `step`."""
     data = layer.data
     if getattr(layer, "multiscale", False):
         data = data[0]
@@ -80,7 +80,7 @@ def voxels_of(layer, step=()):
 
 
 def world_of(layer, positions, step=()):
-    """(n, 3), x, y, z in the world, of positions in a layer's data; of more axes those at the viewer's `step`."""
+    """(n, 3), x, y, z in the world, of positions in a layer's data; if there are more axes, those at the viewer's `step`."""
     positions = np.asarray(positions, float)
     if positions.ndim != 2 or positions.shape[1] < 3:
         raise covol.Error(f"covol: expected marks with three coordinates, got shape {positions.shape}", "invalid_input",
@@ -92,16 +92,16 @@ def world_of(layer, positions, step=()):
 
 
 def lines_of(layer, step=()):
-    """Of a shapes layer: (closed outlines, other marks), both x, y, z in the world."""
+    """The contents of a shapes layer: (closed outlines, other marks), both x, y, z in the world."""
     closed, marks = [], []
     kinds = layer.shape_type
     for n, corners in enumerate(layer.data):
         kind = kinds if isinstance(kinds, str) else kinds[n]
-        if kind == "ellipse":  # its box's corners
+        if kind == "ellipse":  # given by the corners of its box
             middle, a, b = np.mean(corners, 0), (corners[1] - corners[0]) / 2, (corners[3] - corners[0]) / 2
             t = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS, endpoint=False)[:, None]
             corners = middle + np.cos(t) * a + np.sin(t) * b
-        elif kind == "rectangle":  # corners alone would be rounded off
+        elif kind == "rectangle":  # densified, because the smooth surface through the corners alone would be rounded
             corners = np.concatenate([np.linspace(corners[c], corners[(c + 1) % 4], 12, endpoint=False) for c in range(4)])
         line = world_of(layer, corners, step)
         if len(line):
@@ -110,9 +110,9 @@ def lines_of(layer, step=()):
 
 
 def segment(image, points=None, shapes=None, labels=None, labels_as="painted", suggestions=3, step=(), **options):
-    """Runs covol on layers. @return layer-data tuples: Labels, Surface and, where there are any, suggested Points.
+    """Runs covol on layers. @return layer-data tuples: Labels, Surface and, if there are any, suggested Points.
 
-    labels_as: "painted" (some slices, or strokes), "guess" (another result that the marks correct) or "init" (a start).
+    labels_as: "painted" (some slices, or strokes), "guess" (another result that is corrected by the marks) or "init" (a start).
     """
     marks = [world_of(points, points.data, step)] if points is not None else []
     given = dict(options)
@@ -132,18 +132,18 @@ def segment(image, points=None, shapes=None, labels=None, labels_as="painted", s
 
 
 def units_of(layer):
-    """Of a layer's last three axes, as napari from 0.5.5 on has them; None of an older one."""
+    """Units of a layer's last three axes, in napari from 0.5.5; None in older versions."""
     units = getattr(layer, "units", None)
     return None if units is None or len(units) < 3 else tuple(units[-3:])
 
 
 def layers_of(result, transform, name, suggestions=0, units=None):
-    """@param transform  of the image's data to napari's world @param units  of its three axes: the scale bar's"""
+    """@param transform  from the image's data to napari's world @param units  of its three axes, for the scale bar"""
     mesh = result.mesh
     about = {"metadata": {"covol": result.report}, **({} if units is None else {"units": units})}
     made = [
         (result.mask, {"name": f"{name} covol", "affine": transform, **about}, "labels"),
-        # another order of the axes is a mirror: corners in reverse keep the outside outside
+        # reversing the axes is a reflection: the corners are reversed, too, to keep the orientation
         ((mesh.vertices[:, ::-1].copy(), mesh.faces[:, ::-1].astype(np.int64)), {"name": f"{name} covol surface", **about}, "surface"),
     ]
     found = result.suggest(suggestions) if suggestions > 0 else []
@@ -156,8 +156,8 @@ def layers_of(result, transform, name, suggestions=0, units=None):
 
 
 def show(viewer, made):
-    """Puts layer-data tuples into a viewer: into the layers of the last result of the same name, which keep their place, colours and
-    visibility, or into new ones. Suggested places that are done with go.
+    """Adds layer-data tuples to a viewer: to the layers of the last result of the same name, which keep their place, colours and
+    visibility, or as new layers. Outdated suggestions are removed.
     """
     for data, meta, kind in made:
         last = _shown(viewer, meta["name"], kind)
@@ -175,7 +175,7 @@ def show(viewer, made):
 
 
 def _shown(viewer, name, kind):
-    """The layer of that name and kind that a result was put into; a person's own layer is none."""
+    """The layer of that name and kind that contains a result; layers of the user are not considered."""
     for layer in viewer.layers:
         if layer.name == name and type(layer).__name__.lower() == kind and "covol" in layer.metadata:
             return layer

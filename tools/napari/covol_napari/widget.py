@@ -1,4 +1,4 @@
-"""The plugin's panel. What it does stands in layers.py; this file alone needs napari, magicgui and Qt."""
+"""The plugin's panel. Its functions are in layers.py; only this file needs napari, magicgui and Qt."""
 
 
 def make_widget():

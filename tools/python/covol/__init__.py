@@ -1,4 +1,4 @@
-"""covol finds the surface of a structure in a 3D image with the help of a few marks, and the surface behind a point cloud.
+"""covol finds the surface of a structure in a 3D image with the help of a few marks, and reconstructs surfaces from point clouds.
 
     import covol
     result = covol.segment(volume, marks, spacing=(0.35, 0.35, 1.0))
@@ -6,14 +6,14 @@
     result.mesh.vertices   # (n, 3), x, y, z
     result.save("cell.vdb")
 
-Arrays of voxels are indexed z, y, x, as SimpleITK's GetArrayFromImage() and tifffile give them. Positions, `spacing`, `origin`
-and `direction` are x, y, z in the image's own unit: world = origin + direction @ (spacing * (i, j, k)), LPS where it is anatomical,
-as SimpleITK has it; voxel centres are at whole numbers.
+Arrays of voxels are indexed z, y, x, as in SimpleITK's GetArrayFromImage() and tifffile. Positions, `spacing`, `origin` and
+`direction` are x, y, z in the image's own unit: world = origin + direction @ (spacing * (i, j, k)), in LPS if it is anatomical,
+as in SimpleITK; voxel centres are at whole numbers.
 
-Lengths among the options are world units, or voxels of the computation as in "3vx". An option that is None is chosen
-automatically. All of them: `covol.options()`, and docs/commands/segment.md, where they have the same names as flags.
+Lengths among the options are in world units, or in voxels of the computation ("3vx"). Options that are None are chosen
+automatically. They are listed by `covol.options()`, and in docs/commands/segment.md, where the flags have the same names.
 
-Functions raise covol.Error, with `code` and `field`. They release the GIL while they compute, and Ctrl-C stops them.
+Functions raise covol.Error, with `code` and `field`. They release the GIL while they compute, and Ctrl-C cancels them.
 """
 import os
 
@@ -40,28 +40,28 @@ __all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Structures
 def segment(image, points=None, *, contours=None, painted=None, painted_outside=0, painted_as="auto", inside=None, outside=None,
             guess=None, init=None, spacing=None, origin=None, direction=None, affine=None, points_space=None, points_order=None,
             points_scale=1.0, progress=None, threads=0, memory_limit=0, **options):
-    """The surface of a structure in a 3D image, found with the help of marks.
+    """Finds the surface of a structure in a 3D image with the help of marks.
 
     Args:
-        image: array of shape (nz, ny, nx), of integers, floats or bools, with any strides; it is not copied where its numbers
-            are of at most 32 bits, or doubles, and must not change meanwhile. Or an Image, a file's path, or an image of nibabel.
+        image: array of shape (nz, ny, nx), of integers, floats or bools, with any strides; it is not copied if its values
+            have at most 32 bits or are doubles, and must not change during the call. Or an Image, a file's path, or an image of nibabel.
         points: marks on the surface, shape (n, 3); or Points, or a file.
         contours: closed lines of marks on slices: a list of arrays of shape (n, 3), Points, or a file.
-        painted: label image of the image's shape with one label, painted on some slices or in some places.
-        painted_outside: a label in it that was painted on what is outside; 0: none.
-        painted_as: "auto", "slices" (which show whole cross-sections) or "scribbles" (which are inside).
-        inside, outside: positions whose side is known, shape (n, 3); or Points, or a file.
-        guess: another program's result that the marks correct: a mask of the image's shape, a LevelSet or a file.
-        init: how the level set starts, as the flag --init: "tag", "sphere:x,y,z,r", ...; or a mask or a LevelSet.
-        spacing, origin: three numbers, x, y, z, in the unit of the world; 1 and 0 where an array comes without.
-        direction: 3 x 3 (or its nine numbers row by row), whose columns are the image's axes i, j, k; perpendicular.
-        affine: instead of these three a 4 x 4 matrix from voxels (i, j, k) to RAS, as nibabel has it.
-        points_space: "world" (taken where nothing is stated), "index" (voxels from 0), "index1", "ras" or "local".
-        points_order: "xyz" (taken where nothing is stated) or "zyx".
-        points_scale: multiplies lengths of points.
-        progress: called with (stage, fraction) from the calling thread; what it raises stops the computation.
-        threads: at most so many; 0: all cores. Results do not depend on it.
-        memory_limit: bytes that may be taken; 0: no bound.
+        painted: label image of the image's shape with one label, painted on some slices or at some positions.
+        painted_outside: a label in it that marks the outside; 0: none.
+        painted_as: "auto", "slices" (complete cross-sections) or "scribbles" (inside, but incomplete).
+        inside, outside: positions that are known to be inside or outside, shape (n, 3); or Points, or a file.
+        guess: another program's result, which is corrected by the marks: a mask of the image's shape, a LevelSet or a file.
+        init: the start of the level set, as for the flag --init: "tag", "sphere:x,y,z,r", ...; or a mask or a LevelSet.
+        spacing, origin: three numbers, x, y, z, in world units; 1 and 0 by default for arrays.
+        direction: 3 x 3 (or nine numbers in row-major order), whose columns are the image's axes i, j, k; orthogonal.
+        affine: instead of these three, a 4 x 4 matrix from voxels (i, j, k) to RAS, as in nibabel.
+        points_space: "world" (default if the file states none), "index" (voxels from 0), "index1", "ras" or "local".
+        points_order: "xyz" (default if the file states none) or "zyx".
+        points_scale: factor for the coordinates of points.
+        progress: called with (stage, fraction) from the calling thread; exceptions that it raises cancel the computation.
+        threads: maximum number of threads; 0: all cores. Results do not depend on it.
+        memory_limit: maximum memory in bytes; 0: no limit.
         **options: see covol.options().
 
     Returns:
@@ -81,13 +81,13 @@ def segment(image, points=None, *, contours=None, painted=None, painted_outside=
 def structures(image, marks=None, *, painted=None, painted_outside=0, painted_as="auto", init=None, spacing=None, origin=None,
                direction=None, affine=None, points_space=None, points_order=None, points_scale=1.0, progress=None, threads=0,
                memory_limit=0, **options):
-    """The surfaces of several structures in one image. They are made disjoint, and measured as they then are.
+    """Finds the surfaces of several structures in one image. They are made disjoint before they are measured.
 
     Args:
-        marks: dict of the structures' names; each has its points, or a dict of what segment() takes: points, contours, inside,
-            outside, guess, init, exterior_seed, and `painted`, a label image with one label, which is paint of this structure alone.
-        painted: label image of the image's shape. Each label belongs to the structure of its name, or is one more: "label3", or
-            what a .seg.nrrd calls it. Paint of one structure is outside of the others.
+        marks: dict by the structures' names; each value is an array of points, or a dict of arguments of segment(): points,
+            contours, inside, outside, guess, init, exterior_seed, and `painted`, a label image with one label for this structure only.
+        painted: label image of the image's shape. A label belongs to the structure of the same name, or to an additional one: "label3", or
+            its name in a .seg.nrrd. Painted voxels of one structure are outside of the others.
         image, painted_outside, painted_as, init, spacing, origin, direction, affine, points_space, points_order, points_scale,
             progress, threads, memory_limit, **options: see segment().
 
@@ -95,7 +95,7 @@ def structures(image, marks=None, *, painted=None, painted_outside=0, painted_as
         Structures.
 
     Raises:
-        Error, KeyboardInterrupt: as segment(); of one structure the message begins with its name.
+        Error, KeyboardInterrupt: as segment(); messages about one structure begin with its name.
     """
     return Structures(*_run("structures", image, marks or {}, (painted, painted_outside, painted_as), init,
                             {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine},
@@ -103,17 +103,17 @@ def structures(image, marks=None, *, painted=None, painted_outside=0, painted_as
 
 
 def timelapse(frames, marks=None, **keywords):
-    """Segments the frames of a time-lapse one after the other: each starts from the surfaces in the last one that succeeded.
+    """Segments the frames of a time-lapse one after the other: each starts from the surfaces of the last one that succeeded.
 
     Args:
-        frames: images as segment() takes them, in their order, or pairs (image, marks) where a later frame has marks, too. They
-            are asked for one by one.
-        marks: of the first frame: points, a dict of what segment() takes (points, contours, inside, outside, exterior_seed), or
-            for several structures a dict of these by name, as structures() takes it.
-        **keywords: spacing and the like, and options, as of segment().
+        frames: images as for segment(), in order, or pairs (image, marks) for later frames with marks of their own. The iterable
+            is consumed one by one.
+        marks: of the first frame: points, a dict of arguments of segment() (points, contours, inside, outside, exterior_seed), or
+            for several structures a dict of these by name, as for structures().
+        **keywords: spacing and similar arguments, and options, as for segment().
 
     Yields:
-        Result of each frame, or Structures; the Error in place of a frame that failed.
+        Result of each frame, or Structures; for a frame that failed, its Error.
 
     Raises:
         KeyboardInterrupt: after Ctrl-C.
@@ -133,22 +133,22 @@ def timelapse(frames, marks=None, **keywords):
         except Error as error:
             return error
 
-    # The package that runs the program gives it all frames together.
+    # The package that runs the program passes all frames to it at once.
     for found in lapse.follow(frames, go) if hasattr(lapse, "follow") else map(go, frames):
         yield found if isinstance(found, Error) else Structures(*found) if several else found[0][0]
 
 
 def reconstruct(points=None, *, contours=None, inside=None, outside=None, init=None, normals=None, points_space=None,
                 points_order=None, points_scale=1.0, progress=None, threads=0, memory_limit=0, **options):
-    """The closed surface behind a point cloud, without an image and without normals.
+    """Reconstructs the closed surface that a point cloud samples, without an image and without normals.
 
     Args:
-        points: positions, shape (n, 3), in world units; or Points, or a file. Normals that Points have are looked at.
-        normals: unit vectors, shape (n, 3), of `points` where these are an array. They are checked and not trusted.
+        points: positions, shape (n, 3), in world units; or Points, or a file. Their normals are taken into account.
+        normals: unit vectors, shape (n, 3), if `points` is an array. They are checked before they are used.
         contours, inside, outside, init, points_order, points_scale, progress, threads, memory_limit, **options: see segment().
 
     Returns:
-        Result; it has no image, and so no mask.
+        Result; it has no image, and therefore no mask.
 
     Raises:
         Error, KeyboardInterrupt: as segment().
@@ -165,7 +165,7 @@ def _run(function, image, marks, painted, init, geometry, reading, call, options
     reading = dict(zip(("points_space", "points_order", "points_scale"), reading))
 
     def like(value):
-        """A mask or the like; arrays lie where the image does."""
+        """Converts a mask or similar value; arrays have the geometry of the image."""
         is_array = not (value is None or _inputs.is_path(value) or isinstance(value, (Image, LevelSet, Result)))
         own = volume is not None and is_array and not hasattr(value, "affine")
         return _inputs.shape(value, **({key: getattr(volume, key) for key in ("spacing", "origin", "direction")} if own else {}))
@@ -176,11 +176,11 @@ def _run(function, image, marks, painted, init, geometry, reading, call, options
 
 
 class Structures(dict):
-    """What structures() returns: a dict of Results by name.
+    """The result of structures(): a dict of Results by name.
 
     Attributes:
-        overlaps: dicts of what two structures claimed and was divided: "structures" (two names), "volume" (world units^3) and,
-            where one was carved out of the other, "inner".
+        overlaps: dicts that describe overlaps of two structures that were resolved: "structures" (two names), "volume" (world
+            units^3) and, if one was removed from the other, "inner".
     """
 
     def __init__(self, results, overlaps):
@@ -191,22 +191,22 @@ class Structures(dict):
 
     @property
     def mask(self):
-        """Labels of the image's shape: Result.label where a voxel's centre is inside, else 0."""
+        """Labels of the image's shape: Result.label if a voxel's centre is inside, otherwise 0."""
         values = np.array([0, *(result.label for result in self.values())])
         return values.astype(np.min_scalar_type(values.max()))[_covol.label_image(list(self.values()), _inputs.call())]
 
 
 def mesh(surface, *, isovalue=0.0, min_component=0.0, target_edge=0.0, adaptive=0.0, smooth=0, repair=False, progress=None,
          threads=0):
-    """Closed, manifold, outward triangles of a level set.
+    """Extracts a closed, manifold, outward oriented mesh of a level set.
 
     Args:
         surface: LevelSet, Result or the path of a .vdb file.
-        isovalue: this level outside the surface, a length.
-        min_component: pieces smaller than a cube of this edge are dropped.
+        isovalue: offset of the level from the surface, a length; > 0: outside.
+        min_component: components smaller than a cube of this edge are removed.
         target_edge: > 0: decimate to about this edge length.
-        adaptive: > 0: decimate as far as no triangle comes farther from the level set, at most "2vx".
-        smooth: steps of volume-keeping smoothing.
+        adaptive: > 0: decimate as long as no triangle is farther than this from the level set; at most "2vx".
+        smooth: steps of volume-preserving smoothing.
         repair: resolve self-intersections, fill holes.
 
     Returns:
@@ -217,11 +217,11 @@ def mesh(surface, *, isovalue=0.0, min_component=0.0, target_edge=0.0, adaptive=
 
 
 def mask(surface, like, *, label=1, spacing=None, origin=None, direction=None, affine=None, progress=None, threads=0):
-    """Label image of a level set: `label` where a voxel's centre is inside, else 0.
+    """Label image of a level set: `label` if a voxel's centre is inside, otherwise 0.
 
     Args:
         surface: LevelSet, Result or the path of a .vdb file.
-        like: Image, array or file whose voxels the mask gets, as in segment().
+        like: Image, array or file with the voxels of the mask, as in segment().
         label: 1 to 255.
 
     Returns:
@@ -232,11 +232,11 @@ def mask(surface, like, *, label=1, spacing=None, origin=None, direction=None, a
 
 
 def compare(a, b, *, label=0, label_b=None, spacing=None, origin=None, direction=None, affine=None, progress=None, threads=0):
-    """Overlap and surface distances of two solids.
+    """Computes overlap and surface distances of two solids.
 
     Args:
-        a, b: masks (arrays, Images), Mesh, LevelSet, Result, or files of these, in any mix.
-        label: of masks; 0: any label. label_b: of b, where it differs.
+        a, b: masks (arrays, Images), Mesh, LevelSet, Result, or files of these, in any combination.
+        label: of masks; 0: any label. label_b: of b, if it differs.
         spacing, origin, direction, affine: of arrays, as in segment().
 
     Returns:
@@ -255,19 +255,19 @@ def compare(a, b, *, label=0, label_b=None, spacing=None, origin=None, direction
 
 
 def distances(points, surface, *, progress=None, threads=0):
-    """How far points, shape (n, 3), lie from a surface (Mesh, LevelSet or Result): dict with mean, p95 and max, world units."""
+    """Distances of points, shape (n, 3), from a surface (Mesh, LevelSet or Result): dict with mean, p95 and max, world units."""
     triangles = surface if isinstance(surface, Mesh) else surface.mesh if isinstance(surface, Result) else mesh(surface)
     return _covol.distances(points, triangles, _inputs.call(progress, threads))
 
 
 class Suggestion:
-    """A slice where marks would help.
+    """A slice on which marks would improve the result.
 
     Attributes:
         slice: its index along z, from 0.
-        index: (z, y, x), the place in it where they would help most, in voxels.
+        index: (z, y, x), the position in it that is expected to improve the result most, in voxels.
         world: (x, y, z), the same in the world.
-        area: the surface that marks along the outline there would hold, world units^2.
+        area: the part of the surface that marks along the outline there would support, world units^2.
     """
 
     __slots__ = ("slice", "index", "world", "area")
@@ -280,12 +280,12 @@ class Suggestion:
 
 
 def suggest(result, count=3, *, progress=None, threads=0):
-    """The slices of a segmented image where new marks would help most, best first: a list of at most `count` Suggestions."""
+    """The slices of an image on which new marks would improve the result most, best first: a list of at most `count` Suggestions."""
     return [Suggestion(*found) for found in _covol.Result._suggest(result, count, _inputs.call(progress, threads))]
 
 
 def read_level_set(path):
-    """The LevelSet of a .vdb file; of several in it "FILE.vdb:NAME" picks one. Raises Error."""
+    """The LevelSet of a .vdb file; "FILE.vdb:NAME" selects one of several. Raises Error."""
     return _covol.read_level_set(os.fspath(path))
 
 
@@ -300,12 +300,12 @@ def save_mask(path, voxels, like):
 
 
 def phantom(kind="sphere", size=128, points=3000, noise=0.0, seed=1):
-    """A test shape: (Image, points of shape (n, 3), its true labels of the image's shape); kinds as of `covol phantom`."""
+    """A test shape: (Image, points of shape (n, 3), its true labels of the image's shape); kinds as for `covol phantom`."""
     return _covol.phantom(kind, size, points, noise, seed)
 
 
 def options():
-    """The options of segment() and reconstruct() and their defaults; None is chosen automatically. reconstruct() has rho = 0."""
+    """The options of segment() and reconstruct() and their defaults; None: chosen automatically. reconstruct() has rho = 0."""
     return {name: default for name, _, default in _covol.list_options()}
 
 
@@ -315,11 +315,11 @@ def _level_set(surface):
     return read_level_set(surface) if _inputs.is_path(surface) else surface
 
 
-# ---- what Python adds to the types of the extension module ------------------------------------------------------------------
+# ---- members that are added to the types of the extension module ------------------------------------------------------------
 
 
 def _once(make):
-    """A property that is made when it is first asked for."""
+    """A property that is computed on first access."""
     name = "_made_" + make.__name__
 
     def get(self):
@@ -336,12 +336,12 @@ def _result_report(self):
 
 
 def _result_mask(self):
-    """uint8 array of the image's shape: 1 inside. Of a guess that was a mask, its own labels, corrected."""
+    """uint8 array of the image's shape: 1 inside. If the guess was a mask, its own labels, corrected."""
     return self._mask(_inputs.call())
 
 
 def _save_result(self, path):
-    """Writes the level set (.vdb), the mesh (.ply, .obj, .stl, .off, .glb) or the mask (as save_mask()), by the name's end."""
+    """Writes the level set (.vdb), the mesh (.ply, .obj, .stl, .off, .glb) or the mask (as save_mask()), depending on the ending."""
     path = os.fspath(path)
     ending = os.path.splitext(path.lower())[1]
     if ending == ".vdb":
@@ -372,28 +372,28 @@ read_image.__doc__ = """Reads a 3D image in its own number type.
 
 Args:
     path: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5 or .vdb, see docs/formats.md.
-    spacing: instead of the file's. channel, frame: of several. roi: two corners of the world.
+    spacing: instead of the file's. channel, frame: of images with several. roi: two corners in world coordinates.
 
 Returns:
-    Image: array (z, y, x; shares the file's memory where it is mapped), spacing, origin, direction, unit. Raises Error.
+    Image: array (z, y, x; uses the memory of the file if that is mapped), spacing, origin, direction, unit. Raises Error.
 """
 read_points.__doc__ = """Reads marks or a cloud: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, PLY, OBJ, PCD, LAS.
 
 Args:
-    path: see docs/formats.md. points_space, points_order, points_scale, points_channels: instead of what the format says.
+    path: see docs/formats.md. points_space, points_order, points_scale, points_channels: instead of those that the format defines.
 
 Returns:
-    Points: array of shape (n, 3) in its `space`, lines, normals; to_world(image) gives world positions. Raises Error.
+    Points: array of shape (n, 3) in its `space`, lines, normals; to_world(image) returns world positions. Raises Error.
 """
-read_study.__doc__ = """The structures and marks of a study of `covol mark`; structures(image, read_study(folder)) gives their surfaces.
+read_study.__doc__ = """The structures and marks of a study of `covol mark`; structures(image, read_study(folder)) computes their surfaces.
 
 Args:
-    folder: of the study, "stack.tif.covol" say.
+    folder: of the study, for example "stack.tif.covol".
 
 Returns:
-    dict of each structure's marks by its name: a dict of Points with the keys "points", "contours", "inside" and "outside", of an
-    Image with the key "painted", and an Image, a LevelSet or the path of a mesh with the key "guess", without those that there are none of. World
-    positions. Raises Error.
+    dict of the marks of each structure by its name. Each is a dict with Points for the keys "points", "contours", "inside" and
+    "outside", an Image for the key "painted", and an Image, a LevelSet or the path of a mesh for the key "guess"; keys without a
+    value are missing. Positions are in world coordinates. Raises Error.
 """
 read_study_options.__doc__ = """The options of a study: structures(image, read_study(folder), **read_study_options(folder)).
 
@@ -401,7 +401,7 @@ Args:
     folder: of the study.
 
 Returns:
-    dict of keywords: voxel_size, rho, mark_precision and model, without those that the study leaves open. Raises Error.
+    dict of keywords: voxel_size, rho, mark_precision and model, without those that the study does not set. Raises Error.
 """
 for _type in (Error, Study, mark, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, read_study, read_study_options, from_affine,
               to_affine):

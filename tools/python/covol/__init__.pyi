@@ -1,4 +1,4 @@
-# Types of the module covol; what things mean stands in the docstrings of covol/__init__.py. The options between the marks
+# Types of the module covol; documentation is in the docstrings of covol/__init__.py. The options between the marker lines
 # are written by tools/python/write_stub.py.
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -136,7 +136,7 @@ class Structures(dict[str, Result]):
     @property
     def mask(self) -> NDArray[Any]: ...
 
-_ImageLike = Union[Image, ArrayLike, _Path, Any]  # Any: what nibabel reads
+_ImageLike = Union[Image, ArrayLike, _Path, Any]  # Any: images of nibabel
 _PointsLike = Union[Points, ArrayLike, _Path]
 _LinesLike = Union[Points, Sequence[ArrayLike], _Path]
 _Surface = Union[LevelSet, Result, _Path]
@@ -220,12 +220,12 @@ def structures(
     progress: _Progress | None = ...,
     threads: int = ...,
     memory_limit: int = ...,
-    **options: Any,  # as of segment()
+    **options: Any,  # as for segment()
 ) -> Structures: ...
 def timelapse(
     frames: Iterable[_ImageLike | Tuple[_ImageLike, Any]],
     marks: _PointsLike | Mapping[str, Any] | None = ...,
-    **keywords: Any,  # as of segment()
+    **keywords: Any,  # as for segment()
 ) -> Iterator[Result | Structures | Error]: ...
 def reconstruct(
     points: _PointsLike | None = ...,

@@ -2,11 +2,11 @@
 
 
 class Error(Exception):
-    """What covol raises where it cannot do what was asked.
+    """Raised by covol if a request cannot be fulfilled.
 
     Attributes:
         code: "invalid_options", "invalid_input", "io", "unsupported", "numerical" or "cancelled".
-        field: the keyword that is wrong, or that would help, "tag_distance" say; None where the message names none.
+        field: the keyword that is wrong, or that could solve the problem, such as "tag_distance"; None if the message names none.
     """
 
     def __init__(self, message, code="invalid_input", field=None):

@@ -1,4 +1,4 @@
-"""Arrays as files that the program covol reads, and files that it writes as arrays."""
+"""Writes arrays as files for the program covol, and reads its output files as arrays."""
 import gzip
 import io
 import re
@@ -13,7 +13,7 @@ _PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int":
 
 
 def write_nrrd(path, image):
-    """An image (array, spacing, origin, direction, unit) as a file that covol reads back to the same numbers."""
+    """Writes an image (array, spacing, origin, direction, unit) as a file from which covol reads identical values."""
     array = np.ascontiguousarray(image.array)
     if array.dtype == bool:
         array = array.astype(np.uint8)
@@ -32,7 +32,7 @@ def write_nrrd(path, image):
 
 
 def read_nrrd(path):
-    """The voxels of a NRRD file of three dimensions that covol wrote: array of shape (nz, ny, nx)."""
+    """The voxels of a three-dimensional NRRD file written by covol: array of shape (nz, ny, nx)."""
     with open(path, "rb") as file:
         fields = {}
         for line in iter(lambda: file.readline().decode("utf-8", "replace").rstrip("\r\n"), ""):
@@ -52,7 +52,7 @@ def read_nrrd(path):
 
 
 def read_ply(path):
-    """A binary PLY file of triangles: (numbers at the vertices by name, faces of shape (m, 3))."""
+    """Reads a binary PLY file of triangles: (vertex attributes by name, faces of shape (m, 3))."""
     with open(path, "rb") as file:
         head = []
         for line in iter(file.readline, b""):
@@ -69,7 +69,7 @@ def read_ply(path):
 
 
 def write_ply(path, vertices, faces=None, normals=None):
-    """Positions, as doubles, with normals or triangles, as a binary PLY file."""
+    """Writes positions, as doubles, with normals or triangles, as a binary PLY file."""
     columns = [(name, "<f8") for name in ("x", "y", "z")]
     values = [np.asarray(vertices, float)]
     if normals is not None:
@@ -93,7 +93,7 @@ def write_ply(path, vertices, faces=None, normals=None):
 
 
 def write_positions(path, positions, lines=None):
-    """World positions as a table; with `lines`, lists of positions, each is an ordered line of it."""
+    """Writes world positions as a table; each element of `lines`, a list of positions, becomes an ordered line in it."""
     text = io.StringIO()
     if lines is None:
         np.savetxt(text, np.asarray(positions, float).reshape(-1, 3), "%.17g", ",", header="x,y,z", comments="")
@@ -107,7 +107,7 @@ def write_positions(path, positions, lines=None):
 
 
 def read_positions(path):
-    """(n, 3) of a table x, y, z that covol wrote; lines of comment begin with #."""
+    """(n, 3) from a table x, y, z written by covol; comment lines begin with #."""
     with open(path, encoding="utf-8") as file:
         rows = [line for line in file if line[:1] not in "#\n" and line[0] in "+-.0123456789"]
     return np.array([[float(word) for word in row.split(",")[:3]] for row in rows]).reshape(-1, 3)

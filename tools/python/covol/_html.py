@@ -1,4 +1,4 @@
-"""How notebooks show the module's objects."""
+"""HTML representation of the module's objects in notebooks."""
 import html
 
 

@@ -1,4 +1,4 @@
-"""What people pass in, as the types of the extension module."""
+"""Converts arguments of the public functions to types of the extension module."""
 import collections.abc
 import logging
 import os
@@ -12,7 +12,7 @@ _log = logging.getLogger("covol")
 
 
 def call(progress=None, threads=0, memory_limit=0):
-    """How a function runs; automatic choices and warnings go to the logger "covol"."""
+    """Settings for running a function; automatic choices and warnings are sent to the logger "covol"."""
     if progress is not None and not callable(progress):
         raise Error("progress: expected a function of (stage, fraction)", "invalid_options", "progress")
     return _covol.Call(progress, lambda warns, line: _log.log(logging.WARNING if warns else logging.INFO, line),
@@ -24,7 +24,7 @@ def is_path(value):
 
 
 def image(value, spacing=None, origin=None, direction=None, affine=None, name="image"):
-    """An Image from an array, a file, an Image or what nibabel reads."""
+    """An Image from an array, a file, an Image or an image of nibabel."""
     if affine is not None:
         if spacing is not None or origin is not None or direction is not None:
             raise Error("affine: expected without spacing, origin and direction", "invalid_options", "affine")
@@ -50,9 +50,9 @@ def image(value, spacing=None, origin=None, direction=None, affine=None, name="i
 
 
 def from_affine(affine):
-    """Spacing, origin and direction (LPS) of an affine matrix that maps voxels (i, j, k) to RAS, as nibabel has it.
+    """Spacing, origin and direction (LPS) of an affine matrix that maps voxels (i, j, k) to RAS, as in nibabel.
 
-    Raises Error where it is no 4 x 4 matrix, or an axis has no length.
+    Raises Error if it is not a 4 x 4 matrix, or an axis has zero length.
     """
     matrix = np.asarray(affine, float)
     if matrix.shape != (4, 4):
@@ -65,7 +65,7 @@ def from_affine(affine):
 
 
 def to_affine(img):
-    """The affine matrix of an Image: voxels (i, j, k) to RAS, as nibabel has it."""
+    """The affine matrix of an Image: voxels (i, j, k) to RAS, as in nibabel."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.asarray(img.direction) * np.asarray(img.spacing)
     matrix[:3, 3] = img.origin
@@ -109,7 +109,7 @@ def points(name, value, reading, lines=False, normals=None):
 
 
 def marks(given, reading, like):
-    """Of one structure: what segment() takes beside the image, from a dict of its keywords, or from its points."""
+    """The inputs of one structure for segment() except the image, from a dict of its keywords, or from its points."""
     given = given if isinstance(given, collections.abc.Mapping) else {"points": given}
     known = ("points", "contours", "inside", "outside", "guess", "init", "exterior_seed", "painted", "normals")
     for key in given:

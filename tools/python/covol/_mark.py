@@ -1,4 +1,4 @@
-"""covol.mark(): the page of `covol mark` in a notebook, and what is marked on it as arrays."""
+"""covol.mark(): shows the page of `covol mark` in a notebook, and returns its marks as arrays."""
 import atexit
 import html
 import os
@@ -14,7 +14,7 @@ import numpy as np
 from . import _covol, _files, _inputs
 from ._errors import Error
 
-_PATIENCE = 30  # seconds for the program to end
+_PATIENCE = 30  # maximum time in seconds for the program to end
 
 
 def _program(given):
@@ -29,7 +29,7 @@ def _notebooks():
     try:
         from jupyter_server.serverapp import list_running_servers
         ports = {int(server["port"]) for server in list_running_servers()}
-    except Exception:  # noqa: BLE001 - another program's files, in whatever state
+    except Exception:  # noqa: BLE001 - files of another program, which may be invalid
         ports = set()
     return [f"http://localhost:{port}" for port in sorted(ports or {8888})]
 
@@ -48,10 +48,10 @@ def _end(process, folder):
 
 
 class Study:
-    """A study that a person marks on a page, in a notebook's output or in a browser, and its state as it is now.
+    """A study that is marked on a page, in a notebook's output or in a browser, and its current state.
 
     Attributes:
-        url: the page's address, with its secret: whoever has it may change the study, while this runs.
+        url: the page's address, including its secret: everyone who has it can change the study while the page is served.
         folder: of the study.
         image: the Image.
     """
@@ -63,7 +63,7 @@ class Study:
             self.folder = os.path.abspath(os.fspath(study)) if study is not None else os.path.join(self._own, "study")
             if _inputs.is_path(volume):
                 path = os.path.abspath(os.fspath(volume))
-            else:  # in the study, which can be opened again without the array
+            else:  # stored in the study, which can then be opened again without the array
                 os.makedirs(self.folder, exist_ok=True)
                 path = os.path.join(self.folder, "volume.nrrd")
                 _files.write_nrrd(path, self.image)
@@ -78,14 +78,14 @@ class Study:
                 file = os.path.join(self._own, f"marks{len(command)}.csv")
                 _files.write_positions(file, places)
                 command += ["--points", f"{name}={file}"]
-            # A group of its own: Ctrl-C in a notebook stops the cell, not the page.
-            with open(os.path.join(self._own, "said.txt"), "w+") as said:
-                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, start_new_session=True)
+            # A separate process group: Ctrl-C in a notebook stops the cell, not the page.
+            with open(os.path.join(self._own, "output.txt"), "w+") as printed:
+                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=printed, text=True, start_new_session=True)
                 line = self._process.stdout.readline()
                 if not line.startswith("open "):
                     _end(self._process, None)
-                    said.seek(0)
-                    raise Error(said.read().strip() or "mark: the program ended", "io")
+                    printed.seek(0)
+                    raise Error(printed.read().strip() or "mark: the program ended", "io")
         except BaseException:
             shutil.rmtree(self._own, ignore_errors=True)
             raise
@@ -103,19 +103,19 @@ class Study:
 
     @property
     def marks(self):
-        """The structures and their marks as they are now: read_study()."""
+        """The current structures and their marks, as from read_study()."""
         return _covol.read_study(self.folder)
 
     @property
     def options(self):
-        """The study's options as they are now: read_study_options()."""
+        """The study's current options, as from read_study_options()."""
         return _covol.read_study_options(self.folder)
 
     @property
     def result(self):
-        """The surfaces of all structures that have marks, as they are now: Structures, with `mask`. Computed when the study has changed."""
+        """The current surfaces of all structures that have marks: Structures, with `mask`. Computed if the study has changed."""
         journal = pathlib.Path(self.folder) / "journal.jsonl"
-        size = journal.stat().st_size  # it only grows
+        size = journal.stat().st_size  # the journal only grows
         if self._known is None or self._known[0] != size:
             from . import Structures, structures
             if hasattr(_covol, "solve_study"):  # by the program, which reads the study itself
@@ -125,7 +125,7 @@ class Study:
         return self._known[1]
 
     def close(self):
-        """Ends the program. A study without a folder of the caller's is gone with it."""
+        """Ends the program. A study in a temporary folder is deleted."""
         self._finalizer()
 
     def __enter__(self):
@@ -162,23 +162,23 @@ def _named(marks):
 
 def mark(volume, marks=None, *, study=None, spacing=None, origin=None, direction=None, affine=None, notebook=None, program=None,
          height=760):
-    """Shows the page of `covol mark` in a notebook's output cell, and gives what is marked there as arrays.
+    """Shows the page of `covol mark` in a notebook's output cell, and returns its marks as arrays.
 
     Args:
         volume: as the image of segment(); an array is written to a temporary file.
         marks: points on the surface, shape (n, 3), world units; or a dict of these by the structures' names.
-        study: folder that the study is kept in; None: a temporary one, which close() removes.
+        study: folder of the study; None: a temporary one, which close() removes.
         spacing, origin, direction, affine: see segment().
-        notebook: origin of the notebook, "http://localhost:8888", or a list of such: pages of no other origin may show the page
-            in a frame. None: those of the notebook servers that run on this machine, else that one.
-        program: path of the program covol; None: the variable COVOL, else as the shell finds it.
+        notebook: origin of the notebook, "http://localhost:8888", or a list of origins: only pages of these origins may show the
+            page in a frame. None: those of the notebook servers that run on this machine, or that one if there are none.
+        program: path of the program covol; None: the variable COVOL, or covol in PATH.
         height: of the output cell, pixels.
 
     Returns:
-        Study, which a notebook shows. `study.marks` and `study.result.mask` are the state as it is then; `study.close()` ends it.
+        Study, which a notebook displays. `study.marks` and `study.result.mask` give the current state; `study.close()` ends it.
 
     Raises:
-        Error: as read_image() and the program; "io" where there is no program.
+        Error: as read_image() and the program; "io" if the program is not found.
     """
     return Study(volume, marks, study, program, notebook, height,
                  {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine})

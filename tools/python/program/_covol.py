@@ -1,7 +1,7 @@
-"""What covol/__init__.py takes from the compiled module, by the program covol and files: for every Python from 3.9 on.
+"""Replaces the compiled module for covol/__init__.py by the program covol and files: for every Python from 3.9 on.
 
-Images that are files are not read here, their paths are given to the program; arrays are written to a temporary folder, which lives
-as long as what was made from it. Results are the program's, to the bit.
+Images in files are not read here: their paths are passed to the program. Arrays are written to a temporary folder, which exists
+as long as the objects that use it. Results are bitwise identical to the program's.
 """
 import os
 import shutil
@@ -19,7 +19,7 @@ _WITHOUT = "%s: the package that runs the program covol does not have this; %s"
 
 
 class Result:
-    """What segment() and reconstruct() return."""
+    """The result of segment() and reconstruct()."""
 
     def __init__(self, folder, name, report, image, marks, log, again):
         self._folder, self._json, self._again = folder, report, again
@@ -50,7 +50,7 @@ class Result:
         return voxels if not self.name else (voxels == self.label).astype(np.uint8)
 
     def _suggest(self, count, call):
-        """The program names them when it segments: it runs once more."""
+        """Runs the program again, because it prints suggestions only when it segments."""
         if not isinstance(count, int) or count < 0:
             raise Error(f"count: expected >= 0, got {count}", "invalid_options", "count")
         if self.image is None:
@@ -66,7 +66,7 @@ class Result:
 
 
 def run(function, image, structures, painted, init, options, call, lapse):
-    """segment(), structures() and reconstruct(): (results, overlaps)."""
+    """Runs segment(), structures() and reconstruct(). Returns (results, overlaps)."""
     if lapse is not None:
         return lapse.add(image, structures, None if init is None else _start(init, lapse.folder, "init.nrrd"), options, call)
     flags = _values.flags_of(function, options)
@@ -98,7 +98,7 @@ def run(function, image, structures, painted, init, options, call, lapse):
 
 
 def solve_study(image, study, options, call):
-    """The structures of a study of `covol mark`: (results, overlaps)."""
+    """Segments the structures of a study of `covol mark`. Returns (results, overlaps)."""
     folder = Folder()
     log = run_program(["segment", "--study", study, *_values.flags_of("structures", options), "-o", folder.file("surface.vdb"), "--mesh",
                        folder.file("mesh.ply"), "--mask", folder.file("mask.nrrd"), "--json", folder.file("report.json")], call, folder)
@@ -106,9 +106,9 @@ def solve_study(image, study, options, call):
 
 
 def _results(folder, report, image, structures, log, again):
-    """The results of a run, from its files. @param again  runs it with --suggest"""
+    """The results of a run, from its files. @param again  runs the program again with --suggest"""
     report.setdefault("warnings", [])
-    report.pop("options", None)  # with files of the folder
+    report.pop("options", None)  # contains paths of the temporary folder
     for name in ("paths", "rules"):
         report.get("input", {}).get("points", {}).pop(name, None)
     entries = report.get("structures")
@@ -138,7 +138,7 @@ def _marks(own, image):
 
 
 def _words_of(folder, n, name, own, image, command):
-    """The flags of one structure's marks."""
+    """The command-line options for one structure's marks."""
     prefix = f"{name}=" if name else ""
     words = []
     for kind in ("points", "contours", "inside", "outside"):
@@ -172,7 +172,7 @@ def _start(value, folder, name):
 
 
 def label_image(results, call):
-    """Which result is where, from 1 on; 0 outside of all."""
+    """The number of the result at each voxel, from 1; 0 outside of all."""
     first = results[0]
     if first.image is None:
         raise Error("mask: expected an image to lay it on, got points alone", "invalid_input")
@@ -234,7 +234,7 @@ def distances(points, triangles, call):
 
 def read_level_set(path):
     made = LevelSet(os.path.abspath(path.rsplit(":", 1)[0]) + (":" + path.rsplit(":", 1)[1] if ":" in path else ""), None)
-    made.voxel_size  # says now if it is none
+    made.voxel_size  # raises an Error now if the file has no level set
     return made
 
 
@@ -270,7 +270,7 @@ def read_study_options(folder):
 
 
 def copy_level_set(source, path, half):
-    """A grid of a .vdb file as a file of its own."""
+    """Writes a grid of a .vdb file to a separate file."""
     if half:
         return run_program(["convert", source, path, "--half"])
     file, _, grid = source.rpartition(":") if ":" in os.path.basename(source) else (source, "", "")

@@ -1,4 +1,4 @@
-"""timelapse() by the program: all frames in one run of it, which starts each from the one before."""
+"""timelapse() with the program: one run for all frames, in which each starts from the previous one."""
 import os
 import re
 import shutil
@@ -7,14 +7,14 @@ from . import _program, _values
 from ._errors import Error
 from ._program import Folder, read_json
 
-_ALONE = ("inside", "outside", "exterior_seed", "init", "guess", "painted")  # of a single image; the program has them for all frames
+_ALONE = ("inside", "outside", "exterior_seed", "init", "guess", "painted")  # for single images; the program would use them for all frames
 
 
 class Frames:
-    """Collects the frames; the program takes them together.
+    """Collects the frames, which are passed to the program together.
 
     Attributes:
-        started: a frame is there, so that the marks of the first one are not asked for again.
+        started: whether a frame has been added, after which the marks of the first one are not needed again.
     """
 
     def __init__(self):
@@ -25,7 +25,7 @@ class Frames:
         return bool(self._frames)
 
     def add(self, image, structures, start, options, call):
-        """One frame; start: as --init has it, or None. @return its number. Raises Error, TypeError."""
+        """Adds a frame; start: as for --init, or None. @return its number. Raises Error, TypeError."""
         for own in structures.values():
             for kind in _ALONE:
                 if own[kind] is not None and len(own[kind]):
@@ -42,10 +42,10 @@ class Frames:
         return number
 
     def follow(self, frames, go):
-        """What go() gives of each frame, in their order, as if each ran by itself: what found() makes of its files, or its Error.
+        """Yields for each frame, in order, the result of found() or its Error, as if each frame had been run separately.
 
         Args:
-            go: of a frame: add()'s number, or an Error.
+            go: adds a frame, and returns the number from add(), or an Error.
         """
         numbers = [go(frame) for frame in frames]
         results = self._run() if self._frames else []
@@ -53,7 +53,7 @@ class Frames:
             yield number if isinstance(number, Error) else results[number]
 
     def _marks(self):
-        """Flags. Marks of later frames lie in files with the frame's number, for which the program takes a pattern."""
+        """Command-line options. Marks of later frames are in files with the frame's number, for which the program accepts a pattern."""
         words = []
         for n, name in enumerate(self._frames[0]["structures"]):
             for kind in ("points", "contours"):
@@ -73,10 +73,10 @@ class Frames:
         return words
 
     def _run(self):
-        """Of each frame found(), or the Error."""
+        """The result of found(), or the Error, for each frame."""
         folder, first, failed = self.folder, self._frames[0], {}
 
-        class Noted(_values.Call):  # what is said of a frame that failed
+        class Noted(_values.Call):  # notes the errors of frames that failed
             def __init__(self, call):
                 super().__init__(call.progress, self.note, call.threads, call.memory_limit)
                 self.given = call.log
@@ -86,11 +86,11 @@ class Frames:
                     failed[int(found[1])] = _program.error_of(3, found[2])
                 self.given(is_warning, line)
 
-        said = []
+        lines = []
         try:
-            # One frame alone is named twice, for the program would not take it for a time-lapse.
+            # A single frame is passed twice, because the program would not treat it as a time-lapse otherwise.
             paths = [frame["path"] for frame in self._frames]
-            said = _program.run(["segment", *(paths if len(paths) > 1 else 2 * paths), *self._marks(), *first["flags"], "-o",
+            lines = _program.run(["segment", *(paths if len(paths) > 1 else 2 * paths), *self._marks(), *first["flags"], "-o",
                                  folder.file("surface.vdb"), "--mesh", folder.file("mesh.ply"), "--mask", folder.file("mask.nrrd"), "--json",
                                  folder.file("report.json")], Noted(first["call"]), folder)
         except Error as error:
@@ -107,6 +107,6 @@ class Frames:
             for file in os.listdir(folder.path):
                 if tag in file:
                     shutil.move(folder.file(file), own.file(file.replace(tag, "")))
-            log = [line.split(": ", 1)[1] for line in said if line.startswith(f"frame {number}: ")]
+            log = [line.split(": ", 1)[1] for line in lines if line.startswith(f"frame {number}: ")]
             made.append(self.found(own, report["frames"][number], self._frames[number]["image"], self._frames[number]["structures"], log))
         return made

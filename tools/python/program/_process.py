@@ -1,5 +1,5 @@
-"""The program covol as a process: what it says as events, how it ends. Standard library only, and nothing else of this package: the
-plugins for Blender and 3D Slicer have this file in them."""
+"""Runs the program covol as a process: its output as events, and its exit code. Uses only the standard library, and nothing else of
+this package: the plugins for Blender and 3D Slicer contain a copy of this file."""
 import os
 import queue
 import re
@@ -13,7 +13,7 @@ _PREFIX = {"covol: error: ": "error", "covol: warning: ": "warning", "covol: wro
 
 
 class Failed(Exception):
-    """The program ended with this exit code; str() is what it said."""
+    """The program failed with this exit code; str() is its message."""
 
     def __init__(self, code, message):
         super().__init__(message)
@@ -21,11 +21,11 @@ class Failed(Exception):
 
 
 class Interrupted(Failed):
-    """It was cancelled."""
+    """The program was cancelled."""
 
 
 def find_program(given=""):
-    """The path of the program: what is given, the variable COVOL, or covol in PATH and where installers put it. Raises Failed."""
+    """The path of the program: the given one, the variable COVOL, or covol in PATH and in installation folders. Raises Failed."""
     for found in (given, os.environ.get("COVOL"), shutil.which("covol"), os.path.expanduser("~/.local/bin/covol")):
         if found and os.path.isfile(found) and os.access(found, os.X_OK):
             return os.path.abspath(found)
@@ -36,11 +36,11 @@ def find_program(given=""):
 
 
 class Process:
-    """A running covol. `events` come as pairs: ("stage", (name, fraction)), ("note", text), ("warning", text), ("wrote", path)."""
+    """A running process of covol. Events are pairs: ("stage", (name, fraction)), ("note", text), ("warning", text), ("wrote", path)."""
 
     def __init__(self, program, words, folder=None):
-        """@param folder  that it runs in, and whose files are named without it in what is said"""
-        # Other programs' libraries are not for it: 3D Slicer and Blender set variables for their own.
+        """@param folder  working directory; it is removed from the paths in messages"""
+        # Without the library paths that 3D Slicer and Blender set for their own libraries.
         environment = {key: value for key, value in os.environ.items() if key not in ("LD_LIBRARY_PATH", "LD_PRELOAD", "PYTHONHOME")}
         self._folder = os.fspath(folder) + os.sep if folder is not None else None
         self._events, self._failure = queue.Queue(), ""
@@ -68,13 +68,13 @@ class Process:
         self._events.put(None)
 
     def follow(self):
-        """Events until the program ends."""
+        """Yields events until the program ends."""
         for event in iter(self._events.get, None):
             yield event
         self._events.put(None)
 
     def poll(self):
-        """Events that have come; None once the program has ended and all were given."""
+        """The events since the last call; None once the program has ended and all have been returned."""
         found = []
         while not self._events.empty():
             event = self._events.get()
@@ -85,7 +85,7 @@ class Process:
         return found
 
     def cancel(self):
-        """Asks it to end; it leaves no files behind."""
+        """Requests cancellation; the program removes its temporary files."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
 
@@ -93,7 +93,7 @@ class Process:
         """Waits for the end. Raises Failed, Interrupted."""
         code = self._process.wait()
         self._reader.join()
-        if code in (130, -signal.SIGINT):  # it may not have begun to listen
+        if code in (130, -signal.SIGINT):  # it may not have installed its signal handler yet
             raise Interrupted(code, "cancelled")
         if code != 0:
             raise Failed(code, self._failure or f"the program covol ended with {code}")

@@ -1,4 +1,4 @@
-"""Runs the program covol for the functions of this package: progress, messages, Ctrl-C and errors as they are there."""
+"""Runs the program covol for the functions of this package, with their progress, messages, Ctrl-C and errors."""
 import json
 import os
 import re
@@ -17,7 +17,7 @@ _CODES = {2: "invalid_options", 3: "invalid_input", 4: "io", 6: "numerical"}
 
 
 class Folder:
-    """Files of a job, which are gone with the last object that needs them."""
+    """A temporary folder for the files of a job, which is removed with the last object that needs it."""
 
     def __init__(self):
         self.path = tempfile.mkdtemp(prefix="covol-python-")
@@ -28,7 +28,7 @@ class Folder:
 
 
 def main():
-    """The command `covol` of the installed package."""
+    """Entry point of the command `covol` of the installed package."""
     os.execv(_process.find_program(PROGRAM), ["covol", *sys.argv[1:]])
 
 
@@ -36,11 +36,11 @@ def run(words, call=None, folder=None):
     """Runs the program; its notes and warnings go to call.log, its stages to call.progress.
 
     Args:
-        words: behind the program's name.
-        folder: Folder whose files are named without it in what is said.
+        words: the program's arguments.
+        folder: Folder that is removed from the paths in messages.
 
     Returns:
-        list of what it said.
+        list of its messages.
 
     Raises:
         Error; KeyboardInterrupt after Ctrl-C; what call.progress raises.
@@ -50,7 +50,7 @@ def run(words, call=None, folder=None):
         command += ["--threads", call.threads]
     if call is not None and call.memory_limit:
         command += ["--memory-limit", call.memory_limit]
-    said = []
+    lines = []
     try:
         process = _process.Process(_process.find_program(PROGRAM), command)
     except _process.Failed as failed:
@@ -61,9 +61,9 @@ def run(words, call=None, folder=None):
                 if call is not None and call.progress is not None:
                     call.progress(*value)
             elif kind != "wrote":
-                said.append(value.replace(folder.path + os.sep, "") if folder is not None else value)
+                lines.append(value.replace(folder.path + os.sep, "") if folder is not None else value)
                 if call is not None:
-                    call.log(kind == "warning", said[-1])
+                    call.log(kind == "warning", lines[-1])
         process.result()
     except _process.Interrupted:
         raise KeyboardInterrupt from None
@@ -76,7 +76,7 @@ def run(words, call=None, folder=None):
         except _process.Failed:
             pass
         raise
-    return said
+    return lines
 
 
 def read_json(path):
@@ -85,14 +85,14 @@ def read_json(path):
 
 
 def info_of(*words, call=None):
-    """What `covol info` says of a file, as a dict. Raises as run()."""
+    """The output of `covol info` for a file, as a dict. Raises as run()."""
     folder = Folder()
     run(["info", *words, "--json", folder.file("info.json")], call, folder)
     return read_json(folder.file("info.json"))
 
 
 def error_of(code, message):
-    """The Error of a message of the program, with keywords in place of flags."""
+    """The Error for a message of the program, with flags replaced by keywords."""
     found = _FLAG.search(message)
     field = found[1].replace("-", "_") if found else None
     kind = _CODES.get(code, "io")

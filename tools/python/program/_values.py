@@ -14,7 +14,7 @@ _SIGNATURES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "__init__
 
 
 class Call:
-    """How a function runs."""
+    """Settings for running a function."""
 
     def __init__(self, progress, log, threads, memory_limit):
         if isinstance(threads, bool) or not isinstance(threads, int) or threads < 0:
@@ -26,7 +26,7 @@ class Call:
 
 
 def list_options():
-    """Of segment() and reconstruct(): (name, type, default), as __init__.pyi lists them."""
+    """The options of segment() and reconstruct(): (name, type, default), from __init__.pyi."""
     with open(_SIGNATURES, encoding="utf-8") as file:
         text = file.read()
     block = text.split("# options, from covol.options()")[1].split("# end of options")[0]
@@ -35,14 +35,14 @@ def list_options():
 
 
 def flag(name, value):
-    """`--tag-distance=3vx` of a keyword."""
+    """The flag for a keyword: `--tag-distance=3vx`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
         raise Error(f"{name}: expected a number, got {value!r}", "invalid_options", name)
     return f"--{name.replace('_', '-')}={value if isinstance(value, str) else repr(float(value)) if isinstance(value, float) else value}"
 
 
 def flags_of(function, options):
-    """Flags of the options that are not None. Raises TypeError for a name that is none."""
+    """Flags for the options that are not None. Raises TypeError for an unknown name."""
     known = {name: kind for name, kind, _ in list_options()}
     flags = []
     for name, value in options.items():
@@ -99,7 +99,7 @@ def _three(name, value, default):
 
 
 def _plain(array):
-    """In a type that files have: 64-bit integers as 32-bit ones where they fit, else as doubles."""
+    """Converts to a type that files support: 64-bit integers become 32-bit ones if they fit, otherwise doubles."""
     kind = array.dtype
     if kind == bool:
         return array.astype(np.uint8)
@@ -117,7 +117,7 @@ def _plain(array):
 
 
 class Image:
-    """A 3D image and where it lies: Image(array, spacing=, origin=, direction=, unit=), as segment() takes them. Raises Error."""
+    """A 3D image with its geometry: Image(array, spacing=, origin=, direction=, unit=), as for segment(). Raises Error."""
 
     def __init__(self, array, *, spacing=None, origin=None, direction=None, unit=""):
         array = np.asarray(array)
@@ -135,9 +135,9 @@ class Image:
 
     @classmethod
     def _of_file(cls, path, spacing, channel, frame, roi, correct_level_shift, call, folder=None):
-        """Its header is read now, its voxels when they are asked for. @param folder  that the file lies in"""
+        """Reads the header now, and the voxels when they are needed. @param folder  that contains the file"""
         made = cls.__new__(cls)
-        path = "./" + path if path.startswith("-") else path  # the program would take it for an option
+        path = "./" + path if path.startswith("-") else path  # the program would treat it as an option
         words = [path]
         if spacing is not None:
             words.append("--spacing=" + ",".join(repr(x) for x in _three("spacing", spacing, 1)))
@@ -146,7 +146,7 @@ class Image:
         words += ["--correct-level-shift"] if correct_level_shift else []
         own = Folder()
         made._array, made._file, made._folder, made.path = None, words, folder, path
-        if roi is not None:  # the program takes a part of an image by a file of its own
+        if roi is not None:  # parts of an image are passed to the program as a separate file
             box = np.asarray(roi, float)
             if box.shape != (2, 3):
                 raise Error(f"roi: expected two corners, got {roi!r}", "invalid_options", "roi")
@@ -180,7 +180,7 @@ class Image:
 
     @property
     def dtype(self):
-        """Of the voxels."""
+        """Type of the voxels."""
         if self._array is not None:
             return self._array.dtype
         return np.dtype({"float": "float32", "double": "float64"}.get(self._type, self._type))
@@ -197,11 +197,11 @@ class Image:
         return np.linalg.solve(self._matrix(), (positions("world", world) - np.asarray(self.origin)).T).T[:, ::-1]
 
     def _words(self, folder, name):
-        """How the program is told of it."""
+        """Arguments of the program for this image."""
         return list(self._file) if self._file else [self._path(folder, name)]
 
     def _path(self, folder, name):
-        """A file of it: its own where nothing was chosen from that."""
+        """A file with this image: its original file if the image is that file unchanged."""
         if self._file and len(self._file) == 1:
             return self._file[0]
         _files.write_nrrd(folder.file(name), self)
@@ -209,7 +209,7 @@ class Image:
 
 
 class Points:
-    """Marks or a cloud, as a file gives them: see read_points()."""
+    """Marks or a cloud, as read from a file: see read_points()."""
 
     def __init__(self, name, given, lines, space, order, scale, closed, normals):
         for word, choices, what in ((space, ("world", "index", "index1", "ras", "local"), "points_space"), (order, ("xyz", "zyx"), "points_order")):
@@ -245,12 +245,12 @@ class Points:
 
     @property
     def array(self):
-        """(n, 3), x, y, z in `space`; of a file those of the world."""
+        """(n, 3), x, y, z in `space`; for a file, in the world."""
         return self.to_world() if self._file else np.concatenate(self._parts) if self._parts else np.zeros((0, 3))
 
     @property
     def lines(self):
-        """Of contours: a list of arrays (n, 3)."""
+        """The lines of contours: a list of arrays (n, 3)."""
         return self._parts if self._lines and self._parts is not None else []
 
     def __len__(self):
@@ -260,7 +260,7 @@ class Points:
         return self.array if dtype is None else self.array.astype(dtype)
 
     def to_world(self, image=None):
-        """(n, 3), x, y, z in the world; those in voxels need the image. Raises Error."""
+        """(n, 3), x, y, z in the world; positions in voxels require the image. Raises Error."""
         if self._file:
             own = Folder()
             like = ["--like", image._path(own, "like.nrrd")] if image is not None else []
@@ -281,7 +281,7 @@ class Points:
         return image.index_to_world((part - (1 if self.space == "index1" else 0))[:, ::-1])
 
     def _path(self, folder, name, image):
-        """A file that the program reads as these positions."""
+        """A file from which the program reads these positions."""
         if self._file and not self._flags:
             return self._file
         path = folder.file(name + ".csv")
@@ -334,7 +334,7 @@ class Mesh:
         return info_of(self._path(own, "mesh.ply"))["mesh"]
 
     def save(self, path, *, y_up=None, unit_scale=1.0):
-        """Writes .ply, .obj, .stl, .off or .glb, which is y-up unless y_up says otherwise. Raises Error."""
+        """Writes .ply, .obj, .stl, .off or .glb, which is y-up by default; y_up overrides this. Raises Error."""
         own = Folder()
         up = [] if y_up is None else [f"--up={'y' if y_up else 'z'}"]
         run(["convert", self._path(own, "mesh.ply"), os.fspath(path), *up, f"--unit-scale={unit_scale!r}"], None, own)
@@ -348,7 +348,7 @@ class Mesh:
 
 
 class LevelSet:
-    """A level set of OpenVDB, negative inside; what mesh(), mask(), compare(), init= and guess= take."""
+    """A level set of OpenVDB, negative inside; accepted by mesh(), mask(), compare(), init= and guess=."""
 
     def __init__(self, path, folder):
         self._source, self._folder, self._facts = path, folder, None
@@ -369,7 +369,7 @@ class LevelSet:
 
     @property
     def box(self):
-        """Two corners of the domain, world units."""
+        """Two opposite corners of the domain, world units."""
         return tuple(self._about()["min"]), tuple(self._about()["max"])
 
     def save(self, path, *, half=False):

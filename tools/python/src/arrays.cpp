@@ -15,7 +15,7 @@ std::string text_of(const py::handle& value) { return py::cast<std::string>(py::
     throw Error(Errc::InvalidInput, name + ": expected " + expected + ", got " + got, name);
 }
 
-/// Doubles in rows, whatever they were.
+/// Doubles in rows, converted from any numbers.
 py::array_t<double> to_doubles(const char* name, const std::string& expected, const py::handle& value) {
     auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
     if (!array) {
@@ -35,7 +35,7 @@ constexpr struct {
               {'i', 2, PixelType::Int16}, {'u', 4, PixelType::UInt32}, {'i', 4, PixelType::Int32},
               {'f', 4, PixelType::Float}, {'f', 8, PixelType::Double}};
 
-/// The same values in a kind of number that covol knows; the array itself where it is one.
+/// The same values with a number type that covol supports; the array itself if its type is supported.
 py::array known_numbers(py::array array) {
     const char kind = array.dtype().kind();
     const auto bytes = array.dtype().itemsize();
@@ -44,7 +44,7 @@ py::array known_numbers(py::array array) {
     if (kind == 'f' && bytes == 2) return converted("float32");
     if (kind == 'f' && bytes > 8) return converted("float64");
     if ((kind == 'i' || kind == 'u') && bytes == 8) {
-        // labels and counts mostly fit; what does not becomes a double
+        // labels and counts usually fit into 32 bits; otherwise they become doubles
         const double low = py::cast<double>(array.attr("min")()), high = py::cast<double>(array.attr("max")());
         const bool fits =
             low >= std::numeric_limits<std::int32_t>::min() && high <= std::numeric_limits<std::int32_t>::max();
@@ -65,7 +65,7 @@ bool is_whole(const py::array& array) {
     return py::cast<bool>(array.attr("flags").attr("aligned"));
 }
 
-/// Keeps an array from any thread.
+/// Keeps a reference to an array, which may be released on any thread.
 std::shared_ptr<const void> keep(const void* first, py::array array) {
     const auto owner = new py::array(std::move(array));
     return {first, [owner](const void*) {

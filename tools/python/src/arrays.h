@@ -14,7 +14,7 @@
 // Arrays are indexed z, y, x; positions, spacings and origins are x, y, z.
 namespace covol::python {
 
-/// An array that shows memory which `owner` keeps; nobody writes to it.
+/// A read-only array that shows memory of `owner`.
 template <typename T, typename Owner>
 py::array show(const T* data, const std::vector<py::ssize_t>& shape, const std::vector<py::ssize_t>& strides,
                std::shared_ptr<Owner> owner) {
@@ -25,7 +25,7 @@ py::array show(const T* data, const std::vector<py::ssize_t>& shape, const std::
     return array;
 }
 
-/// The same, of values without gaps that the array takes over and may change.
+/// The same for contiguous values that the array takes over; the array is writable.
 template <typename T>
 py::array give(std::vector<T>&& values, const std::vector<py::ssize_t>& shape) {
     const auto kept = new std::vector<T>(std::move(values));
@@ -35,17 +35,17 @@ py::array give(std::vector<T>&& values, const std::vector<py::ssize_t>& shape) {
 
 [[nodiscard]] Vec3 to_vec3(const char* name, const py::handle& value);
 [[nodiscard]] py::tuple from_vec3(const Vec3& v);
-/// Rows; columns are the image's axes. Nine numbers in a row, or 3 x 3.
+/// The columns are the image's axes. Nine numbers in row-major order, or 3 x 3.
 [[nodiscard]] Matrix3 to_matrix(const char* name, const py::handle& value);
 [[nodiscard]] py::array from_matrix(const Matrix3& m);
-/// (n, 3), of any numbers; one position is one row. @throws Error InvalidInput.
+/// (n, 3), with any number type; one position is one row. @throws Error InvalidInput.
 [[nodiscard]] std::vector<Vec3> to_positions(const char* name, const py::handle& value);
 [[nodiscard]] py::array from_positions(const std::vector<Vec3>& positions);
 
-/// An image over the array's own memory where its numbers are of a kind that covol knows, in this machine's byte order
-/// and aligned; a copy where not. @throws Error InvalidInput, Unsupported.
+/// An image that uses the array's own memory if the number type is supported by covol, in this machine's byte order and
+/// aligned; otherwise a copy. @throws Error InvalidInput, Unsupported.
 [[nodiscard]] Image to_image(const py::handle& array, ImageGeometry geometry);
-/// The held voxels; a view where they lie in memory.
+/// The loaded voxels; a view if they are in memory.
 [[nodiscard]] py::array voxels_of(const Image& image);
 [[nodiscard]] py::tuple shape_of(const Index3& size);
 

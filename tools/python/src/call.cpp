@@ -13,21 +13,21 @@
 namespace covol::python {
 namespace {
 
-constexpr std::chrono::milliseconds kSignals(50);  // between two looks at signals
+constexpr std::chrono::milliseconds kSignalInterval(50);  // interval of checks for signals
 
 struct Event {
     bool is_progress = false;
     bool is_warning = false;
     double fraction = 0;
-    std::string text;  ///< a stage or a line
+    std::string text;  ///< the name of a stage, or a line of the log
 };
 
-/// What the working thread hands to the calling one.
-class Mailbox {
+/// Passes events from the working thread to the calling one.
+class EventQueue {
 public:
     void put(Event event) {
         const std::lock_guard lock(mutex_);
-        // of a stage's progress the last word is enough
+        // only the latest progress of a stage is kept
         if (event.is_progress && !events_.empty() && events_.back().is_progress && events_.back().text == event.text)
             events_.back() = std::move(event);
         else
@@ -39,10 +39,10 @@ public:
         closed_ = true;
         wake_.notify_one();
     }
-    /// All events so far, some time after the first of them at the latest; false: there will be no more.
+    /// Gets all events so far, after a timeout at the latest; false: there will be no more.
     bool wait(std::vector<Event>& events) {
         std::unique_lock lock(mutex_);
-        wake_.wait_for(lock, kSignals, [&] { return closed_ || !events_.empty(); });
+        wake_.wait_for(lock, kSignalInterval, [&] { return closed_ || !events_.empty(); });
         events = std::exchange(events_, {});
         return !closed_;
     }
@@ -67,7 +67,7 @@ void deliver(const Call& call, const std::vector<Event>& events) {
 }  // namespace
 
 void Call::run(const std::function<void(const RunContext&)>& work) const {
-    Mailbox mailbox;
+    EventQueue mailbox;
     std::atomic<bool> cancel = false;
     RunContext context;
     context.threads = threads;
@@ -82,7 +82,7 @@ void Call::run(const std::function<void(const RunContext&)>& work) const {
             mailbox.put({false, level == LogLevel::Warning, 0, line});
         };
 
-    std::exception_ptr failed, raised;  // by the work; by Python
+    std::exception_ptr failed, raised;  // by the work; by Python callbacks
     {
         const py::gil_scoped_release released;
         std::thread worker([&] {

@@ -10,16 +10,16 @@ namespace covol::python {
 
 namespace py = pybind11;
 
-/// How a function of the module runs: what every long one takes beside its own arguments.
+/// How a function of the module is run: the arguments that all long functions have in common.
 struct Call {
     py::object progress = py::none();  ///< called with (stage, fraction)
     py::object log = py::none();       ///< called with (is_warning, line)
     int threads = 0;
     std::uint64_t memory_limit = 0;
 
-    /// Runs `work` on a thread of its own, without the GIL, and waits for it. Callbacks, and Python's signal handlers
-    /// where this is the main thread, are called from here meanwhile; what they raise stops the work, and is raised
-    /// once it has ended.
+    /// Runs `work` on a separate thread without the GIL, and waits for it. Meanwhile callbacks, and Python's signal
+    /// handlers if this is the main thread, are called from this thread; exceptions that they raise cancel the work,
+    /// and are raised after it has ended.
     void run(const std::function<void(const RunContext&)>& work) const;
 };
 

@@ -8,7 +8,7 @@
 #include "covol/mesh_io.h"
 #include "solve.h"
 
-// The module's own types. Which arguments and results have which shapes stands in covol/__init__.pyi.
+// The module's types. The shapes of arguments and results are documented in covol/__init__.pyi.
 namespace covol::python {
 
 struct Mesh {
@@ -21,7 +21,7 @@ void add_points(py::module_& module);
 void add_surfaces(py::module_& module);
 void add_jobs(py::module_& module);
 
-/// Text of JSON as what Python makes of it.
+/// Converts JSON text to Python objects.
 [[nodiscard]] py::object from_json(const std::string& text);
 
 }  // namespace covol::python

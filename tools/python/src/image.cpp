@@ -58,7 +58,7 @@ ReadPointsOptions make_reading(const py::object& space, const py::object& order,
     return reading;
 }
 
-/// Positions in one array, or of several lines one after the other.
+/// Positions in one array, or of several lines that are concatenated.
 PointCloud make_points(const std::string& name, const py::object& positions, const std::optional<py::list>& lines,
                        const py::object& space, const py::object& order, double scale, bool closed,
                        const py::object& normals) {
@@ -94,7 +94,7 @@ py::object guess_of(const Marks& marks, const std::string& path) {
     return py::str(path);
 }
 
-/// What structures() takes as keywords.
+/// The study's options as keywords of structures().
 py::dict options_of_study(const std::string& folder) {
     const StudyOptions options = read_study_options(folder);
     py::dict keywords;
@@ -105,7 +105,7 @@ py::dict options_of_study(const std::string& folder) {
     return keywords;
 }
 
-/// Each structure's marks as structures() takes them.
+/// Each structure's marks as arguments of structures().
 py::dict marks_of_study(const std::string& folder) {
     py::dict structures;
     const ImageGeometry image = read_study_image(folder).geometry;

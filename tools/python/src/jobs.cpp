@@ -3,7 +3,7 @@
 
 #include "arrays.h"
 #include "classes.h"
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "covol/error.h"
 #include "covol/surface.h"
 
@@ -35,7 +35,7 @@ GivenMarks to_marks(const py::handle& name, const py::handle& inputs) {
 }
 
 /// @param marks    inputs of each structure, by name
-/// @param painted  the image, the label outside, how it is to be understood
+/// @param painted  the image, the label of the outside, and how the image is read
 /// @return the results, and (a, b, volume, inner) of each overlap
 py::tuple run_job(const char* function, const std::optional<Image>& image, const py::dict& marks,
                   const py::tuple& painted, const py::object& init, const py::dict& keywords, const Call& call,
@@ -52,7 +52,7 @@ py::tuple run_job(const char* function, const std::optional<Image>& image, const
     return py::make_tuple(made.structures, overlaps);
 }
 
-/// As the program writes it, without the paths.
+/// As written by the program, without paths.
 py::object report_of(const Result& r) {
     const SegmentReport& report = r.result.report;
     tool::Json json = tool::to_json(report);
@@ -70,7 +70,7 @@ const Image& image_of(const Result& r) {
     return *r.image;
 }
 
-/// Of a mask that marks corrected its own values; else 1 where a voxel's centre is inside.
+/// The own values of a mask that marks corrected; otherwise 1 if a voxel's centre is inside.
 py::array mask_of(const Result& r, const Call& call) {
     const Image& image = image_of(r);
     const Image* const guess = r.guess && r.guess->mask ? &*r.guess->mask : nullptr;
@@ -85,7 +85,7 @@ py::array mask_of(const Result& r, const Call& call) {
     return labels.empty() ? give(std::move(voxels), shape) : give(std::move(labels), shape);
 }
 
-/// The structures' numbers from 1 on where a voxel's centre is inside; 0 outside of all.
+/// The numbers of the structures, from 1, at voxels whose centre is inside; 0 outside of all.
 py::array label_image(const std::vector<std::shared_ptr<Result>>& results, const Call& call) {
     const ImageGeometry geometry = image_of(*results.at(0)).geometry();
     std::vector<Structure> solids;
@@ -102,7 +102,7 @@ Mesh mesh_of(const std::shared_ptr<Result>& r) {
     return mesh;
 }
 
-/// (slice, (z, y, x), (x, y, z), area) for each slice where marks would help.
+/// (slice, (z, y, x), (x, y, z), area) for each slice on which marks would improve the result.
 py::list suggest(const Result& r, int count, const Call& call) {
     kNotNegative.require("count", count);
     const Image& image = image_of(r);

@@ -1,4 +1,5 @@
-// The extension module covol._covol: arrays in and out, and how calls run. What people call is in covol/__init__.py.
+// The extension module covol._covol: conversion of arrays, and how calls are run. The public functions are in
+// covol/__init__.py.
 #include <cctype>
 #include <optional>
 #include <utility>

@@ -22,7 +22,7 @@ double to_number(const std::string& name, py::handle value) {
 
 // ---- what a value of each type is in Python ------------------------------------------------------------------------
 
-/// A type without a case here has no keyword.
+/// Types without a case here have no keyword.
 template <typename T>
 constexpr bool kHasKeyword = HasWords<T> || kIsNumber<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, WorldBox> ||
                              std::is_same_v<T, std::vector<Vec3>>;
@@ -81,7 +81,7 @@ py::object to_python(const std::optional<T>& v) {
     return v ? to_python(*v) : py::none();
 }
 
-/// Calls visit(option, field, plain type) for each option that is a keyword.
+/// Calls visit(option, field, plain type) for each option that has a keyword.
 template <typename Of, typename Visit>
 void for_each_keyword(Of& settings, const Visit& visit) {
     for_each_option(settings, [&](const OptionInfo& option, auto& field) {

@@ -13,7 +13,7 @@ namespace covol::python {
 namespace py = pybind11;
 using tool::Length;
 
-/// All that options of segment() and reconstruct() set.
+/// All settings of segment() and reconstruct() that have options.
 struct Settings {
     SegmentOptions segment;
     ContourOptions contours;
@@ -21,24 +21,24 @@ struct Settings {
     tool::InputOptions inputs;
 };
 
-/// Keywords, read while the GIL is held.
+/// Keyword arguments, which are read while the GIL is held.
 class GivenOptions {
 public:
-    /// @throws Error InvalidOptions, py::type_error for a name that is none.
+    /// @throws Error InvalidOptions, py::type_error for an unknown name.
     GivenOptions(const char* function, const py::dict& keywords);
     /// "voxel_size", which may be relative to the automatic one.
     [[nodiscard]] Length voxel_size() const { return given_.length("voxel_size"); }
-    /// The settings for voxels of edge h, which stays one that may grow where it was not given.
+    /// The settings for voxels of edge h. If no voxel size was given, it may still be increased.
     [[nodiscard]] Settings resolve(double h, bool with_image) const;
 
 private:
     tool::Given<Settings> given_;
 };
 
-/// (name, type, default) of each option: what __init__.pyi is made of.
+/// (name, type, default) of each option: the source of __init__.pyi.
 [[nodiscard]] py::list list_options();
 
-/// The value of a word. @throws Error InvalidOptions, "name: expected one of ..."
+/// The enumerator with the given name. @throws Error InvalidOptions, "name: expected one of ..."
 template <HasWords Enum>
 [[nodiscard]] Enum to_choice(const std::string& name, py::handle given);
 [[nodiscard]] Length to_length(const std::string& name, py::handle given);

@@ -11,37 +11,36 @@
 
 namespace covol::python {
 
-/// A level set of covol, or one that is read from a .vdb file.
+/// A level set computed by covol, or read from a .vdb file.
 struct LevelSet {
     FloatGridPtr grid;
 };
 
-/// Where a level set starts, or a guess that marks correct: a text as on the command line or a file, a level set or a
-/// mask.
+/// A start, or a guess that marks correct: a text as on the command line, a file, a level set or a mask.
 using Shape = std::variant<std::monostate, std::string, LevelSet, Image>;
 
-/// What says where one structure is.
+/// The marks and other inputs of one structure.
 struct GivenMarks {
     std::string name;
     std::vector<PointCloud> points, contours, inside, outside;
     std::vector<Vec3> exterior_seeds;
     Shape init, guess;
-    std::optional<Image> painted = {};  ///< of this structure alone
+    std::optional<Image> painted = {};  ///< of this structure only
 };
 
-/// All of a job but its options.
+/// All inputs of a job except its options.
 struct Problem {
-    std::optional<Image> image;  ///< none: points alone
+    std::optional<Image> image;  ///< none: points only
     std::vector<GivenMarks> structures;
     std::optional<Image> painted;
     PaintedOptions painting;
     Shape init;
 };
 
-/// What came of one structure, and what it came from.
+/// The result for one structure, and its inputs.
 struct Result : StructureResult {
     std::optional<Image> image;
-    std::vector<std::string> log;  ///< choices and warnings, in their order
+    std::vector<std::string> log;  ///< automatic choices and warnings, in chronological order
 };
 
 struct Solution {
@@ -49,7 +48,7 @@ struct Solution {
     std::vector<StructureOverlap> overlaps;
 };
 
-/// The job of `covol segment` and `covol reconstruct` on what is in memory. @param lapse  null: no time-lapse
+/// Runs the job of `covol segment` or `covol reconstruct` on data in memory. @param lapse  null: no time-lapse
 [[nodiscard]] Solution solve(const Problem& problem, const GivenOptions& given, const Call& call, TimeLapse* lapse);
 
 }  // namespace covol::python

@@ -1,4 +1,4 @@
-// Mesh and LevelSet, and what is made from them.
+// Mesh and LevelSet, and functions that create results from them.
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -7,7 +7,7 @@
 
 #include "arrays.h"
 #include "classes.h"
-#include "cli/report.h"
+#include "cli/output/report.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_cleanup.h"
@@ -18,7 +18,7 @@
 namespace covol::python {
 namespace {
 
-/// In single precision and without a copy, but where that would not hold them.
+/// In single precision and without a copy, unless single precision is not sufficient.
 py::array vertices_of(const Mesh& mesh) {
     const auto count = static_cast<py::ssize_t>(mesh.triangles->vertices.size());
     if (mesh.triangles->origin != Vec3{0, 0, 0}) {
@@ -67,7 +67,7 @@ void save_mesh(const Mesh& mesh, const std::filesystem::path& path, std::optiona
     write_mesh(path.string(), *mesh.triangles, options);
 }
 
-/// What `covol mesh` does.
+/// The same as `covol mesh`.
 Mesh make_mesh(const LevelSet& surface, const py::object& isovalue, const py::object& min_component,
                const py::object& target_edge, const py::object& adaptive, int smooth, bool repair, const Call& call) {
     const double h = domain_of(*surface.grid).voxel_size;
@@ -143,7 +143,7 @@ py::object compare_solids(const py::object& a, const py::object& b, int label, i
     return from_json(tool::to_json(report).dump());
 }
 
-/// Of points from a surface.
+/// Distances of points from a surface.
 py::object measure_points(const py::object& points, const Mesh& mesh, const Call& call) {
     const std::vector<Vec3> places = to_positions("points", points);
     if (places.empty()) throw Error(Errc::InvalidInput, "points: expected positions, got none", "points");

@@ -1,1 +1,1 @@
-"""What the module Covol of 3D Slicer does: job.py, and what it shares with covol's other plugins."""
+"""Functions of the module Covol of 3D Slicer: job.py, and code shared with covol's other plugins."""

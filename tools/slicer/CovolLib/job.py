@@ -1,7 +1,7 @@
-"""Between nodes of 3D Slicer and covol: nodes are exported to files, the program runs, and its files come back into nodes.
+"""Runs covol on nodes of 3D Slicer: nodes are exported to files, the program runs, and its output files are loaded as nodes.
 
-`slicer` is 3D Slicer's module, or an object with the functions of it that are used: util.exportNode(), util.loadSegmentation(),
-util.loadModel(), mrmlScene. Nothing else here needs 3D Slicer.
+`slicer` is 3D Slicer's module, or an object with those of its functions that are used: util.exportNode(), util.loadSegmentation(),
+util.loadModel(), mrmlScene. This module does not need 3D Slicer otherwise.
 """
 import json
 import os
@@ -16,18 +16,18 @@ CURVE, FIDUCIALS = "vtkMRMLMarkupsClosedCurveNode", "vtkMRMLMarkupsFiducialNode"
 
 
 class Job:
-    """One run. Start it, ask `process.poll()` or `process.follow()`, then `finish()`."""
+    """One run. Create it, call `process.poll()` or `process.follow()`, then `finish()`."""
 
     def __init__(self, slicer, program, volume, markups, guess=None, options=""):
         """
         Args:
             volume: the volume node.
-            markups: nodes of markups: point lists are marks on the border, closed curves its outlines on slices.
-            guess: a segmentation with one segment that the marks correct, or None.
-            options: further options, as a shell would have them.
+            markups: markup nodes: point lists are marks on the border, closed curves are outlines of the structure on slices.
+            guess: a segmentation with one segment that is corrected by the marks, or None.
+            options: further options, in shell syntax.
 
         Raises:
-            Failed: what cannot be run is said before anything is started.
+            Failed: invalid inputs, before the program is started.
         """
         try:
             more = shlex.split(options)
@@ -53,14 +53,14 @@ class Job:
         self.process = _process.Process(found, [*words, *more], self._folder.name)
 
     def _export(self, node, name):
-        """A file of a node as it lies in the world, with the transforms that it is below."""
+        """Exports a node to a file in world coordinates, with its parent transforms applied."""
         path = os.path.join(self._folder.name, name)
         if self._slicer.util.exportNode(node, path, world=True) is False:
             raise _process.Failed(4, f"{node.GetName()}: 3D Slicer cannot write it")
         return path
 
     def finish(self, segmentation=None, model=None):
-        """Waits for the end and puts the result into nodes: those of the last one, else new ones.
+        """Waits for the end and stores the result in nodes: those of the last result, or new ones.
 
         Args:
             segmentation, model: nodes of the last result, or None.
@@ -82,7 +82,7 @@ class Job:
             made.SetName(f"{self._volume.GetName()} {NAME}")
             made.SetReferenceImageGeometryParameterFromVolumeNode(self._volume)
             return made
-        # The segments of the last result are replaced one by one: those that a person has added stay.
+        # Only the segments of the last result are replaced: those that the user has added stay.
         old, new = last.GetSegmentation(), made.GetSegmentation()
         for n in range(new.GetNumberOfSegments()):
             number = new.GetNthSegmentID(n)
@@ -103,7 +103,7 @@ class Job:
 
 
 def summary(report):
-    """What a panel says of a result: lines."""
+    """Summary of a result for a panel, as lines."""
     entry = (report.get("structures") or [report])[0]
     surface = entry["surface"]
     unit = report.get("input", {}).get("image", {}).get("unit") or "unit"

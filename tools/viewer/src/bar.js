@@ -18,7 +18,7 @@ export function toolChoice(state, tools) {
   return el('div', {class: 'tools', role: 'group', 'aria-label': 'tool'}, buttons);
 }
 
-/** `can()` gives whether there is something to undo, and to redo. */
+/** `can()` returns whether there are actions to undo, and to redo. */
 export function historyButtons({study, state}, can) {
   const undo = barButton('undo', 'undo (z)', () => study.act({do: 'undo'})), redo = barButton('redo', 'redo (Shift+z)', () => study.act({do: 'redo'}));
   const update = () => { [undo.disabled, redo.disabled] = can().map((is) => !is); };
@@ -27,7 +27,7 @@ export function historyButtons({study, state}, can) {
   return el('div', {class: 'tools', role: 'group', 'aria-label': 'history'}, undo, redo);
 }
 
-/** `more()` gives what else there is to choose from. */
+/** `more()` returns further entries. */
 export function windowMenu({state, image, panels}, more = () => []) {
   return menu('grey values (w)', [icon('window'), el('span', {class: 'caret'})], (close) => [
     ...presets(image, panels[state.get('keyPanel')].slice).map(([name, window]) => menuItem(name, () => { state.set({window}); close(); },

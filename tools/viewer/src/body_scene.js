@@ -1,4 +1,4 @@
-// The 3D view of the page: surfaces that come and go, marks, slices where they are asked for.
+// The 3D view of the page: surfaces that are added and removed, marks, and optionally slices.
 import {
   BackSide, Box3, BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, InstancedMesh, IcosahedronGeometry, LineBasicMaterial,
   LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Raycaster,
@@ -9,21 +9,21 @@ import {AXIS_COLORS} from './space.js';
 import {EYE, rgbColor, Stage3D} from './stage3d.js';
 
 const CLICK = 4;  // CSS pixels
-// Until a change is seen in 3D, ms: a mark waits for the surface that it makes, and that for its outlines.
+// Delays in ms before a change is shown in 3D: after a mark, the surface that follows from it; after a surface, its outlines.
 const WITH_SURFACE = 600, AFTER_OUTLINES = 60;
 const KINDS = ['surface', 'inside', 'outside'];
-const HALO = 1.3;  // radius of the rim around a mark, of its own: it is told from dark and light alike
+const HALO = 1.3;  // radius of the rim around a mark, which makes it visible on dark and light backgrounds
 const shared = new IcosahedronGeometry(1, 2), coarse = new IcosahedronGeometry(1, 1), coarsest = new IcosahedronGeometry(1, 0);
 const ballOf = (count) => count > 4000 ? coarsest : count > 800 ? coarse : shared;
 
-/** A mark is told from the surface that it lies on, and from those of the other kinds. */
+/** Marks are distinguishable from their surface, and from marks of other kinds. */
 function markColor(color, kind) {
   const own = rgbColor(color);
   return kind === 'surface' ? own.multiplyScalar(0.3) : kind === 'inside' ? own.lerp(rgbColor([255, 255, 255]), 0.6) : rgbColor([20, 20, 22]);
 }
 
 export class BodyScene extends Stage3D {
-  /** `app` has space, state, study, meshes, tools, panels and goTo(world). @throws where there is no WebGL */
+  /** `app` has space, state, study, meshes, tools, panels and goTo(world). @throws if WebGL is not available */
   constructor(canvas, app) {
     super(canvas, app.state, app.space);
     Object.assign(this, {app, surfaces: new Map(), balls: new Map(), isTouched: false, due: Infinity, patience: WITH_SURFACE});
@@ -31,7 +31,7 @@ export class BodyScene extends Stage3D {
     for (let n = 0; n < 8; ++n) box.expandByPoint(new Vector3(...this.space.toWorld([0, 1, 2].map((a) => corners[n >> a & 1][a]))));
     this.imageBox = box;
     this.setBox(box);
-    this.sphere.radius *= 1.15;  // its corners lie on the ball around it
+    this.sphere.radius *= 1.15;  // the sphere is circumscribed about the box
     this.addImageBox(corners);
     this.addPlanes();
     this.addRing();
@@ -81,7 +81,7 @@ export class BodyScene extends Stage3D {
     state.on(['meshes'], () => this.refreshIn(AFTER_OUTLINES));
     state.on(['drag', 'active', 'marks'], () => this.refreshIn(0));
     state.on(['planes'], () => this.movePlanes());
-    // Most of the time nothing in 3D shows where the slices are.
+    // The positions of the slices are usually not visible in 3D.
     state.on(['slices'], () => { if (state.get('planes').some(Boolean) || state.get('cut') >= 0) this.movePlanes(); });
     state.on(['cut'], () => { this.turnCut(); this.updateClip(); });
     state.on(['flip'], () => this.updateClip());
@@ -97,7 +97,7 @@ export class BodyScene extends Stage3D {
     this.updateSigns();
   }
 
-  /** In so many ms at the latest what has changed is shown: where the processor draws the picture, that takes longer than all else. */
+  /** Shows changes after at most `wait` ms. Delayed, because drawing takes longest of all if there is no graphics card. */
   refreshIn(wait) {
     const due = performance.now() + wait;
     if (this.due <= due) return;
@@ -111,14 +111,14 @@ export class BodyScene extends Stage3D {
     else refresh();
   }
 
-  /** Whether structures came, went, or are shown in another way. */
+  /** Whether structures were added or removed, or their appearance has changed. */
   isLookChanged() {
     const look = this.app.study.structures.flatMap((s) => [s.id, s.visible, String(s.color)]), isSame = String(look) === this.lookSeen;
     this.lookSeen = String(look);
     return !isSame;
   }
 
-  /** Whether surfaces or marks are others than those that were shown last. */
+  /** Whether surfaces or marks differ from the displayed ones. */
   isChanged() {
     const {study, meshes} = this.app, seen = [this.state.get('drag'), this.state.get('active'), this.state.get('marks')];
     for (const structure of study.structures) seen.push(structure.id, meshes.get(structure.id), structure.visible, structure.marks, String(structure.color));
@@ -127,7 +127,7 @@ export class BodyScene extends Stage3D {
     return !isSame;
   }
 
-  /** Surfaces and marks as they are now. The camera stays, but while nobody has touched it all of the body is shown. */
+  /** Updates surfaces and marks. The camera is kept; until the user moves it, it shows the whole body. */
   update() {
     const {study, meshes} = this.app, seen = new Set();
     for (const structure of study.structures) {
@@ -146,7 +146,7 @@ export class BodyScene extends Stage3D {
     this.updateClip();
   }
 
-  /** Whether the body is in sight, and not too small. */
+  /** Whether the body is visible, and large enough. */
   isWellSeen() {
     const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));
     const fit = this.sphere.radius / Math.sin(half), distance = this.camera.position.distanceTo(this.sphere.center);
@@ -182,7 +182,7 @@ export class BodyScene extends Stage3D {
   updateMarks(structure, count) {
     let own = this.balls.get(structure.id);
     const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null, isShown = structure.visible && this.state.get('marks');
-    // On the screen about as large beside a small body as beside a large one; smaller where there are many.
+    // About the same size on the screen for small and large bodies; smaller for many marks.
     const radius = this.sphere.radius * Math.min(0.013, Math.max(0.005, 0.2 / Math.sqrt(count))), ball = ballOf(count);
     const key = [structure.marks, structure.color, isShown, moved, radius, ball];
     if (own && key.every((part, n) => part === own.key[n])) return;
@@ -235,7 +235,7 @@ export class BodyScene extends Stage3D {
     this.cornersOf(axis, this.state.get('slices')[axis]).forEach((place, n) => position.setXYZ(n, ...place));
     position.needsUpdate = true;
     if (!picture) return;
-    // The last pixels of a coarse picture reach beyond the image.
+    // The last pixels of a coarse picture extend beyond the image.
     const x = this.space.size[right] / pictureStep / picture.width, y = this.space.size[down] / pictureStep / picture.height;
     [[0, 0], [x, 0], [x, y], [0, y]].forEach(([u, v], n) => uv.setXY(n, u, v));
     uv.needsUpdate = true;
@@ -243,7 +243,7 @@ export class BodyScene extends Stage3D {
     this.drawOutlines(axis);
   }
 
-  /** The surfaces' outlines on a slice, seen from both of its sides. */
+  /** The surfaces' outlines on a slice, visible from both sides. */
   drawOutlines(axis) {
     const {outlines} = this.planes[axis], {right, down} = this.app.panels[axis], at = this.state.get('slices')[axis];
     const places = [], colors = [], lift = 0.002 * this.sphere.radius / this.space.spacing[axis], index = [0, 0, 0];
@@ -277,7 +277,7 @@ export class BodyScene extends Stage3D {
     this.draw();
   }
 
-  /** What is under the pointer: the slices go there, or a mark is set there. */
+  /** Moves the slices to the position under the pointer, or sets a mark there. */
   pick(event) {
     const box = this.canvas.getBoundingClientRect(), ray = new Raycaster();
     ray.setFromCamera(new Vector2(2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height), this.camera);
@@ -300,7 +300,7 @@ export class BodyScene extends Stage3D {
     this.app.keep('camera', null);
   }
 
-  /** A thin body in a large image must not be cut off when the eye moves away from it. */
+  /** Depth range in which a thin body in a large image is not clipped when the camera moves away from it. */
   setDepth(distance) {
     const size = this.imageBox.max.distanceTo(this.imageBox.min);
     this.camera.near = Math.min(distance, size) / 100;
@@ -318,7 +318,7 @@ export class BodyScene extends Stage3D {
     this.app.keep('camera', {position: this.camera.position.toArray(), target: this.controls.target.toArray()});
   }
 
-  /** The camera as it was before a reload, {position, target}; what makes no sense is not taken. */
+  /** Restores the camera after a reload, {position, target}; invalid values are ignored. */
   takeCamera(kept) {
     const {position, target} = kept ?? {};
     if (![position, target].every((place) => place?.length === 3 && place.every(Number.isFinite))) return;

@@ -1,4 +1,4 @@
-// What actions make of structures.
+// The effects of actions on structures.
 
 const isSamePlace = (a, b) => a.length === b.length && a.every((v, n) => v === b[n]);
 export const isSameMark = (mark, action) => mark.kind === action.kind && isSamePlace(mark.world, action.world);
@@ -9,7 +9,7 @@ const CHANGES = {
   recolor: (own, a) => ({...own, color: a.color}),
   lock: (own, a) => ({...own, locked: a.locked}),
   show: (own, a) => ({...own, visible: a.visible}),
-  // What the server has already told of is not shown twice until it is acknowledged.
+  // A mark that the server has already sent is not shown twice before it is acknowledged.
   add_mark: (own, a, id) => own.marks.some((m) => !m.isNew && isSameMark(m, a)) ? own : ({...own, marks: [...own.marks, {id, kind: a.kind, world: a.world, isNew: true}]}),
   move_mark: (own, a) => ({...own, marks: own.marks.map((m) => m.id === a.mark ? {...m, world: a.world} : m)}),
   remove_mark: (own, a) => ({...own, marks: own.marks.filter((m) => m.id !== a.mark)}),
@@ -21,7 +21,7 @@ const CHANGES = {
   remove_outline: (own, a) => ({...own, outlines: own.outlines.filter((o) => o.id !== a.mark)}),
 };
 
-/** The structures after an action; what it makes gets the ID. Nothing that was there is changed in place. */
+/** The structures after an action; a new object gets `id`. Existing objects are not modified. */
 export function applyAction(structures, action, id) {
   switch (action.do) {
     case 'add_structure':
@@ -33,7 +33,7 @@ export function applyAction(structures, action, id) {
       if (!mark) return structures;
       return structures.map((s) => s.id === action.structure ? CHANGES.remove_mark(s, action) : s.id === action.to ? {...s, marks: [...s.marks, mark]} : s);
     }
-    case 'duplicate': return structures;  // its copy has a name and a colour that the server chooses
+    case 'duplicate': return structures;  // the server chooses the name and colour of the copy
     default: {
       const change = CHANGES[action.do];
       return change ? structures.map((s) => s.id === action.structure ? change(s, action, id) : s) : structures;

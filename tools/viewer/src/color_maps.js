@@ -1,4 +1,4 @@
-// Colour maps for slices: a few colours of each, the others between them.
+// Colour maps for slices: a few colours of each, with interpolation between them.
 
 const MAPS = {
   grey: [[0, 0, 0], [255, 255, 255]],

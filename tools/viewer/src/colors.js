@@ -1,4 +1,4 @@
-// Colours of values: viridis (Smith and van der Walt, 2015), told apart by colour-blind readers too.
+// Colours of values: viridis (Smith and van der Walt, 2015), which colour-blind readers can distinguish, too.
 const VIRIDIS = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121],
   [110, 206, 88], [181, 222, 43], [253, 231, 37]];
 export const SUPPORT = [[68, 119, 170], [102, 190, 170], [220, 95, 60]];
@@ -8,7 +8,7 @@ export function viridis(share) {
   return VIRIDIS[n].map((low, c) => low + (at - n) * (VIRIDIS[n + 1][c] - low));
 }
 
-/** What a surface can be coloured by, for those whose values are known. */
+/** The quantities that a surface can be coloured by, if their values are known. */
 export function colorings(structures) {
   const has = (name) => structures.some((s) => s.values[name]);
   const list = [['structure', 'structure']];

@@ -1,4 +1,4 @@
-// Elements without markup in strings: a name from a file is text and nothing else.
+// Creates elements without markup in strings: a name from a file is always treated as text.
 
 /** An element; attributes that begin with "on" are listeners, children may be strings. */
 export function el(tag, attributes = {}, ...children) {
@@ -20,7 +20,7 @@ export function svg(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** A button that is on or off. */
+/** A toggle button. */
 export function toggle(label, isOn, change, attributes = {}) {
   const button = el('button', {
     type: 'button', class: 'toggle', 'aria-pressed': String(isOn), ...attributes,
@@ -33,7 +33,7 @@ export function toggle(label, isOn, change, attributes = {}) {
   return button;
 }
 
-/** One of several words. */
+/** A choice of one of several words. */
 export function choice(words, chosen, change, label) {
   const buttons = words.map(([value, text, title]) => el('button', {
     type: 'button', class: 'toggle', 'aria-pressed': String(value === chosen), title, 'data-value': value,
@@ -45,7 +45,7 @@ export function choice(words, chosen, change, label) {
   return el('div', {class: 'choice', role: 'group', 'aria-label': label}, buttons);
 }
 
-/** A number as people read it: four digits, no exponent where it can be helped. */
+/** A number for display: four digits, without an exponent if possible. */
 export function number(value, digits = 4) {
   if (typeof value !== 'number' || !Number.isFinite(value)) return String(value);
   if (Number.isInteger(value)) return Math.abs(value) < 1e15 ? value.toLocaleString('en-US').replace(/,/g, '\u2009') : String(value);
@@ -55,7 +55,7 @@ export function number(value, digits = 4) {
   return Math.abs(text) >= 1e4 ? Math.round(text).toLocaleString('en-US').replace(/,/g, '\u2009') : String(text);
 }
 
-/** "um" as it is printed. */
+/** A unit for display: "um" with a Greek mu. */
 export function unitText(unit) {
   const known = {um: '\u00b5m', micron: '\u00b5m', micrometer: '\u00b5m', micrometre: '\u00b5m', millimeter: 'mm', nanometer: 'nm'};
   return known[unit] ?? unit;
@@ -63,7 +63,7 @@ export function unitText(unit) {
 
 export function colorOf(rgb) { return `rgb(${rgb[0]}, ${rgb[1]}, ${rgb[2]})`; }
 
-/** A round patch of a colour. */
+/** A round dot of a colour. */
 export function dot(color) {
   const element = el('span', {class: 'dot'});
   element.style.background = colorOf(color);

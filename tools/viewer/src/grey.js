@@ -1,4 +1,4 @@
-// Which values of the image are black and which are white, and the colours between.
+// The window of grey values, from black to white, and the colours in between.
 import {colorTable} from './color_maps.js';
 
 /** A pixel for each of the 65536 codes of a slice. */
@@ -11,7 +11,7 @@ export function greyTable({low, high}, {black, white}, colors = 'grey') {
   return table;
 }
 
-/** The range between the darkest and the brightest hundredth of a slice. */
+/** The range between the 1st and the 99th percentile of a slice. */
 function rangeOfSlice({values}, {low, high}) {
   const counts = new Uint32Array(1024);
   for (let n = 0; n < values.length; ++n) ++counts[values[n] >> 6];
@@ -24,12 +24,12 @@ function rangeOfSlice({values}, {low, high}) {
   return {black: value(at(0.01)), white: value(at(0.99))};
 }
 
-/** [name, window] of what there is to choose from; `slice` is the one that is looked at. */
+/** Available choices as [name, window]; `slice` is the displayed one. */
 export function presets(image, slice) {
   const automatic = {black: image.black, white: image.white}, whole = {black: image.low, white: image.high}, list = [['automatic', automatic]];
   if (!isSame(automatic, whole)) list.push(['whole range', whole]);
   if (slice) list.push(['this slice', rangeOfSlice(slice, image)]);
-  // Hounsfield units: air is -1000, and no scanner tells less than -4096 or more than 32767.
+  // Hounsfield units: air is -1000, and scanners report values from -4096 to 32767.
   const isAnatomicalCt = image.anatomical && image.low <= -500, looksLikeCt = image.low <= -900 && image.low >= -4096 && image.high <= 32767;
   if ((isAnatomicalCt || looksLikeCt) && image.high >= 300)
     list.push(['soft tissue', {black: -160, white: 240}], ['brain', {black: 0, white: 80}], ['bone', {black: -450, white: 1050}], ['lung', {black: -1350, white: 150}]);

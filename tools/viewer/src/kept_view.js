@@ -1,9 +1,9 @@
-// What is seen survives a reload: slices, zoom, grey values, planes in 3D.
+// Stores the view over a reload: slices, zoom, grey values, planes in 3D.
 import {COLOR_MAPS} from './color_maps.js';
 
 export const VIEW_NAMES = ['slices', 'views', 'window', 'planes', 'cut', 'flip', 'large', 'countFrom', 'marks', 'colors'];
 
-/** What is shown at first: as it was before a reload, as far as that makes sense. */
+/** The initial state: as before a reload, as far as the stored values are valid. */
 export function viewState(image, space, kept, first = {}) {
   const isTriple = (list, test) => Array.isArray(list) && list.length === 3 && list.every(test), isOneOf = (values, value, otherwise) => values.includes(value) ? value : otherwise;
   const otherwise = {slices: space.size.map((n) => Math.floor((n - 1) / 2)), window: {black: image.black, white: image.white}, planes: [false, false, false], ...first};
@@ -17,7 +17,7 @@ export function viewState(image, space, kept, first = {}) {
   };
 }
 
-/** Keeps these parts of the state; the last change counts. `isLasting(name, value)` says what may be kept. */
+/** Stores these parts of the state after each change. `isLasting(name, value)` returns whether a value may be stored. */
 export function remember(state, store, names, isLasting = () => true) {
   let timer = null;
   const save = () => {

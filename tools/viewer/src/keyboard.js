@@ -1,4 +1,4 @@
-// Keys that every page has, and the sheet that lists keys.
+// Keys of both pages, and the sheet that lists keys.
 import {el} from './dom.js';
 import {isSame, presets} from './grey.js';
 
@@ -6,7 +6,7 @@ export const VIEW_ROWS = [['wheel, [ ]', 'slice; with Shift 10'], ['Ctrl+wheel, 
   ['arrows', 'move the crosshair, turn 3D'], ['right-drag', 'grey values'], ['w', 'next grey values'], ['f', 'this view alone'], ['r', 'reset views'], ['v', 'slices in 3D'],
   ['q', 'marks: show or hide'], ['k', 'count slices from 1, as Fiji does'], ['t', 'dark or light'], ['?', 'this sheet']];
 
-/** [title, rows of [key, what it does]] for each part. */
+/** `parts` are [title, rows of [key, description]]. */
 export function helpSheet(parts) {
   const dialog = el('dialog', {class: 'help', 'aria-label': 'keys', onclick: (event) => { if (event.target === dialog) dialog.close(); }},
     el('div', {class: 'help-head'}, el('h2', {}, 'Keys'), el('button', {type: 'button', class: 'icon', 'aria-label': 'close', onclick: () => dialog.close()}, '\u2715')),
@@ -15,7 +15,7 @@ export function helpSheet(parts) {
   return dialog;
 }
 
-/** What the keys of VIEW_ROWS do; `app` has state, panels, image and space, and `view()` gives the 3D view. */
+/** Actions of the keys of VIEW_ROWS; `app` has state, panels, image and space, and `view()` returns the 3D view. */
 export function viewKeys(app, {help, theme, view}) {
   const {state, panels, image, space} = app, panel = () => panels[state.get('keyPanel')], step = (by) => panel()?.go(panel().at + by);
 
@@ -49,14 +49,14 @@ export function viewKeys(app, {help, theme, view}) {
 }
 
 /**
- * Sends keys where they belong: `keys` are actions by key, `enter(event)` says whether it took the key, `digit(n)` counts
- * from 0. Arrows and the keys of pages have their own meaning outside of the elements that `taking` selects.
+ * Dispatches keys: `keys` are actions by key, `enter(event)` returns whether it handled the key, `digit(n)` counts from 0.
+ * Outside of elements that match `taking`, arrow and page keys keep their default action.
  */
 export function listenToKeys(keys, {help, view, moveCrosshair, enter, digit, taking = 'body, canvas'}) {
   document.addEventListener('keydown', (event) => {
     const {key, target} = event, isText = target.matches?.('input:not([type=range]):not([type=color]):not([type=checkbox]), select, textarea'), isOnControl = target.matches?.('button, a, input, select, summary');
     if (help.open || document.querySelector('dialog[open]') || isText) return;
-    const isTyped = event.getModifierState('AltGraph');  // [ and ] on many keyboards
+    const isTyped = event.getModifierState('AltGraph');  // [ and ] on many keyboard layouts
     if (!isTyped && (event.ctrlKey || event.metaKey)) {
       const act = {z: event.shiftKey ? keys.Z : keys.z, Z: keys.Z, y: keys.Z}[key];
       if (!act) return;
@@ -80,7 +80,7 @@ export function listenToKeys(keys, {help, view, moveCrosshair, enter, digit, tak
   });
 }
 
-/** A frame shows what has the keys, once keys are used. */
+/** Shows a frame around the focused element once keys are used. */
 export function showFocus() {
   addEventListener('keydown', ({key}) => { if (/^(Tab|Arrow.*|Page.*|[[\]{}a])$/.test(key)) document.documentElement.dataset.keys = 'on'; });
   addEventListener('pointerdown', () => { delete document.documentElement.dataset.keys; }, true);

@@ -1,11 +1,11 @@
-// Marks by mouse, pen and fingers: a click sets one, a drag moves it.
+// Marks by mouse, pen and touch: a click sets one, a drag moves it.
 import {marksOn} from './overlay.js';
 import {CLICK, PlanePointer, TAP} from './pointer.js';
 
 const HIT = 8;  // CSS pixels
 
 export class MarkPointer extends PlanePointer {
-  /** The nearest mark of this slice that may be changed. */
+  /** The nearest mark on this slice that can be changed. */
   markAt([x, y], within = HIT) {
     let best = null, least = within;
     const active = this.panel.tools.active();
@@ -18,7 +18,7 @@ export class MarkPointer extends PlanePointer {
     return best;
   }
 
-  /** What a press there would take hold of. */
+  /** The target of a press at that position. */
   targetAt(spot, isTouch = false) { return this.markAt(spot, isTouch ? TAP + 4 : HIT); }
 
   takesTouch(spot) { return super.takesTouch(spot) || Boolean(this.markAt(spot, TAP + 4)); }

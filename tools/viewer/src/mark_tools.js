@@ -1,6 +1,6 @@
-// What a click, a drag or a key does with marks of the active structure; the ruler.
+// Effects of clicks, drags and keys on marks of the active structure; the ruler.
 
-/** [name, label, key, what it does] */
+/** [name, label, key, description] */
 export const MARK_TOOLS = [
   ['surface', 'surface mark', 's', 'Click: mark on the surface \u00b7 Shift: inside \u00b7 Alt: outside \u00b7 drag moves a mark'],
   ['inside', 'inside mark', 'i', 'Click: mark inside \u00b7 drag moves a mark'],
@@ -23,7 +23,7 @@ export class MarkTools {
 
   active() { return this.study.structure(this.state.get('active')); }
 
-  /** The structure that is marked, made where there is none; null, and a word, where it is not to be changed. */
+  /** The structure to be marked, which is created if there is none; null, with a message, if it cannot be changed. */
   open() {
     let own = this.active() ?? this.study.structures[0] ?? null;
     if (!own) own = this.study.structure(this.addStructure());

@@ -1,7 +1,7 @@
 // A button with a list below it.
 import {el} from './dom.js';
 
-/** `fill` gives the list's elements when it opens. */
+/** `fill` returns the list's elements when it opens. */
 export function menu(label, face, fill) {
   const list = el('div', {class: 'menu', role: 'menu', 'aria-label': label, hidden: true});
   const button = el('button', {type: 'button', class: 'tool', title: label, 'aria-label': label, 'aria-haspopup': 'menu', 'aria-expanded': 'false', onclick: () => open(list.hidden)}, face);
@@ -11,7 +11,7 @@ export function menu(label, face, fill) {
     list.hidden = !isOpen;
     button.setAttribute('aria-expanded', String(isOpen));
     if (!isOpen) return isByKey && button.focus();
-    // Beside the edge of a narrow window it opens to the other side.
+    // Near the edge of a narrow window it opens to the other side.
     list.style.left = '0';
     const over = list.getBoundingClientRect().right - document.documentElement.clientWidth + 8;
     if (over > 0) list.style.left = `${-over}px`;

@@ -1,4 +1,4 @@
-// Meshes as lib/src/report/mesh_codec.h codes them.
+// Decodes meshes as encoded by lib/src/report/mesh_codec.h.
 
 export function decodePositions(mesh, bytes) {
   const count = mesh.vertices, positions = new Float32Array(3 * count);

@@ -1,4 +1,4 @@
-// A plane of any direction through the image, in 3D: the image upon it, and where the surfaces meet it.
+// An oblique plane through the image, in 3D: the image on it, and its intersections with the surfaces.
 import {
   BufferAttribute, BufferGeometry, DataTexture, DoubleSide, Group, LinearFilter, LineBasicMaterial, LineLoop, LineSegments, Mesh,
   MeshBasicMaterial, SRGBColorSpace, Vector3,
@@ -6,10 +6,10 @@ import {
 import {linesAt} from './outline.js';
 import {rgbColor} from './stage3d.js';
 
-const PIXELS = 384;  // along each side
+const PIXELS = 384;  // in each direction
 const COLOR = '#c98b1d';
 
-/** Two directions that span the plane of a normal, the second one as upright as it may be. */
+/** Two directions that span the plane with this normal; the second one is as upright as possible. */
 function basisOf(normal) {
   const up = new Vector3(0, 0, 1), right = up.clone().cross(normal);
   if (right.lengthSq() < 1e-6) right.set(1, 0, 0);
@@ -19,8 +19,8 @@ function basisOf(normal) {
 
 export class ObliquePlane {
   /**
-   * `half` is half of the plane's side, in world units. `codesOf(grid)` gives, at once or later, codes of 16 bits for the
-   * pixels of a grid {first, alongX, alongY, count} in voxels of the image, row by row; `arrived` is called when it was later.
+   * `half` is half of the plane's side, in world units. `codesOf(grid)` returns, at once or later, codes of 16 bits for the
+   * pixels of a grid {first, alongX, alongY, count} in voxels of the image, row by row; `arrived` is called if they came later.
    */
   constructor(space, half, codesOf, arrived) {
     Object.assign(this, {space, half, codesOf, arrived, group: new Group(), pixels: new Uint8Array(4 * PIXELS * PIXELS)});
@@ -35,7 +35,7 @@ export class ObliquePlane {
     this.group.add(this.mesh, border, this.lines);
   }
 
-  /** `grey` gives pixels for codes of 16 bits; `surfaces` are [mesh, colour]. */
+  /** `grey` has a pixel for each code of 16 bits; `surfaces` are [mesh, colour]. */
   put({normal, center}, grey, surfaces) {
     const towards = new Vector3(...normal), middle = new Vector3(...center), [right, up] = basisOf(towards), {half} = this;
     const place = (x, y) => middle.clone().addScaledVector(right, x).addScaledVector(up, y), position = this.mesh.geometry.getAttribute('position');
@@ -54,7 +54,7 @@ export class ObliquePlane {
     const codes = this.codesOf(grid);
     if (!(codes instanceof Promise)) return this.take(codes, grid, grey);
     return codes.then((own) => {
-      if (this.key !== key || !own) return;  // another plane is looked at now
+      if (this.key !== key || !own) return;  // another plane is displayed now
       this.take(own, grid, grey);
       this.arrived();
     });

@@ -1,19 +1,19 @@
-// The 3D view with a plane of any direction through the image.
+// The 3D view with an oblique plane through the image.
 import {Vector3} from 'three';
 import {BodyScene} from './body_scene.js';
 import {el} from './dom.js';
 import {ObliquePlane} from './oblique.js';
 import {EYE} from './stage3d.js';
 
-export const OBLIQUE = 3;  // beside the axes 0, 1, 2 of the image: what surfaces are cut at
+export const OBLIQUE = 3;  // in addition to the image axes 0, 1, 2: the plane that cuts surfaces
 
-/** The plane that was shown before a reload, if that makes sense; else null. */
+/** The stored plane from before a reload if it is valid, otherwise null. */
 export function keptOblique(kept) {
   const isPlace = (place) => Array.isArray(place) && place.length === 3 && place.every(Number.isFinite);
   return isPlace(kept?.normal) && isPlace(kept?.center) ? {normal: kept.normal, center: kept.center} : null;
 }
 
-/** The plane faces the eye when it is switched on. */
+/** The plane faces the camera when it is switched on. */
 export function obliqueButton(state, view, key) {
   const button = el('button', {type: 'button', class: 'small', title: `a plane through the crosshair that faces you (${key})`, 'data-key': 'oblique', onclick: () => {
     if (!state.get('oblique')) view()?.faceOblique();
@@ -26,7 +26,7 @@ export function obliqueButton(state, view, key) {
 }
 
 export class ObliqueScene extends BodyScene {
-  /** `codesOf` is an ObliquePlane's. */
+  /** `codesOf` is passed to the ObliquePlane. */
   addOblique(codesOf) {
     this.oblique = new ObliquePlane(this.space, 0.5 * this.imageBox.max.distanceTo(this.imageBox.min), codesOf, () => this.draw());
     this.oblique.group.visible = false;
@@ -41,13 +41,13 @@ export class ObliqueScene extends BodyScene {
     this.updateOblique();
   }
 
-  /** The plane through the crosshair that the eye looks at straight. */
+  /** Sets the plane through the crosshair that is perpendicular to the viewing direction. */
   faceOblique() {
     const normal = this.camera.position.clone().sub(this.controls.target).normalize().toArray();
     this.state.set({oblique: {normal, center: this.space.toWorld(this.state.get('slices'))}});
   }
 
-  /** Moves it towards its normal, by so many of the smallest voxels' sides. */
+  /** Moves the plane along its normal by that many times the smallest voxel side. */
   stepOblique(by) {
     const {normal, center} = this.state.get('oblique'), step = by * Math.min(...this.space.spacing);
     this.state.set({oblique: {normal, center: center.map((x, a) => x + step * normal[a])}});

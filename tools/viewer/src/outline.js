@@ -1,6 +1,6 @@
-// Where a mesh meets a plane of the image.
+// Intersections of a mesh with a plane of the image.
 
-/** The mesh's vertices in the image's voxels: one array for each axis. */
+/** The mesh's vertices in voxels of the image: one array for each axis. */
 export function indexCoordinates(positions, volume) {
   const count = positions.length / 3, result = [0, 1, 2].map(() => new Float32Array(count));
   volume.duals.forEach((axis, a) => {
@@ -13,12 +13,12 @@ export function indexCoordinates(positions, volume) {
 }
 
 /**
- * The segments x0, y0, x1, y1, ... in which triangles cross coordinates[axis] = at, in the two other axes. `edges` is
- * given a number for the mesh's edge on which each end lies.
+ * The segments x0, y0, x1, y1, ... in which triangles cross coordinates[axis] = at, in the two other axes. `edges` gets,
+ * for each end, the number of the mesh's edge that it lies on.
  */
 function cross(coordinates, corners, axis, at, [right, down], edges = null) {
   const along = coordinates[axis], xs = coordinates[right], ys = coordinates[down], segments = [], count = along.length;
-  // A vertex on the plane counts as above it: no segment is found twice or lost.
+  // A vertex on the plane counts as above it, so that no segment is found twice or missed.
   const edge = (a, b) => {
     const share = (at - along[a]) / (along[b] - along[a]);
     segments.push(xs[a] + share * (xs[b] - xs[a]), ys[a] + share * (ys[b] - ys[a]));
@@ -35,23 +35,23 @@ function cross(coordinates, corners, axis, at, [right, down], edges = null) {
   return segments;
 }
 
-/** A structure's outline on a slice; the last one of each axis is kept. */
+/** A structure's outline on a slice; the latest one of each axis is cached. */
 export function outlineAt(structure, axis, at, axes) {
   structure.outlines ??= [];
   const known = structure.outlines[axis];
   if (known?.at === at) return known.segments;
-  // A lattice of marching cubes has vertices on slices: a little beside them no triangle lies in the plane.
+  // Marching cubes have vertices exactly on slices: with a small offset, no triangle lies in the plane.
   const segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes);
   structure.outlines[axis] = {at, segments};
   return segments;
 }
 
-/** Lines {places: [x0, y0, x1, y1, ...], closed} of segments whose ends are on the same edges. */
+/** Joins segments whose ends are on the same edges to lines {places: [x0, y0, x1, y1, ...], closed}. */
 function chain(segments, edges) {
   const ends = new Map(), used = new Uint8Array(edges.length / 2), lines = [];
   edges.forEach((edge, n) => { ends.has(edge) ? ends.get(edge).push(n) : ends.set(edge, [n]); });
   const place = (end) => [segments[2 * end], segments[2 * end + 1]];
-  /** From an end on to the next ones, until there are none. */
+  /** Follows the line from an end until it ends. */
   const follow = (end, places) => {
     for (let next = ends.get(edges[end]).find((other) => !used[other >> 1]); next !== undefined;) {
       used[next >> 1] = 1;
@@ -73,14 +73,14 @@ function chain(segments, edges) {
   return lines;
 }
 
-/** Whether a slice lies between the structure's ends: most of many do not meet it. */
+/** Whether a slice meets the structure's extent; with many structures, most do not. */
 function isMet(structure, axis, at) {
   structure.spans ??= structure.index.map((along) => along.reduce(([low, high], x) => [Math.min(low, x), Math.max(high, x)], [Infinity, -Infinity]));
   const [low, high] = structure.spans[axis];
   return at >= low - 1 && at <= high + 1;
 }
 
-/** A structure's outline on a slice as lines; the last one of each axis is kept. */
+/** A structure's outline on a slice as lines; the latest one of each axis is cached. */
 export function linesAt(structure, axis, at, axes) {
   structure.lines ??= [];
   const known = structure.lines[axis];

@@ -1,31 +1,31 @@
-// What is drawn upon a slice: crosshair, outlines, marks, the ruler, a place that is asked about.
+// Drawn on a slice: crosshair, outlines, marks, the ruler, a suggested position.
 import {colorOf, number} from './dom.js';
 import {linesAt} from './outline.js';
 import {write} from './plane.js';
 import {AXIS_COLORS} from './space.js';
 
 export const FAINT_WITHIN = 2;  // slices
-const GAP = 9;  // pixels of the crosshair's middle, which stay free
+const GAP = 9;  // pixels around the crosshair's centre that stay free
 const indices = new WeakMap();
 
-/** A mark's place in voxels. */
+/** A mark's position in voxels. */
 export function indexOf(space, mark) {
   let index = indices.get(mark);
   if (!index) indices.set(mark, index = space.toIndex(mark.world));
   return index;
 }
 
-/** A structure's colour on a grey image: dark ones are made brighter, first as they are, then towards white. */
+/** A structure's colour on a grey image: dark colours are brightened, first at constant hue, then towards white. */
 export function inkOf(rgb) {
   const light = ([r, g, b]) => (0.299 * r + 0.587 * g + 0.114 * b) / 255, grow = Math.min(255 / Math.max(1, ...rgb), Math.max(1, 0.6 / Math.max(0.01, light(rgb))));
   const bright = rgb.map((v) => v * grow), share = Math.max(0, (0.5 - light(bright)) / (1 - light(bright)));
   return colorOf(bright.map((v) => Math.round(v + share * (255 - v))));
 }
 
-/** Slices between a mark or an outline and the one that is seen, in whole ones. */
+/** The distance in whole slices between a mark or an outline and the displayed slice. */
 export const away = (at, shown) => Math.max(0, Math.ceil(Math.abs(at - shown) - 0.5 - 1e-6));
 
-/** A line of voxels: dark below, so that it is seen on white as well. */
+/** A line of voxels with a dark rim, which makes it visible on white, too. */
 export function stroke(context, panel, lines, color, {width = 1.6, rim = 1.8, dash = [], alpha = 1} = {}) {
   context.beginPath();
   for (const {places, closed} of lines) {
@@ -52,7 +52,7 @@ export function drawCrosshair(panel, context) {
   if (slices[axis] !== panel.shownAt) return;
   context.lineWidth = 1;
   context.globalAlpha = 0.6;
-  // A column leans where the image is sheared.
+  // Columns are inclined if the image is sheared.
   const slope = plane.lean / plane.scaleY, from = left + (y - top) * slope, on = (row) => x + (row - y) * slope;
   const parts = [[plane.right, on(top), top, on(y - GAP), y - GAP], [plane.right, on(y + GAP), y + GAP, on(top + height), top + height],
     [plane.down, from, y, x - GAP, y], [plane.down, x + GAP, y, from + width, y]];
@@ -79,7 +79,7 @@ export function drawSurface(panel, context, structure, isActive) {
   }
 }
 
-/** A disc on the surface, with a plus inside, hollow with a minus outside. */
+/** A disc for marks on the surface, with a plus for inside, hollow with a minus for outside. */
 export function drawMark(context, [x, y], kind, color, {radius = 4, alpha = 1, isMeant = false} = {}) {
   const size = isMeant ? radius + 1.5 : radius;
   context.globalAlpha = alpha;
@@ -120,7 +120,7 @@ export function drawMark(context, [x, y], kind, color, {radius = 4, alpha = 1, i
   context.globalAlpha = 1;
 }
 
-/** Marks as they are seen on a panel: [{structure, mark, spot, far}], those that a drag has moved with their new place. */
+/** Marks displayed on a panel: [{structure, mark, spot, far}]; dragged ones have their new position. */
 export function marksOn(panel, most = FAINT_WITHIN) {
   const {study, space, state, axis, plane} = panel, drag = state.get('drag'), list = [];
   if (!state.get('marks')) return list;
@@ -136,7 +136,7 @@ export function marksOn(panel, most = FAINT_WITHIN) {
 
 export function drawMarks(panel, context) {
   const selected = panel.state.get('selected'), hover = panel.state.get('hover'), list = marksOn(panel);
-  const many = list.length > 300;  // these would hide the outline
+  const many = list.length > 300;  // full-size marks would hide the outline
   for (const {structure, mark, far, spot} of list.sort((a, b) => b.far - a.far)) {
     const isMeant = [selected, hover].some((t) => t?.mark === mark.id && t.structure === structure.id);
     drawMark(context, spot, mark.kind, inkOf(structure.color), {radius: (far ? 3 : 4) * (many ? 0.6 : 1), alpha: far ? 0.5 - 0.15 * far : 1, isMeant});

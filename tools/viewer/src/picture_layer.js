@@ -1,7 +1,7 @@
-// The image on a plane, on a canvas of its own below the marks: it is drawn anew only when it is another picture.
+// The image on a plane, on a separate canvas below the marks: it is redrawn only if the picture changes.
 import {el} from './dom.js';
 
-/** Pictures come from the processor: on a canvas of the graphics card each one would be sent there first. */
+/** Pictures are computed on the CPU: a canvas in GPU memory would require an upload of each one. */
 const contextOf = (canvas) => canvas.getContext('2d', {willReadFrequently: true});
 
 /** Adds the colours of another channel. */
@@ -16,7 +16,7 @@ function addTo(pixels, values, table) {
 
 /** A slice, or a part of it, as a picture. */
 class Picture {
-  /** Whether it is another one than before. */
+  /** Draws the slice. Returns whether the picture has changed. */
   paint(slice, grey) {
     if (this.slice === slice && this.grey === grey.key) return false;
     this.canvas ??= document.createElement('canvas');
@@ -38,7 +38,7 @@ export class PictureLayer {
     Object.assign(this, {canvas: el('canvas', {class: 'image', 'aria-hidden': 'true'}), whole: new Picture(), fine: new Picture(), hasFine: false, count: 0});
   }
 
-  /** A whole slice, and a finer part of it or null. Whether the whole is another picture than before. */
+  /** Sets a whole slice, and a finer part of it or null. Returns whether the picture of the whole has changed. */
   take(slice, part, grey) {
     const isNew = this.whole.paint(slice, grey), isFiner = part ? this.fine.paint(part, grey) : false;
     if (isNew || isFiner || this.hasFine !== Boolean(part)) ++this.count;
@@ -46,7 +46,7 @@ export class PictureLayer {
     return isNew;
   }
 
-  /** On so many CSS pixels; `plane` says where. Nothing where there is no picture. */
+  /** Draws on that many CSS pixels; `plane` gives the position. Does nothing without a picture. */
   draw(plane, width, height, ratio, isThere) {
     const {canvas} = this, key = [this.count, isThere, width, height, ratio, plane.left, plane.top, plane.scaleX, plane.scaleY].join(' ');
     if (key === this.key) return;

@@ -1,10 +1,10 @@
-// One plane of an image on a canvas: where voxels are drawn, with letters of orientation and a scale bar.
+// One plane of an image on a canvas: positions of voxels, with orientation letters and a scale bar.
 import {number} from './dom.js';
 import {dominant} from './space.js';
 
-const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // towards - and + of the world's axes, LPS
+const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // at the - and + ends of the world's axes, LPS
 
-/** Text that is readable on any grey. */
+/** Text that is legible on any grey value. */
 export function write(context, text, x, y, color = '#fff') {
   context.lineJoin = 'round';
   context.strokeStyle = 'rgba(0, 0, 0, 0.7)';
@@ -14,7 +14,7 @@ export function write(context, text, x, y, color = '#fff') {
   context.fillText(text, x, y);
 }
 
-/** The largest of 1, 2, 5, 10, ... that is no more than this. */
+/** The largest of 1, 2, 5, 10, ... that is not larger than `most`. */
 export function roundLength(most) {
   const tens = 10 ** Math.floor(Math.log10(most));
   return [5, 2, 1].map((n) => n * tens).find((n) => n <= most) ?? tens;
@@ -25,29 +25,29 @@ export class Plane {
     Object.assign(this, {space, axis, anatomical});
     [this.right, this.down] = space.planeAxes(axis);
     this.flipX = this.flipY = false;
-    if (anatomical) {  // as a radiologist hangs it: the patient's left at the right, anterior and superior up
+    if (anatomical) {  // radiological convention: the patient's left at the right, anterior and superior up
       const x = dominant(space.axes[this.right]), y = dominant(space.axes[this.down]);
       this.flipX = x.sign < 0;
       this.flipY = y.w === 2 ? y.sign > 0 : y.sign < 0;
     } else {
-      this.flipY = this.down === 2;  // z up, as in 3D
+      this.flipY = this.down === 2;  // z up, as in the 3D view
     }
   }
 
-  /** Fits the plane into so many CSS pixels; `view` has a zoom, and the voxel x, y that is in the middle. */
+  /** Fits the plane into that many CSS pixels; `view` has a zoom, and the voxel x, y at the centre. */
   lay(width, height, view = null) {
     const {size, spacing} = this.space, cosine = this.space.cosine(this.right, this.down) * (this.flipX === this.flipY ? 1 : -1);
     const steep = Math.sqrt(1 - cosine * cosine), sizeX = size[this.right] * spacing[this.right] + Math.abs(cosine) * size[this.down] * spacing[this.down], sizeY = steep * size[this.down] * spacing[this.down];
     const scale = Math.min(width / sizeX, height / sizeY) * (view?.zoom ?? 1);  // CSS pixels per world unit
     const scaleX = scale * spacing[this.right], scaleY = scale * steep * spacing[this.down];
-    /** Of a sheared image each row begins so many pixels farther right than the one above it. */
+    /** In a sheared image, each row is shifted by this many pixels to the right of the one above it. */
     const lean = scale * cosine * spacing[this.down];
     const [x, y] = view ? this.shown(view.x, view.y) : [(size[this.right] - 1) / 2, (size[this.down] - 1) / 2];
     Object.assign(this, {scale, scaleX, scaleY, lean, viewWidth: width, viewHeight: height, width: scaleX * size[this.right], height: scale * sizeY,
       left: width / 2 - (x + 0.5) * scaleX - (y + 0.5) * lean, top: height / 2 - (y + 0.5) * scaleY});
   }
 
-  /** Voxels as they are counted from the left and from the top; its own inverse. */
+  /** Voxel coordinates counted from the left and from the top; the function is its own inverse. */
   shown(x, y) {
     const {size} = this.space;
     return [this.flipX ? size[this.right] - 1 - x : x, this.flipY ? size[this.down] - 1 - y : y];
@@ -65,7 +65,7 @@ export class Plane {
     return this.shown((px - this.left - rows * this.lean) / this.scaleX - 0.5, rows - 0.5);
   }
 
-  /** A picture of the plane, of which a pixel is `step` x `step` voxels; the last ones may reach beyond the image. A part of it begins at a pixel x, y. */
+  /** Draws a picture whose pixels are `step` x `step` voxels; the last ones may extend beyond the image. A part begins at pixel x, y. */
   drawPicture(context, picture, step = 1, {x = 0, y = 0} = {}) {
     const {left, top, width, height} = this, slope = this.lean / this.scaleY, x0 = left + (this.flipY ? slope * height : 0), right = this.flipX ? -1 : 1, down = this.flipY ? -1 : 1;
     context.save();
@@ -83,7 +83,7 @@ export class Plane {
     const {viewWidth: width, viewHeight: height} = this;
     const most = Math.min(120, width / 4) / this.scale;
     const length = roundLength(most), pixels = length * this.scale;
-    // On the picture itself, where there is room.
+    // On the image itself, if there is enough space.
     const x = width - Math.max(12, this.left + 10) - pixels, y = height - Math.max(12, this.top + 10);
     context.font = '11px system-ui, sans-serif';
     context.textAlign = 'center';

@@ -1,4 +1,4 @@
-// One plane on the page: its slice, what is drawn upon it, zoom and place.
+// One plane on the page: its slice, the overlay, zoom and position.
 import {el, number} from './dom.js';
 import {Plane, write} from './plane.js';
 import {AXIS_COLORS, dominant, planeName} from './space.js';
@@ -8,13 +8,13 @@ import {PictureLayer} from './picture_layer.js';
 const MOST_STEP = 1024, LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
 const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom', 'marks'];
 
-/** As many voxels for a value as there are in a pixel of the screen. */
+/** The number of voxels per value that matches the pixels of the screen. */
 const stepFor = (voxels) => Math.min(MOST_STEP, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
 
 export class PlanePanel {
   /**
-   * `app` has image, space, unitText, state, slices, toast, and what the pointer and the overlay ask for.
-   * `drawOverlay(panel, context)` draws upon the slice, `Input` is a PlanePointer, `redrawnOn` are more names of the state.
+   * `app` has image, space, unitText, state, slices, toast, and the members that pointer and overlay need.
+   * `drawOverlay(panel, context)` draws on the slice, `Input` is a PlanePointer, `redrawnOn` lists further names of the state.
    */
   constructor(axis, app, {drawOverlay, Input, redrawnOn = []}) {
     Object.assign(this, {axis, ...app, drawOverlay, shownAt: -1, travel: 0, picture: null, pictureStep: 1, layer: new PictureLayer()});
@@ -57,7 +57,7 @@ export class PlanePanel {
     this.state.set({views});
   }
 
-  /** The view that shows a voxel at a place of the canvas. */
+  /** The view that shows a voxel at a position on the canvas. */
   viewWith(zoom, [x, y], [px, py]) {
     const {plane} = this, grow = zoom / (this.view?.zoom ?? 1), [sx, sy] = plane.shown(x, y), rows = (py - plane.viewHeight / 2) / (plane.scaleY * grow);
     const [cx, cy] = plane.shown(sx - (px - plane.viewWidth / 2) / (plane.scaleX * grow) + rows * plane.lean / plane.scaleX, sy - rows);
@@ -68,24 +68,24 @@ export class PlanePanel {
     const {plane} = this, before = this.view?.zoom ?? 1, fit = Math.min(plane.scaleX, plane.scaleY) / before;
     const zoom = Math.min(LARGEST_VOXEL / fit, before * factor);
     this.setView(zoom <= 1.001 ? null : this.viewWith(zoom, plane.unplace(px, py), [px, py]));
-    this.draw();  // the next event counts from here
+    this.draw();  // updates the plane, from which the next event starts
   }
 
-  /** Brings a place into sight where zoom has put it out of it. */
+  /** Scrolls to a position if it is outside of the zoomed view. */
   reveal(index) {
     if (!this.view || !this.plane.viewWidth) return;
     const [px, py] = this.plane.place(index[this.right], index[this.down]), {viewWidth, viewHeight} = this.plane, rim = 24;
     if (px < rim || py < rim || px > viewWidth - rim || py > viewHeight - rim) this.setView({...this.view, x: index[this.right], y: index[this.down]});
   }
 
-  /** A place of the canvas in voxels of the image, on the slice that is seen. */
+  /** A position on the canvas in voxels of the image, on the displayed slice. */
   indexAt(px, py) {
     const index = [0, 0, 0], [x, y] = this.plane.unplace(px, py);
     [index[this.axis], index[this.right], index[this.down]] = [this.shownAt, x, y];
     return index;
   }
 
-  /** Whether a place may be marked: it is in the image, and that is seen. */
+  /** Whether a position can be marked: it is inside the image, and the slice is displayed. */
   isSeen(index) {
     if (!this.isInside(index)) return false;
     if (!this.hasPicture) this.toast('This slice could not be loaded: it is not marked blindly.');
@@ -94,7 +94,7 @@ export class PlanePanel {
 
   isInside(index) { return [this.right, this.down].every((a) => index[a] >= -0.5 && index[a] <= this.space.size[a] - 0.5); }
 
-  /** A place of the world in CSS pixels of the canvas, and of the window. */
+  /** A position of the world in CSS pixels of the canvas, and of the window. */
   spotOf(world) {
     const index = this.space.toIndex(world);
     return this.plane.place(index[this.right], index[this.down]);
@@ -129,14 +129,14 @@ export class PlanePanel {
     return undefined;
   }
 
-  /** A plane that another one hides may still be seen in 3D. */
+  /** A plane that is hidden behind another one on the page may still be visible in 3D. */
   drawHidden(ratio) {
     if (!this.state.get('planes')[this.axis]) return;
     if (!this.plane.scaleX) this.plane.lay(512, 512);
     this.takeSlice(ratio);
   }
 
-  /** As many voxels for a value as there are in a pixel of the screen, and the part of the slice that is seen. */
+  /** The number of voxels per value that matches the pixels of the screen, and the displayed part of the slice. */
   wish(ratio) {
     const {plane, axis, slices} = this, step = stepFor(1 / (Math.max(plane.scaleX, plane.scaleY) * ratio));
     const {viewWidth: width, viewHeight: height} = plane, corners = [[0, 0], [width, 0], [0, height], [width, height]].map(([x, y]) => plane.unplace(x, y));
@@ -150,7 +150,7 @@ export class PlanePanel {
     this.wanted = wanted;
     this.generation = slices.generation;
     this.hadFailed = failed;
-    // Until it is here one before it stays, with all that belongs to it.
+    // Until the slice has been received, a previous one is displayed, with its overlay.
     const late = slices.best(axis, at, step) || part || this.shownAt < 0 ? null : slices.late(axis, at, step, this.shownAt), place = late ?? at;
     const slice = slices.best(axis, place, step), detail = part && slices.partial(axis, place, step, part);
     const isNew = slice && this.layer.take(slice, detail, this.state.get('grey'));
@@ -159,7 +159,7 @@ export class PlanePanel {
     if (isNew) this.onPicture?.(axis);
   }
 
-  /** The slice has changed, though its number has not. */
+  /** The content of the slice has changed, although its position has not. */
   forgetPicture() { this.layer.whole.slice = null; }
 
   drawNoPicture(context, width, height) {

@@ -1,9 +1,9 @@
-// Mouse, pen and fingers on a plane: place, zoom, grey values, crosshair, ruler. What else a press does is added by those who extend it.
+// Mouse, pen and touch on a plane: position, zoom, grey values, crosshair, ruler. Subclasses add further actions of a press.
 
-export const CLICK = 4, TAP = 10;  // CSS pixels that a press may move and still be a click
-const NOTCH = 30;  // of a wheel that turns smoothly
+export const CLICK = 4, TAP = 10;  // CSS pixels that a click may move
+const NOTCH = 30;  // scroll distance of one step, for wheels without notches
 
-/** Whether the space bar is down: then a drag moves the picture. */
+/** Whether the space bar is pressed: then a drag moves the image. */
 const keys = {space: false};
 addEventListener('keydown', (event) => { if (event.key === ' ') keys.space = true; });
 addEventListener('keyup', (event) => { if (event.key === ' ') keys.space = false; });
@@ -22,9 +22,9 @@ export class PlanePointer {
     canvas.addEventListener('pointerleave', () => this.leave());
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('wheel', (event) => this.turn(event), {passive: false});
-    // The space bar does not scroll the page while the pointer is on a plane.
+    // The space bar must not scroll the page while the pointer is on a plane.
     addEventListener('keydown', (event) => { if (event.key === ' ' && this.spot && !event.target.matches?.('button, a, input, select, summary, textarea')) event.preventDefault(); });
-    // One finger scrolls the page, unless it has something to do here.
+    // One finger scrolls the page, unless the touch has a function here.
     canvas.addEventListener('touchstart', (event) => {
       const box = canvas.getBoundingClientRect(), touch = event.touches[0];
       if (event.touches.length > 1 || this.takesTouch([touch.clientX - box.left, touch.clientY - box.top])) event.preventDefault();
@@ -40,7 +40,7 @@ export class PlanePointer {
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
-  /** Whether a finger that is put there has something to do. */
+  /** Whether a touch at that position has a function. */
   takesTouch() { return ['ruler', 'crosshair'].includes(this.tool); }
 
   down(event) {
@@ -59,10 +59,10 @@ export class PlanePointer {
     return this.press(event, spot);
   }
 
-  /** The main button went down, and no gesture of this class begins by it. */
+  /** Called when the main button is pressed and no gesture of this class begins. */
   press() {}
 
-  /** A second finger or the system ends what was begun. */
+  /** Called when a second finger or the system interrupts a gesture. */
   interrupt() {}
 
   begin(what, from, more = {}) { this.gesture = {what, from, last: from, moved: false, ...more}; }
@@ -93,7 +93,7 @@ export class PlanePointer {
     const {panel, gesture} = this, spot = this.spotOf(event);
     this.fingers.delete(event.pointerId);
     if (event.pointerType === 'touch') this.spot = null;
-    if (gesture?.what === 'pinch') {  // the second finger that is lifted sets no mark
+    if (gesture?.what === 'pinch') {  // lifting the second finger must not set a mark
       if (this.fingers.size === 0) this.gesture = null;
       return;
     }

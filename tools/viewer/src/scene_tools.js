@@ -1,8 +1,8 @@
-// What belongs to the 3D view, upon it.
+// Controls on the 3D view.
 import {el} from './dom.js';
 import {icon} from './icons.js';
 
-/** `names` are the planes'; one page may have more controls, and more [value, text] to cut at. */
+/** `names` are those of the planes; a page may add further controls, and further [value, text] for the choice of the cut. */
 export function sceneTools(app, view, names, {more = [], cuts = []} = {}) {
   const {state} = app;
   const planes = [2, 1, 0].map((axis) => el('button', {type: 'button', class: 'small', 'data-plane': axis, 'aria-label': `slice ${names[axis]} in 3D`, onclick: () => {

@@ -1,4 +1,4 @@
-// What every 3D view has: a camera that is turned by hand, lights that turn with it, a plane that cuts.
+// Common parts of the 3D views: a camera that is turned by hand, lights that turn with it, a cutting plane.
 import {
   AmbientLight, Box3, Color, DirectionalLight, PerspectiveCamera, Plane, Scene, Sphere, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
@@ -11,7 +11,7 @@ export const EYE = new Vector3(0.45, -0.8, 0.4);
 
 export function rgbColor(rgb) { return new Color().setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255, SRGBColorSpace); }
 
-/** The world's axes as the eye sees them. */
+/** The world's axes as seen by the camera. */
 export function axisTriad(anatomical) {
   const names = anatomical ? ['L', 'P', 'S'] : ['x', 'y', 'z'], drawing = svg('svg', {viewBox: '-32 -32 64 64', class: 'triad', 'aria-hidden': 'true'});
   const lines = AXIS_COLORS.map((color) => svg('line', {x1: 0, y1: 0, stroke: color, 'stroke-width': 2.5, 'stroke-linecap': 'round'}));
@@ -30,7 +30,7 @@ export function axisTriad(anatomical) {
   return {drawing, turn};
 }
 
-/** The length of a bar at the distance of what the camera turns about. */
+/** A scale bar for the distance of the centre of rotation. */
 export function scaleBar(unit) {
   const text = el('span', {}), bar = el('i', {}), drawing = el('div', {class: 'scale', 'aria-hidden': 'true'}, text, bar);
   const update = ({camera, controls, canvas}) => {
@@ -43,7 +43,7 @@ export function scaleBar(unit) {
   return {drawing, update};
 }
 
-/** `make(canvas)` makes the view in a holder, or a word says why there is none. */
+/** `make(canvas)` creates the view in a holder; if it fails, a message gives the reason. */
 export function stageIn(holder, {label, triad, scale, otherwise}, make) {
   const canvas = el('canvas', {tabindex: 0, role: 'img', 'aria-label': label});
   holder.append(canvas, triad.drawing, scale.drawing);
@@ -67,7 +67,7 @@ export function stageIn(holder, {label, triad, scale, otherwise}, make) {
 }
 
 export class Stage3D {
-  /** `space` is the image's, or null. @throws where there is no WebGL */
+  /** `space` is the image's, or null. @throws if WebGL is not available */
   constructor(canvas, state, space) {
     Object.assign(this, {canvas, state, space});
     this.renderer = new WebGLRenderer({canvas, antialias: true, alpha: true, preserveDrawingBuffer: false});
@@ -82,7 +82,7 @@ export class Stage3D {
     this.sphere = new Sphere(new Vector3(), 1);
   }
 
-  /** Called when the scene is filled. */
+  /** Called when the scene has been filled. */
   begin() {
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;
@@ -98,20 +98,20 @@ export class Stage3D {
     fill.position.set(1.2, -0.1, 0.7);
     rim.position.set(0.2, 0.8, -1.2);
     for (const light of [key, fill, rim]) {
-      this.camera.add(light, light.target);  // they turn with the eye
+      this.camera.add(light, light.target);  // they turn with the camera
       light.target.position.set(0, 0, 0);
     }
     this.scene.add(new AmbientLight(0xffffff, 0.4));
   }
 
-  /** What is looked at: everything in the box. */
+  /** Sets the box of all displayed objects. */
   setBox(box) {
     this.box.copy(box);
     this.box.getBoundingSphere(this.sphere);
     if (!(this.sphere.radius > 0)) this.sphere.radius = 1;
   }
 
-  /** The half that is cut away is the one in front. */
+  /** Cuts away the half that is in front. */
   turnCut() {
     const axis = this.state.get('cut');
     if (axis < 0) return;
@@ -119,7 +119,7 @@ export class Stage3D {
     this.cutSign = Math.sign(normal.dot(this.camera.position.clone().sub(place))) || 1;
   }
 
-  /** One half beside the slice of an axis is cut away from these. */
+  /** Clips these materials on one side of the slice of an axis. */
   clipMaterials(materials) {
     const axis = this.state.get('cut');
     let planes = null;
@@ -141,7 +141,7 @@ export class Stage3D {
     return {normal: new Vector3(...this.space.duals[axis]).normalize(), place: new Vector3(...this.space.toWorld(index))};
   }
 
-  /** The corners of a slice, in the order of a square. */
+  /** The corners of a slice, in cyclic order. */
   cornersOf(axis, at) {
     const [right, down] = this.space.planeAxes(axis);
     return [[0, 0], [1, 0], [1, 1], [0, 1]].map(([x, y]) => {
@@ -153,9 +153,9 @@ export class Stage3D {
     });
   }
 
-  /** Turns to a direction; at once, or in a third of a second. */
+  /** Turns to a direction; at once, or within a third of a second. */
   look(direction, atOnce = false) {
-    // The narrower side of the view has to hold the ball around all surfaces.
+    // The narrower side of the view must contain the bounding sphere of all surfaces.
     const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));
     const distance = 0.93 * this.sphere.radius / Math.sin(half), from = this.camera.position.clone().sub(this.sphere.center);
     const begin = from.clone().normalize(), end = direction.clone().normalize(), size = from.length() || distance;

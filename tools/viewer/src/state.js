@@ -1,4 +1,4 @@
-// What is shown now; views hear of each change.
+// The current state of the display; views are notified of changes.
 
 export class State {
   constructor(values) {
@@ -15,7 +15,7 @@ export class State {
     for (const listener of this.listeners) listener(changed);
   }
 
-  /** `listener` is called when one of these changes. */
+  /** `listener` is called when one of these values changes. */
   on(names, listener) {
     this.listeners.push((changed) => { if (changed.some((name) => names.includes(name))) listener(); });
   }

@@ -1,4 +1,4 @@
-// The row below the views: what is under the cursor, what a click does.
+// The row below the views: the values at the cursor, and the effect of a click.
 import {el, number} from './dom.js';
 
 /** `hints` has a text for each tool. */
@@ -8,10 +8,10 @@ export function statusRow({state, space, image, slices, unitText}, hints) {
   const update = () => { hint.textContent = hints[state.get('tool')] ?? ''; };
   state.on(['tool'], update);
   update();
-  // A tenth of a voxel can be told.
+  // The digits resolve a tenth of a voxel.
   const digits = Math.min(6, Math.max(0, Math.ceil(1 - Math.log10(Math.min(...space.spacing)))));
   const signed = (v) => v.toFixed(digits).replace('-', '\u2212');
-  /** Tells of a place in a panel; null: the pointer has left. */
+  /** Shows a position in a panel; null: the pointer has left. */
   const tell = (panel, spot) => {
     const index = spot && panel.indexAt(...spot);
     if (!index || !panel.isInside(index)) return [voxel, world, value].forEach((part) => { part.textContent = ''; });

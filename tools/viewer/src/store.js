@@ -1,7 +1,7 @@
-// What a reload must not lose. The browser's storage may be full or forbidden: then it is lost, and nothing else happens.
+// Data that must survive a reload. If the browser's storage is full or blocked, they are lost without an error.
 
 export class Store {
-  /** `place()` gives the storage: localStorage, or sessionStorage for what belongs to one tab. */
+  /** `place()` returns the storage: localStorage, or sessionStorage for data of one tab. */
   constructor(prefix, place = () => localStorage) { Object.assign(this, {prefix: `${prefix}/`, place}); }
 
   get(name, otherwise = null) {
@@ -13,7 +13,7 @@ export class Store {
     }
   }
 
-  /** Whether it is kept. */
+  /** Returns whether the value was stored. */
   set(name, value) {
     try {
       this.place().setItem(this.prefix + name, JSON.stringify(value));
@@ -26,7 +26,7 @@ export class Store {
   remove(name) {
     try {
       this.place().removeItem(this.prefix + name);
-    } catch { /* nothing was kept */ }
+    } catch { /* there is nothing to remove */ }
   }
 
   names() {

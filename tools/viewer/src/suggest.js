@@ -1,13 +1,13 @@
-// Places where a mark would help most: asked for, looked at one after the other.
+// Positions at which a mark would improve the result most: requested, then shown one after the other.
 
 export class Suggestions {
-  /** `goTo(world)` brings all planes to a place. */
+  /** `goTo(world)` moves all planes to a position. */
   constructor({state, study, meshes, connection, tools, toast, goTo}) {
     Object.assign(this, {state, study, meshes, connection, tools, toast, goTo, left: [], structure: null});
     study.on('suggestions', (answer) => this.take(answer));
     study.on('failed', () => this.stopAsking());
     study.on('change', () => { if (this.structure !== null && !this.study.structure(this.structure)) this.clear(); });
-    study.on('action', (item) => {  // a mark beside it answers it too
+    study.on('action', (item) => {  // a mark near the suggestion replaces it, too
       if (item?.action.do === 'add_mark' && this.state.get('ring')) this.state.set({ring: null});
     });
     state.on(['active'], () => this.clear());
@@ -19,7 +19,7 @@ export class Suggestions {
     this.state.set({ring: null, suggested: 0});
   }
 
-  /** To the next one; asks where there is none left. */
+  /** Goes to the next one; requests more if none is left. */
   next() {
     if (this.left.length > 0) return this.show();
     const own = this.tools.active() ?? this.study.structures[0];
@@ -53,7 +53,7 @@ export class Suggestions {
     this.goTo(place.world);
   }
 
-  /** The border is where the ring is. */
+  /** Accepts the suggestion: sets a mark at the ring. */
   accept() {
     const ring = this.state.get('ring');
     if (!ring) return false;

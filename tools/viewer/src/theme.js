@@ -1,7 +1,7 @@
-// Dark or light: what the system says, until the button says otherwise.
+// Dark or light: the system's setting, until the button is used.
 import {el} from './dom.js';
 
-/** `kept` has get() and set(theme): what the button said is asked for at first, and told when it says something. */
+/** `kept` has get() and set(theme), which store the choice of the button. */
 export function themeButton(state, face, kept = null) {
   const system = matchMedia('(prefers-color-scheme: dark)');
   let isChosen = Boolean(kept?.get());

@@ -1,4 +1,4 @@
-// Short texts that go away by themselves, or by a click.
+// Short messages that disappear after a while, or on a click.
 import {el} from './dom.js';
 
 const STAY = 6000;  // ms

@@ -9,8 +9,8 @@
 
 namespace covol::cloud {
 
-/// Of the surface around each point, world units squared: the disc to its eighth neighbour. A density on a lattice
-/// would count the other side of thin parts, too.
+/// Area of the surface around each point, world units squared, from the disc that reaches to its eighth neighbour. A
+/// density on a lattice would also count points of the opposite side of thin parts.
 [[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<double> areas(points.size());

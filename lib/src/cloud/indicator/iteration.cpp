@@ -16,7 +16,7 @@
 namespace covol::cloud {
 namespace {
 
-/// Mean over each cell's points of the indicator, less 1/2.
+/// The mean of the indicator over each cell's points, minus 1/2.
 std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     std::vector<double> off(cells.cell_count());
     tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
@@ -28,7 +28,7 @@ std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     return off;
 }
 
-/// Of each cell: whether it may be turned, and to which side it is off.
+/// The sign of each cell's deviation; 0 if it is too small for the cell to be turned.
 std::vector<int> sides_of(const std::vector<double>& off) {
     std::vector<int> side;
     for (const double x : off) side.push_back(std::abs(x) < kIteration.patch_off ? 0 : x < 0 ? -1 : 1);
@@ -37,15 +37,15 @@ std::vector<int> sides_of(const std::vector<double>& off) {
 
 }  // namespace
 
-Iteration::Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double first_guess,
+Iteration::Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double initial_cells,
                      const RunContext& run)
-    : points_(points), areas_(areas), first_guess_(first_guess), run_(run) {}
+    : points_(points), areas_(areas), initial_cells_(initial_cells), run_(run) {}
 
 void Iteration::run(const Stage& stage, Orientation& result) {
     WindingField field(indicator_grid(points_, areas_, stage.cell));
     if (last_) field.start_from(last_->indicator());
     stage_ = stage;
-    if (result.normals.empty()) guess_normals(stage.cell, result);
+    if (result.normals.empty()) estimate_normals(stage.cell, result);
     for (int n = 0; n < stage.iterations; ++n) {
         ++result.iterations;
         if (turn(field, result, kIteration.cycles) < kIteration.steady) break;
@@ -56,13 +56,13 @@ void Iteration::run(const Stage& stage, Orientation& result) {
 }
 
 void Iteration::mend(double spacing, Orientation& result) {
-    result.mended = mend_torn(points_, spacing, result.normals);
+    result.mended = repair_torn(points_, spacing, result.normals);
     if (result.mended > 0) solve(*last_, result, kIteration.last_cycles);
 }
 
-void Iteration::guess_normals(double cell, Orientation& result) const {
+void Iteration::estimate_normals(double cell, Orientation& result) const {
     const StackField density =
-        spread(grid_around(points_, areas_, first_guess_ * cell), points_, std::vector<double>(points_.size(), 1.0));
+        spread(grid_around(points_, areas_, initial_cells_ * cell), points_, std::vector<double>(points_.size(), 1.0));
     result.normals.resize(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
         const Vec3 g = density.at(points_[n]).gradient;
@@ -70,7 +70,7 @@ void Iteration::guess_normals(double cell, Orientation& result) const {
     });
 }
 
-/// The indicator of the normals.
+/// Computes the indicator of the normals.
 void Iteration::solve(WindingField& field, Orientation& result, int cycles) {
     cloud::solve(field, points_, result, cycles, run_);
     const double half = scale_to_half(field, points_);
@@ -94,14 +94,14 @@ double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
     return 1 - std::accumulate(cosine.begin(), cosine.end(), 0.0) / double(count);
 }
 
-/// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it
-/// makes its own normals. Each such patch is turned to try, all at once, and stays turned where that brings it
-/// closer to 1/2.
+/// Updates cannot correct a patch that is turned as a whole, because its indicator reproduces its own normals; its mean
+/// indicator differs from 1/2. All such patches are therefore turned at once on trial, and those stay turned whose mean
+/// comes closer to 1/2.
 void Iteration::turn_patches(WindingField& field, Orientation& result) {
     const PointCells cells(points_, kIteration.patch_cells * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
     for (int round = 0; round < kIteration.patch_rounds; ++round) {
-        turn(field, result, kIteration.patch_cycles);  // the indicator of what the normals are now
+        turn(field, result, kIteration.patch_cycles);  // makes the indicator that of the current normals
         const std::vector<double> off = mean_off(cells, field.indicator());
         const std::vector<int> patch = patches_of(beside, sides_of(off));
         const int patches = 1 + *std::max_element(patch.begin(), patch.end());

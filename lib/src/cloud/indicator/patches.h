@@ -7,15 +7,15 @@
 
 namespace covol::cloud {
 
-/// The cells beside each cell that have points.
+/// For each cell, its neighbouring cells that contain points.
 [[nodiscard]] std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells);
 
-/// The number of each cell's patch, from 0: connected cells of the same side; -1: of side 0.
+/// The number of each cell's patch, from 0: connected cells of the same side; -1 for cells of side 0.
 /// @param beside  neighbours_of()
 [[nodiscard]] std::vector<int> patches_of(const std::vector<std::vector<std::uint32_t>>& beside,
                                           const std::vector<int>& side);
 
-/// visit(cell, point as it was given)
+/// visit(cell, index of the point in the input)
 template <typename Visit>
 void for_points_of(const PointCells& cells, Visit visit) {
     for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kNeighbours = 12;
 
-/// Sheets at the points, and which points beside each other are on the same one.
+/// The sheet at each point, and which neighbouring points are on the same one.
 class Sheets {
 public:
     Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
@@ -38,9 +38,9 @@ public:
     }
 
     [[nodiscard]] std::size_t size() const { return axes_.size(); }
-    /// The sheet's normal, of either sign; 0 where there is none.
+    /// The sheet's normal, of either sign; 0 if there is no sheet.
     [[nodiscard]] const Vec3& axis(std::size_t n) const { return axes_[n]; }
-    /// visit(neighbour) for those on the same sheet.
+    /// visit(neighbour) for the neighbours on the same sheet.
     template <typename Visit>
     void for_beside(std::size_t n, Visit visit) const {
         for (const std::uint32_t other : beside_[n])
@@ -52,7 +52,7 @@ private:
     std::vector<std::array<std::uint32_t, kNeighbours>> beside_;
 };
 
-/// @return how many
+/// @return how many were changed
 std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::vector<char> is_lying(sheets.size(), 0);
     std::vector<std::uint32_t> lying;
@@ -63,7 +63,7 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
         lying.push_back(n);
     }
     const std::size_t all = lying.size();
-    // Each round those of whose neighbours most tell the side.
+    // Each round sets those for which at least half of the neighbours on their sheet have a known side.
     for (std::size_t before = all + 1; !lying.empty() && lying.size() < before;) {
         before = lying.size();
         std::vector<std::pair<std::uint32_t, Vec3>> mended;
@@ -85,10 +85,10 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     return all - lying.size();
 }
 
-/// @return how many
+/// @return how many were turned
 std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
-    detail::DisjointSets parts(sheets.size());  // of sheets whose normals go on from one point to the next
-    // By the sheets' normals: from tilted one to tilted one a seam could be crossed.
+    detail::DisjointSets parts(sheets.size());  // points connected by consistent normals
+    // Compare sides relative to the sheets' normals: a chain of tilted normals could otherwise cross a seam.
     const auto side = [&](std::uint32_t n) { return dot(sheets.axis(n), normals[n]); };
     const auto meets = [&](std::uint32_t n, std::uint32_t other) {
         return side(n) * side(other) * dot(sheets.axis(n), sheets.axis(other));
@@ -99,13 +99,13 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
         });
     std::vector<std::size_t> size(sheets.size(), 0);
     for (std::uint32_t n = 0; n < sheets.size(); ++n) ++size[parts.root(n)];
-    // How often two parts meet back to front.
+    // The number of neighbours with opposite normals, for each pair of parts.
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> seams;
     for (std::uint32_t n = 0; n < sheets.size(); ++n)
         sheets.for_beside(n, [&](std::uint32_t other) {
             if (const auto a = parts.root(n), b = parts.root(other); a != b && meets(n, other) < 0) ++seams[{a, b}];
         });
-    // Each to the larger one that it meets most often.
+    // Each part is turned to match the larger part with which it shares the longest seam.
     std::map<std::uint32_t, std::pair<std::size_t, std::uint32_t>> turned;
     for (const auto& [pair, count] : seams) {
         const auto [a, b] = pair;
@@ -114,7 +114,7 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::erase_if(turned, [](const auto& t) { return t.second.first == 0; });
     std::size_t count = 0;
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
-        // A part within one that is turned itself goes over twice.
+        // If that part is turned as well, turning twice cancels out.
         int times_turned = 0;
         for (auto at = turned.find(parts.root(n)); at != turned.end(); at = turned.find(at->second.second))
             ++times_turned;
@@ -127,7 +127,7 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
 
 }  // namespace
 
-std::size_t mend_torn(const std::vector<Vec3>& points, double spacing, std::vector<Vec3>& normals) {
+std::size_t repair_torn(const std::vector<Vec3>& points, double spacing, std::vector<Vec3>& normals) {
     if (points.size() <= kNeighbours) return 0;
     const Sheets sheets(points, spacing);
     const std::size_t upright = set_upright(sheets, normals);

@@ -1,4 +1,5 @@
-// Which of several orientations a cloud takes: its own, that of its file, or that of where its points can be seen from.
+// The choice between several orientations of a cloud: computed from the points, from the hints of its file, or from the
+// directions in which its points can be seen.
 #include <algorithm>
 #include <utility>
 
@@ -19,10 +20,10 @@ namespace {
 
 using cloud::doubt;
 using cloud::first_cell;
-using cloud::fraction_passed;
+using cloud::fraction_missed;
 using cloud::is_settled;
 
-/// Share of the surface that lies far from every point.
+/// Fraction of the surface that is far from every point.
 double bare_fraction(const CloudOrientation& cloud) {
     const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
     return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
@@ -31,25 +32,25 @@ double bare_fraction(const CloudOrientation& cloud) {
 bool does_enclose(const CloudOrientation& cloud) {
     return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
 }
-/// The indicator that was found may be too coarse for what its normals tell.
+/// Recomputes the indicator if it is too coarse for the detail of its normals.
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double noise = cloud.scale.noise, spacing = cloud.scale.spacing;
-    // Where normals are beyond doubt, the surface may be as fine as the points tell.
+    // If the normals are beyond doubt, the surface may be as fine as the points allow.
     const double first =
         is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
     const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kOrientation.coarse * cell)
         o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
-        fraction_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
+        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
         o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
-/// Of sheets, as of a scan of one side or from the air: neighbours agree on a side all over, which is the one that most
-/// points are seen from. @return whether they do, and the surface passes no more points
+/// For sheets, as in scans of one side or from the air: neighbours agree on one side everywhere, the one from which
+/// most points are seen. @return whether they do and the surface does not miss more points
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
-    // With more noise neighbours lie above each other, and quadrics have handles in what is bare.
+    // With more noise, neighbours may lie above one another, and quadrics form handles where there are no points.
     if (cloud.scale.noise > kOrientation.noise_of_sheets * cloud.scale.spacing) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
@@ -59,28 +60,30 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     if (!sheets.report.used || sheets.torn > kOrientation.few_torn) return false;
     cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
-    if (fraction_passed(*sheets.orientation.screened, cloud.points, reach) >
-        fraction_passed(*cloud.orientation.indicator, cloud.points, reach))
+    if (fraction_missed(*sheets.orientation.screened, cloud.points, reach) >
+        fraction_missed(*cloud.orientation.indicator, cloud.points, reach))
         return false;
     cloud.orientation = std::move(sheets.orientation);
     return cloud.encloses = true;
 }
 
-/// Of points that enclose nothing as they are oriented.
-/// @param reach  distance at which a surface passes a point by
+/// For points that enclose nothing with their current orientation.
+/// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
-    const double passed = fraction_passed(*cloud.orientation.indicator, cloud.points, reach);
+    const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);
     const bool mostly_bare = bare_fraction(cloud) > kOrientation.mostly_bare;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
-    // Normals waver in the folds of a closed surface, too; but there views pass by most points.
+    // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most
+    // points.
     cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
-                     passed < kOrientation.fewer_passed * fraction_passed(*seen.indicator, cloud.points, reach);
+                     passed < kOrientation.fewer_passed * fraction_missed(*seen.indicator, cloud.points, reach);
     if (cloud.encloses) return;
     cloud.orientation = std::move(seen);
     cloud.has_quadrics = false;
 }
 
-/// Points that given normals put within the solid are on no surface. @return whether there were any
+/// Removes points that given normals place inside the solid, since they are not on the surface. @return whether there
+/// were any
 bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::GivenSides& given) {
     const double reach = kOrientation.passed_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
     const std::vector<char> enclosed =
@@ -95,13 +98,14 @@ bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::Give
     return true;
 }
 
-/// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
+/// Uses the hints if they are consistent and nothing certain contradicts them, otherwise the points alone, otherwise
+/// views.
 void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunContext& run) {
-    const auto judged = [&] {
+    const auto checked = [&] {
         return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     };
-    cloud::GivenSides given = judged();
-    if (given.report.used && drop_enclosed(cloud, hints, given)) given = judged();
+    cloud::GivenSides given = checked();
+    if (given.report.used && drop_enclosed(cloud, hints, given)) given = checked();
     HintsReport& report = cloud.hints = given.report;
     if (!report.used && cloud::fill_a_solid(cloud.points, cloud.scale.nearest, run)) {
         cloud.orientation = cloud::orient_filled(cloud.points, cloud.scale);
@@ -114,13 +118,14 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
         const double reach = kOrientation.passed_reach * cloud.scale.spacing;
-        // Of walls within a solid, some points of which are left, given normals alone can tell.
+        // Only given normals identify walls inside a solid, of which some points may remain: they are then not
+        // overruled.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
                 kOrientation.contradicted &&
-            // In narrow folds it is these that are wrong.
-            fraction_passed(*cloud.orientation.indicator, cloud.points, reach) <=
-                fraction_passed(*given.orientation.indicator, cloud.points, reach)) {
+            // In narrow folds it is the computed normals that are wrong, and their surface misses more points.
+            fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
+                fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
@@ -133,7 +138,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.encloses = true;
     }
     report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
-    // Normals of faces tell nothing of the edges between them, beyond which quadrics through one face would go on.
+    // Normals of faces do not show the edges between them, and quadrics through one face would extend beyond its edges.
     if (report.used) cloud::take_directions(*cloud.orientation.indicator, cloud.points, cloud.orientation.normals);
 }
 
@@ -148,7 +153,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
     with_threads(run, [&] {
         cloud.points = merge_close_points(points, 0);
         cloud.scale = measure_cloud_scale(cloud.points, run);
-        // Where there are many, some show once others are gone.
+        // If there are many stray points, some can be detected only after others were removed.
         for (int round = 0; round < kOrientation.stray_rounds; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
             std::size_t kept = 0;

@@ -1,4 +1,4 @@
-// Quadrics through neighbourhoods: how far apart the points of a cloud lie on its surface, and how far off it.
+// Spacing of a cloud's points on its surface, and their distance from it, from quadrics fitted to neighbourhoods.
 #include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
 
@@ -16,10 +16,10 @@
 namespace covol {
 namespace {
 
-constexpr double kCellRadii = 2;      // edge of the cells that points are sorted into, in first radii
+constexpr double kCellRadii = 2;      // edge of the cells for sorting points, in initial radii
 constexpr std::size_t kNearest = 12;  // twice the unknowns of a quadric
 
-/// Standard deviation of points from the quadric over the plane of the last two axes that fits them best.
+/// Standard deviation of points from the best-fitting quadric over the plane of the last two axes.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
     using Vector6 = Eigen::Matrix<double, 6, 1>;
     Eigen::Matrix<double, 6, 6> m = Eigen::Matrix<double, 6, 6>::Zero();
@@ -37,7 +37,7 @@ double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matr
     return std::sqrt(std::max(0.0, left) / double(points.size() - 6));
 }
 
-/// The same over the plane that fits them best.
+/// The same over the best-fitting plane.
 double off_sheet(const std::vector<Eigen::Vector3d>& points) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
@@ -56,12 +56,12 @@ Eigen::Vector3d from_to(const Vec3& from, const Vec3& to) {
 }
 
 struct Around {
-    double reach = 0;  ///< of the points
-    double count = 0;  ///< of them; 0: too few
+    double reach = 0;  ///< radius that contains the points
+    double count = 0;  ///< number of points; 0: too few
     double noise = 0;  ///< their standard deviation from a quadric
 };
 
-Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius) {
+Around measure_around(const cloud::PointCells& cells, const Vec3& at, double radius) {
     std::vector<cloud::PointCells::Range> ranges;
     cells.find(at, radius, ranges);
     std::vector<Eigen::Vector3d> near;
@@ -74,10 +74,10 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
     return {radius, double(near.size()), radius * off_sheet(near)};
 }
 
-/// Every few points and the nearest of each, where there are so many.
-std::vector<Around> look_at_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
+/// Examines a sample of the points with the nearest neighbours of each.
+std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
                                     std::size_t step) {
-    tbb::concurrent_vector<Around> around;  // in any order: medians are what is asked
+    tbb::concurrent_vector<Around> around;  // the order does not affect the medians
     cloud::for_nearest(
         cells, 2 * nearest, kNearest - 1,
         [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
@@ -104,19 +104,19 @@ double median_of(const std::vector<Around>& around, Value value) {
 CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
     CloudScale scale;
     const double nearest = scale.nearest = measure_spacing(points).median;
-    scale.spacing = 2 * nearest;  // what it is for points spread evenly at random
+    scale.spacing = 2 * nearest;  // the expected value for points that are distributed evenly at random
     if (!(nearest > 0)) return scale;
     const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
     double radius = kCloudScale.first_spacings * nearest, best = 1;
     const cloud::PointCells cells(points, kCellRadii * radius);
-    const std::vector<Around> closest = look_at_nearest(points, cells, nearest, step);
+    const std::vector<Around> closest = measure_nearest(points, cells, nearest, step);
     scale.near_reach = median_of(closest, [](const Around& a) { return a.reach; });
     scale.near_noise = median_of(closest, [](const Around& a) { return a.noise; });
     for (int n = 0; n < kCloudScale.radii; ++n, radius *= kCloudScale.growth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);
         tbb::parallel_for(std::size_t(0), around.size(),
-                          [&](std::size_t m) { around[m] = look_around(cells, points[m * step], radius); });
+                          [&](std::size_t m) { around[m] = measure_around(cells, points[m * step], radius); });
         std::erase_if(around, [](const Around& a) { return a.count == 0; });
         if (2 * around.size() * step < points.size()) continue;  // too few neighbours yet
         const double noise = median_of(around, [](const Around& a) { return a.noise; });
@@ -125,7 +125,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
             scale.spacing = median_of(around, [&](const Around& a) { return radius * std::sqrt(M_PI / a.count); });
             scale.noise = noise;
         }
-        // Wider, the surface's own curvature is all that comes.
+        // In wider neighbourhoods, only the surface's own curvature would add to the deviation.
         if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
     }
     return scale;

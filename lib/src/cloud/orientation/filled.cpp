@@ -22,7 +22,7 @@ constexpr int kMaxRadii = 64;
 
 struct Neighbourhood {
     double count = 0;
-    double thickness = 0;  ///< [radii] least standard deviation along any direction
+    double thickness = 0;  ///< [radii] minimum standard deviation along any direction
 };
 
 Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radius) {
@@ -45,17 +45,17 @@ Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radi
     return {count, std::sqrt(std::max(0.0, axes.eigenvalues()[0]))};
 }
 
-/// [radii] Of random points that fill a ball; fitted to balls of 8 to 100 points, of which few measure less.
+/// [radii] For random points that fill a ball; fitted to balls of 8 to 100 points, few of which have a smaller value.
 double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / std::sqrt(count)); }
 
 }  // namespace
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * kFilled.min_neighbours || !(spacing > 0)) return false;  // an eighth is twelve times the first ones
+    if (all < 96 * kFilled.min_neighbours || !(spacing > 0)) return false;  // an eighth: 12 times the minimum
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
-    // Not every so many: points in rows would be asked at the same place of each row.
+    // Not at regular intervals, which would sample points in rows at the same position of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
     for (int n = 0; n < kMaxRadii; ++n, radius *= kCloudScale.growth) {
@@ -77,7 +77,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
 }
 
 Orientation orient_filled(const std::vector<Vec3>& points, const CloudScale& scale) {
-    // Of evenly random points a ball of that radius holds eleven others.
+    // For evenly random points, a ball of radius near_reach contains eleven others.
     const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / 11);
     StackField density = spread(grid_around(points, {}, kFilled.cell_spacings * spacing), points,
                                 std::vector<double>(points.size(), 1.0));

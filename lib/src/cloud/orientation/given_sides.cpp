@@ -28,7 +28,7 @@ std::size_t count_known(const std::vector<Vec3>& directions) {
     }));
 }
 
-/// Of local planes, on the side of `towards`.
+/// Normals of local planes, on the side of `towards`.
 std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
                                   const CloudScale& scale) {
     std::vector<Vec3> normals = plane_normals(points, scale);
@@ -37,7 +37,7 @@ std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::ve
     return normals;
 }
 
-/// Normals and what their indicator function says of them.
+/// Given normals and how far their indicator function supports them.
 class HeldOutHints {
 public:
     HeldOutHints(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale,
@@ -50,29 +50,30 @@ public:
         oriented_.areas = areas_;
     }
 
-    /// Share of those told that each half foresees of the other; all are turned over where most point inwards.
-    /// @param is_outward  they are known not to
-    double foreseen(HintsReport& report, bool is_outward) {
+    /// Fraction of the given normals in each half that the other half's indicator predicts. Reverses all if most point
+    /// inwards.
+    /// @param is_outward  whether they are known to point outwards
+    double predicted(HintsReport& report, bool is_outward) {
         std::vector<char> all(points_.size(), 1);
-        listen(all);
+        compute_indicator(all);
         report.inward = !is_outward && mean_at(field_, points_) < 0;
         if (report.inward)
             for (Vec3& n : oriented_.normals) n = times(-1, n);
         std::size_t agree = 0;
         for (const bool half : {false, true}) {
-            std::vector<char> speaks(points_.size());
-            for (std::size_t n = 0; n < speaks.size(); ++n) speaks[n] = is_second(n) == half;
-            listen(speaks);
-            for (std::size_t n = 0; n < speaks.size(); ++n) agree += !speaks[n] && falls_along(n) > 0;
+            std::vector<char> selected(points_.size());
+            for (std::size_t n = 0; n < selected.size(); ++n) selected[n] = is_second(n) == half;
+            compute_indicator(selected);
+            for (std::size_t n = 0; n < selected.size(); ++n) agree += !selected[n] && falls_along(n) > 0;
         }
         return double(agree) / double(std::max<std::size_t>(count_known(oriented_.normals), 1));
     }
 
-    /// Turns single normals that all around speak against; those without one take the direction in which the indicator
-    /// falls.
-    void settle() {
+    /// Reverses single normals that the indicator contradicts; points without a normal take the direction in which the
+    /// indicator decreases.
+    void resolve_contradictions() {
         for (int n = 0; n < kGivenSides.turns; ++n) {
-            listen(std::vector<char>(points_.size(), 1));
+            compute_indicator(std::vector<char>(points_.size(), 1));
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
                 if (falls_along(p) * field_.indicator().stack().cell() > -kGivenSides.speaks_against) continue;
@@ -89,18 +90,18 @@ public:
     [[nodiscard]] Orientation& oriented() { return oriented_; }
 
 private:
-    /// Not every second one: files have pairs.
+    /// Pseudo-random instead of alternating, because files may contain pairs of points.
     static bool is_second(std::size_t n) { return (n * 2654435761U >> 16 & 1) != 0; }
 
     [[nodiscard]] double falls_along(std::size_t n) const {
         return -dot(oriented_.normals[n], field_.indicator().at(points_[n]).gradient);
     }
 
-    /// The indicator of those who speak.
-    void listen(const std::vector<char>& speaks) {
+    /// Computes the indicator of the selected points.
+    void compute_indicator(const std::vector<char>& selected) {
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
-            vectors[n] = speaks[n] ? times(oriented_.areas[n], oriented_.normals[n]) : Vec3{0, 0, 0};
+            vectors[n] = selected[n] ? times(oriented_.areas[n], oriented_.normals[n]) : Vec3{0, 0, 0};
         field_.solve(points_, vectors, kIndicator.cycles_from_nothing, run_);
         scale_to_half(field_, points_);
     }
@@ -112,8 +113,8 @@ private:
     Orientation oriented_;
 };
 
-/// Share of the points that have a neighbour beside, not above them, whose normal points to the other side: where a
-/// part is turned as a whole its rim has.
+/// Fraction of the points with a neighbour beside, not above them whose normal is opposite: this occurs along the rim
+/// of a part that is turned as a whole.
 double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<char> is_torn(points.size(), 0);
@@ -128,7 +129,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
     return double(std::count(is_torn.begin(), is_torn.end(), 1)) / double(points.size());
 }
 
-/// What the indicator of an orientation's normals says; areas are scaled as it is.
+/// Computes the indicator of an orientation's normals and scales the areas accordingly.
 void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result, const RunContext& run) {
     solve(field, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(field, points);
@@ -142,19 +143,19 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
          double cell, GivenSides& result, const RunContext& run) {
     result.given = given;
     HeldOutHints held_out(points, given, scale, run);
-    result.report.foreseen = held_out.foreseen(result.report, is_outward);
+    result.report.predicted = held_out.predicted(result.report, is_outward);
     result.report.why_not.clear();
-    if (result.report.foreseen < kGivenSides.min_predicted) {
+    if (result.report.predicted < kGivenSides.min_predicted) {
         result.report.why_not = "half of them do not foresee the sides of the other half";
         return false;
     }
-    held_out.settle();
+    held_out.resolve_contradictions();
     Orientation& own = result.orientation = std::move(held_out.oriented());
     WindingField field(indicator_grid(points, own.areas, cell));
     find_indicator(field, points, own, run);
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);
-    // Noise that carries points across a thin part leaves them with the other side's normals.
+    // Noise that moves points across a thin part leaves them with normals of the opposite side.
     for (int n = 0; own.turned > kGivenSides.few_turned && n < kGivenSides.smoothings; ++n) {
         for (std::size_t p = 0; p < points.size(); ++p)
             own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
@@ -175,7 +176,7 @@ std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vect
         alone[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
                              indicator.inside(minus(points[n], away))}) > kGivenSides.enclosed;
     });
-    // Noise carries single points into the solid: a wall within it has its points beside each other.
+    // Noise moves single points into the solid, whereas the points of a wall inside it are next to each other.
     const PointCells cells(points, kNear.first_radius * scale.spacing);
     for_nearest(cells, scale.spacing, kGivenSides.beside, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         const auto others = std::count_if(near.begin(), near.end(),

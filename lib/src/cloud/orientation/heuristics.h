@@ -1,133 +1,135 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
 #include <cstddef>
 
 #include "base/heuristic.h"
 
 namespace covol {
 
-/// Spacing and noise of a cloud from quadrics through neighbourhoods that grow: cloud_scale.cpp.
+/// Spacing and noise of a cloud from quadrics fitted to neighbourhoods of increasing size: cloud_scale.cpp.
 struct CloudScaleHeuristics {
-    /// [points] Places whose neighbourhoods are looked at; the medians are theirs.
+    /// [points] Number of sampled points from whose neighbourhoods the medians are computed.
     std::size_t samples = heuristic("cloud_scale.samples", 2000);
-    /// [points] Fewest in a neighbourhood that a quadric (6 unknowns) is fitted to.
+    /// [points] Minimum in a neighbourhood to which a quadric (6 unknowns) is fitted.
     std::size_t minimum = heuristic("cloud_scale.minimum", 12);
-    /// [count] Most radii that are tried.
+    /// [count] Maximum number of radii that are tried.
     int radii = heuristic("cloud_scale.radii", 14);
     /// [ratio] Of a radius to the one before: each neighbourhood has twice the points.
     double growth = heuristic("cloud_scale.growth", 1.4142135623730951);
     /// [median distances to the nearest point] The first radius.
     double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
-    /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; points that fill a ball
-    /// have 0.45.
+    /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; it is 0.45 for points that
+    /// fill a ball.
     double sheet = heuristic("cloud_scale.sheet", 0.15);
-    /// [ratio] Growth of that deviation, in radii, at which larger neighbourhoods are given up.
+    /// [ratio] Increase of that deviation, in radii, at which the search for larger neighbourhoods ends.
     double worse = heuristic("cloud_scale.worse", 1.05);
 };
 COVOL_HEURISTICS CloudScaleHeuristics kCloudScale{};
 
 /// Points that lie on no sheet: stray.cpp.
 struct StrayHeuristics {
-    /// [points] Nearest ones that tell how lonely a point is and what sheet it is on.
+    /// [points] Nearest neighbours that determine whether a point is isolated and which sheet it is on.
     std::size_t neighbours = heuristic("stray.neighbours", 8);
-    /// [points] That the usual distance to the last of them is the median of.
+    /// [points] Sample for the median distance to the last of these neighbours.
     std::size_t samples = heuristic("stray.samples", 20000);
-    /// [noises] Least edge of the cells they are searched in: a layer as thick as several spacings has few in a cell of
-    /// a spacing.
+    /// [noises] Minimum edge of the search cells: in a layer several spacings thick, a cell of one spacing has few
+    /// points.
     double cell_noises = heuristic("stray.cell_noises", 0.5);
-    /// [median distances to the last neighbour] A last neighbour farther away makes a point lonely.
+    /// [median distances to the last neighbour] Distance of the last neighbour from which on a point is isolated.
     double far = heuristic("stray.far", 2.5);
-    /// [distances to the last neighbour] Deviation of the neighbours from their plane, or of the point, from which on a
-    /// lonely point is on no sheet.
+    /// [distances to the last neighbour] Deviation of the neighbours or of the point from their plane, from which on an
+    /// isolated point is on no sheet.
     double off_plane = heuristic("stray.off_plane", 0.25);
 };
 COVOL_HEURISTICS StrayHeuristics kStray{};
 
 /// Points that fill a solid: filled.cpp.
 struct FilledHeuristics {
-    /// [points] Whose neighbourhoods are looked at.
+    /// [points] Number of sampled points whose neighbourhoods are examined.
     std::size_t samples = heuristic("filled.samples", 400);
-    /// [points] Fewest in a neighbourhood.
+    /// [points] Minimum in a neighbourhood.
     double min_neighbours = heuristic("filled.min_neighbours", 8);
-    /// [radii] Least standard deviation along any direction, at all radii, of points that fill a solid: measured 0.29
-    /// to 0.42 of balls, boxes, tori and lattices, 0.24 and less of surfaces with noise and thin parts.
+    /// [radii] Minimum standard deviation along any direction, at all radii, for points that fill a solid: measured
+    /// 0.29 to 0.42 for balls, boxes, tori and lattices, at most 0.24 for surfaces with noise and thin parts.
     double min_thickness = heuristic("filled.min_thickness", 0.27);
-    /// [of the expected one] The same of few points, which measure less.
+    /// [fraction of the expected one] The same for few points, for which it is smaller.
     double thick = heuristic("filled.thick", 0.8);
-    /// [distances of the points] Cell of the grid of their density: its splines hold about 70 points.
+    /// [distances of the points] Cell of the grid of their density: its splines cover about 70 points.
     double cell_spacings = heuristic("filled.cell_spacings", 2);
 };
 COVOL_HEURISTICS FilledHeuristics kFilled{};
 
-/// Normals that agree with their indicator function: orientation.cpp. Hou et al., Iterative Poisson surface
-/// reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022, has the iteration; tries and doubts are ours.
+/// Normals that agree with their indicator function: orientation.cpp. The iteration follows Hou et al., Iterative
+/// Poisson surface reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022; several attempts and the measure of doubt are
+/// added here.
 struct OrientationHeuristics {
-    /// [cells] Of the grid of the density whose gradient is the first guess.
+    /// [cells] Of the density grid whose gradient gives the initial normals.
     double first_cells = heuristic("orientation.first_cells", 3.2);
-    /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of
-    /// these.
+    /// [indicator] Value above which another part encloses a point; noise causes it for points that are not enclosed.
     double enclosed = heuristic("orientation.enclosed", 0.9);
-    /// [indicator] The same where more noise is allowed for.
+    /// [indicator] The same with a margin for more noise.
     double surely_enclosed = heuristic("orientation.surely_enclosed", 1.2);
-    /// [spacings] Cell of the finest lattice: smaller ones let single points turn, larger ones lose thin parts.
+    /// [spacings] Cell of the finest lattice: with smaller ones single points may turn, larger ones lose thin parts.
     double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
-    /// [noises] The same, at least.
+    /// [noises] Minimum cell of the finest lattice.
     double cell_noises = heuristic("orientation.cell_noises", 1.0);
-    /// [spacings] Smallest cell of any try.
+    /// [spacings] Minimum cell of any attempt.
     double min_spacings = heuristic("orientation.min_spacings", 0.5);
-    /// [indicator] That its mean over the points may differ from 1/2 without doubt.
+    /// [indicator] Deviation of its mean over the points from 1/2 up to which there is no doubt.
     double off_half = heuristic("orientation.off_half", 0.02);
-    /// [ratio] Of what is beyond that, against the share of normals that turned, among tries: walls that run into each
-    /// other turn less than those that waver.
+    /// [ratio] Weight of the deviation beyond that, relative to the fraction of normals that turned, in the comparison
+    /// of attempts: fewer normals turn at walls that merge than at unstable ones.
     double off_weight = heuristic("orientation.off_weight", 2);
-    /// [cells] Of the lattice on which tries are compared, in those of the first: too fine for walls to run together.
+    /// [cells of the first attempt] Cell of the lattice on which attempts are compared: fine enough to keep walls
+    /// separate.
     double strain_cells = heuristic("orientation.strain_cells", 0.67);
-    /// [cells] Of the last try, in those of the first: noise makes the first cells wider than thin walls.
+    /// [cells of the first attempt] Cell of the last attempt: noise makes the first cells wider than thin walls.
     double thin_cells = heuristic("orientation.thin_cells", 0.44);
-    /// [cells] Of the first lattice, above which the one that was chosen is too coarse for what its normals tell.
+    /// [cells of the first attempt] Cell above which the chosen lattice is refined because it is too coarse for its
+    /// normals.
     double coarse = heuristic("orientation.coarse", 1.2);
-    /// [spacings] Noise below which a surface may be as fine as the tries were compared.
+    /// [spacings] Noise below which a surface may be as fine as the lattice on which attempts are compared.
     double little_noise = heuristic("orientation.little_noise", 0.5);
-    /// [share of the points] That a surface passes by and that ask for that.
+    /// [fraction of the points] Missed by a surface, above which it is refined to that lattice.
     double many_passed = heuristic("orientation.many_passed", 0.02);
-    /// [points] That iterate, on the surface in the square of a lattice's cell.
+    /// [points] Number used in the iteration per area of a lattice cell's face.
     double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
-    /// [cells] Along the longest side, at most, in the first tries.
+    /// [cells] Maximum along the longest side in the first attempts.
     double first_along = heuristic("orientation.first_along", 192);
-    /// [points] Most of those: time.
+    /// [points] Maximum number used in the iteration: limits the time.
     double max_sampled = heuristic("orientation.max_sampled", 100000);
-    /// [points] Fewest of those: where parts lie so far apart that the lattice has each in a cell.
+    /// [points] Minimum number used in the iteration: for parts so far apart that each lies in one cell of the lattice.
     std::size_t min_sampled = heuristic("orientation.min_sampled", 100);
-    /// [spacings] Edge of the cells that those are taken from.
+    /// [spacings] Edge of the cells by which points are ordered for sampling.
     double sample_spacings = heuristic("orientation.sample_spacings", 4);
-    /// [spacings] Noise below which the nearest points tell the sheet that a point is on.
+    /// [spacings] Noise below which the nearest points determine the sheet of a point.
     double sharp = heuristic("orientation.sharp", 0.2);
     /// [spacings] Noise up to which points that enclose nothing are oriented from neighbour to neighbour.
     double noise_of_sheets = heuristic("orientation.noise_of_sheets", 0.3);
-    /// [rounds] Of leaving out stray points.
+    /// [rounds] Maximum number of rounds of removing stray points.
     int stray_rounds = heuristic("orientation.stray_rounds", 3);
-    /// [share of the points] That a round has to leave out for another one.
+    /// [fraction of the points] Minimum that a round must remove for another one.
     double many_stray = heuristic("orientation.many_stray", 0.005);
-    /// [share of the points] Of given normals with opposite ones beside them; good ones have less than 0.001 without
-    /// noise and 0.005 at any.
+    /// [fraction of the points] Maximum with an opposite given normal beside them; for correct normals it is below
+    /// 0.001 without noise and 0.005 with any noise.
     double few_torn = heuristic("orientation.few_torn", 0.002);
-    /// [share of the points] Of given normals against an orientation that settled; those of which a part is turned as a
-    /// whole have more than 0.1.
+    /// [fraction of the points] Maximum whose given normals contradict an orientation that has settled; it is above 0.1
+    /// if a part of them is turned as a whole.
     double contradicted = heuristic("orientation.contradicted", 0.03);
-    /// [share of the points] Doubt below which points enclose a solid: of closed shapes up to 0.013, of scans of one
-    /// side from 0.026 to 0.19.
+    /// [fraction of the points] Doubt below which points enclose a solid: up to 0.013 for closed shapes, 0.026 to 0.19
+    /// for scans of one side.
     double settled = heuristic("orientation.settled", 0.014);
-    /// [share of the area] Without points, below which they enclose one all the same: of closed shapes less than 0.01,
-    /// of scans of one side 0.14 to 0.4.
+    /// [fraction of the area] Without points, below which points enclose a solid in spite of doubt: less than 0.01 for
+    /// closed shapes, 0.14 to 0.4 for scans of one side.
     double bare = heuristic("orientation.bare", 0.05);
-    /// [ratio] Of the points that an orientation that is in doubt passes by to those that views do, below which they
-    /// enclose a solid all the same: of closed shapes and shells open at one end 0.06 to 0.21, of scans of one side
-    /// 0.83 to 0.97, of thin noisy shells 0.44.
+    /// [ratio] Of the points missed by a doubtful orientation to those missed by the orientation from views, below
+    /// which points enclose a solid nevertheless: 0.06 to 0.21 for closed shapes and shells open at one end, 0.83 to
+    /// 0.97 for scans of one side, 0.44 for thin noisy shells.
     double fewer_passed = heuristic("orientation.fewer_passed", 1.0 / 3);
-    /// [share of the area] Without points, above which what closes them is larger than what they are on: of closed
-    /// shapes up to 0.04, of scans of some sides 0.14 to 0.37, of those from the air 0.66 to 0.85.
+    /// [fraction of the area] Without points, above which the closing surface is larger than the one with points: up to
+    /// 0.04 for closed shapes, 0.14 to 0.37 for scans of some sides, 0.66 to 0.85 for scans from the air.
     double mostly_bare = heuristic("orientation.mostly_bare", 0.5);
-    /// [spacings] Distance from a point at which the surface passes it by.
+    /// [spacings] Distance from a point from which on the surface misses it.
     double passed_reach = heuristic("orientation.passed_reach", 1.5);
     /// [spacings or noises] Distance to the nearest point from which on the surface is bare.
     double bare_reach = heuristic("orientation.bare_reach", 2);
@@ -136,88 +138,92 @@ COVOL_HEURISTICS OrientationHeuristics kOrientation{};
 
 /// Normals and sensors of the file, checked: given_sides.cpp.
 struct GivenSidesHeuristics {
-    /// [share of the normals] That turn of an orientation beyond doubt.
+    /// [fraction of the normals] That turn in an orientation without doubt.
     double few_turned = heuristic("given_sides.few_turned", 0.002);
-    /// [share of the points] Fewest with a normal or sensor for them to be used.
+    /// [fraction of the points] Minimum with a normal or sensor for them to be used.
     double min_known = heuristic("given_sides.min_known", 0.5);
-    /// [share of the normals] That the other half has to foresee; of normals without a meaning it is half.
+    /// [fraction of the normals] Minimum that must be predicted by the other half; half of meaningless normals are.
     double min_predicted = heuristic("given_sides.min_predicted", 0.65);
-    /// [share of the points] That their sensor has to see: a body hides at least half of itself from a wrong place.
+    /// [fraction of the points] Minimum that their sensor must see: a body hides at least half of itself from a wrong
+    /// position.
     double min_free_views = heuristic("given_sides.min_free_views", 0.7);
-    /// [spacings or noises] Cells of the lattice on which points judge each other: about four points each.
+    /// [spacings or noises] Cell of the lattice on which normals are cross-validated: about four points each.
     double vote_spacings = heuristic("given_sides.vote_spacings", 2);
-    /// [rounds] Of turning normals that the others contradict.
+    /// [rounds] Of reversing normals that the others contradict.
     int turns = heuristic("given_sides.turns", 3);
     /// [indicator's step over a cell] Slope from which on the indicator contradicts a normal.
     double speaks_against = heuristic("given_sides.speaks_against", 0.1);
-    /// [indicator] At a point and on both of its sides, from which on it is within the solid: halfway from a border.
+    /// [indicator] At a point and on both of its sides, from which on the point is inside: halfway from a border.
     double enclosed = heuristic("given_sides.enclosed", 0.75);
-    /// [rounds] Of smoothing normals that noise has mixed.
+    /// [rounds] Of smoothing normals that are mixed by noise.
     int smoothings = heuristic("given_sides.smoothings", 2);
     /// [points] Neighbours whose normals are compared.
     std::size_t beside = heuristic("given_sides.beside", 8);
-    /// [sine] Of a neighbour's height over the tangent plane, below which both are of one sheet.
+    /// [sine] Of a neighbour's elevation from the tangent plane, below which both points are on one sheet.
     double flat = heuristic("given_sides.flat", 0.3);
-    /// [cosine] Between normals of one sheet that is torn there.
+    /// [cosine] Between two normals of one sheet below which it is torn there.
     double opposite = heuristic("given_sides.opposite", -0.5);
 };
 COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
 
-/// Normals of local planes, and their signs from neighbour to neighbour: propagation.cpp.
+/// Normals of local planes, with signs propagated from neighbour to neighbour: propagation.cpp.
 struct PropagationHeuristics {
-    /// [noises] Radius of the neighbourhood that a plane is fitted to.
+    /// [noises] Radius of the neighbourhood to which a plane is fitted.
     double plane_noises = heuristic("propagation.plane_noises", 4);
-    /// [points] Fewest in it.
+    /// [points] Minimum in it.
     double fewest = heuristic("propagation.fewest", 12);
-    /// [points] Most in it.
+    /// [points] Maximum in it.
     double maximum = heuristic("propagation.maximum", 100);
-    /// [points] Neighbours that a point may take its sign from.
+    /// [points] Neighbours from which a point may take its sign.
     std::size_t neighbours = heuristic("propagation.neighbours", 10);
 };
 COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 
-/// Clouds of one side, by where each point can be seen from: views.cpp.
+/// Scans of one side, oriented by the directions from which each point can be seen: views.cpp.
 struct ViewsHeuristics {
-    /// [rays] From each cell, evenly over the sphere.
+    /// [rays] From each cell, evenly distributed over the sphere.
     int rays = heuristic("views.rays", 96);
-    /// [cells] Along the longest side: memory.
+    /// [cells] Maximum along the longest side: limits memory.
     int max_view_cells = heuristic("views.max_view_cells", 256);
-    /// [cells] Start of a ray: beyond the point's own sheet.
+    /// [cells] Start of a ray, beyond the point's own sheet.
     double first_step = heuristic("views.first_step", 2.5);
-    /// [spacings or noises] Edge of the cells that stop a view: about four points each.
+    /// [spacings or noises] Edge of the cells that block a view: about four points each.
     double view_spacings = heuristic("views.view_spacings", 2.0);
-    /// [spacings or noises] Edge of the cells of the indicator whose topology counts.
+    /// [spacings or noises] Edge of the cells of the indicator that determines the topology.
     double coarse_spacings = heuristic("views.coarse_spacings", 2.4);
     /// [spacings or noises] Edge of the cells of the screened indicator.
     double fine_spacings = heuristic("views.fine_spacings", 1.2);
-    /// [share of the points] That are free in one direction and not in the opposite one, from which on it is the sky.
+    /// [fraction of the points] With a free view in one direction and not in the opposite one, from which on the
+    /// direction is the sky's.
     double sky = heuristic("views.sky", 0.01);
-    /// [weight] Of each point's own free directions, against the sky's.
+    /// [weight] Of each point's own free directions, relative to the sky's.
     double beside_sky = heuristic("views.beside_sky", 0.1);
-    /// [share of all directions] Less those opposite, from which a point is seen on a side.
+    /// [fraction of all directions] Excess of free directions on one side over the other from which a point is seen on
+    /// that side.
     double min_free = heuristic("views.min_free", 0.01);
-    /// [indicator's slope over a cell] Weight with which points hold the screened indicator (Kazhdan and Hoppe,
-    /// Screened Poisson surface reconstruction, ACM Trans. Graph. 32(3), 2013).
+    /// [indicator's slope over a cell] Weight of the points in the screened indicator (Kazhdan and Hoppe, Screened
+    /// Poisson surface reconstruction, ACM Trans. Graph. 32(3), 2013).
     double screening = heuristic("views.screening", 4);
 };
 COVOL_HEURISTICS ViewsHeuristics kViews{};
 
-/// Layers of a scan below others: layers.cpp. Lengths are in the distance from which on points are not of one sheet.
+/// Layers of a scan below others: layers.cpp. Lengths are relative to the distance from which on points are not of one
+/// sheet.
 struct LayersHeuristics {
     /// [distances between sheets] Edge of the cells whose points turn together.
     double cell = heuristic("layers.cell", 2);
-    /// [distances between sheets] Of a layer below the one that hides it.
+    /// [distances between sheets] Maximum depth of a layer below the one that hides it.
     double farthest_layer = heuristic("layers.farthest_layer", 6);
-    /// [share of a patch's points] That may be farther from the surface once they are turned.
+    /// [fraction of a patch's points] Maximum that may be far from the surface after turning.
     double max_away = heuristic("layers.max_away", 0.2);
-    /// [cells of the indicator] Surface without points as near is bare.
+    /// [cells of the indicator] Distance to the nearest point from which on the surface is bare.
     double bare_cells = heuristic("layers.bare_cells", 2);
-    /// [areas of the patch] Of bare surface: a cavity's far side is not much larger than its near one, a ring's hole
-    /// is.
+    /// [areas of the patch] Maximum decrease of the bare surface: the far side of a cavity is not much larger than its
+    /// near side, unlike the hole of a ring.
     double max_gain = heuristic("layers.max_gain", 1.5);
-    /// [patches] That are tried; each costs a solution.
+    /// [patches] Maximum number tried; each requires a solution.
     int max_patches = heuristic("layers.max_patches", 12);
-    /// [points] Fewest of a patch.
+    /// [points] Minimum in a patch.
     std::size_t min_points = heuristic("layers.min_points", 12);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};

@@ -21,16 +21,16 @@ double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
 }
 namespace {
 
-double weighed(const Orientation& o, double weight) {
+double weighted_doubt(const Orientation& o, double weight) {
     return o.turned + weight * std::max(0.0, o.off_half - kOrientation.off_half);
 }
 
 }  // namespace
 
-double doubt(const Orientation& o) { return weighed(o, kOrientation.off_weight); }
-bool is_settled(const Orientation& o) { return weighed(o, 1) < kGivenSides.few_turned; }
+double doubt(const Orientation& o) { return weighted_doubt(o, kOrientation.off_weight); }
+bool is_settled(const Orientation& o) { return weighted_doubt(o, 1) < kGivenSides.few_turned; }
 
-double fraction_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     std::vector<char> passed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         const Indicator::Sample at = indicator.at(points[n]);

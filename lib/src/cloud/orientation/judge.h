@@ -1,21 +1,22 @@
 #pragma once
-// What speaks for and against an orientation, and how fine its grids may be.
+// Criteria for and against an orientation, and the cell size of its grids.
 #include <vector>
 
 #include "covol/orientation.h"
 
 namespace covol::cloud {
 
-/// Of the finest grid, world units: no finer than so many points tell.
+/// Cell of the finest grid, world units, limited by the number of points.
 [[nodiscard]] double finest_cell(const CloudScale& scale, std::size_t points);
-/// The same of the first tries: on larger cells fewer normals turn, and only thin parts ask for smaller ones.
+/// Cell of the first attempts: with larger cells fewer normals turn, and only thin parts require smaller ones.
 [[nodiscard]] double first_cell(const CloudScale& scale, const std::vector<Vec3>& points);
 
-/// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
+/// Doubt that an orientation is right: normals keep turning, or the mean of the indicator is not 1/2 at the points, if
+/// parts are turned as a whole.
 [[nodiscard]] double doubt(const Orientation& orientation);
 [[nodiscard]] bool is_settled(const Orientation& orientation);
 
-/// Share of the points that the indicator's level 1/2 passes by at more than that distance, world units.
-[[nodiscard]] double fraction_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
+/// Fraction of the points from which the indicator's level 1/2 is farther than `reach`, world units.
+[[nodiscard]] double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
 
 }  // namespace covol::cloud

@@ -14,9 +14,9 @@
 namespace covol::cloud {
 namespace {
 
-using Patch = std::vector<std::uint32_t>;  // points
+using Patch = std::vector<std::uint32_t>;  // indices of points
 
-/// Cells of points, and those of them that are opposed by what lies around them.
+/// Cells of points, and which of them have free directions opposed to those around them.
 class Opposed {
 public:
     Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
@@ -24,7 +24,7 @@ public:
         std::vector<Vec3> places, frees;
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             places.push_back(cells.sorted()[cells.cell(c).begin]);
-            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // the same for all of a cell
+            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // equal for all points of a cell
         }
         const PointCells near(places, cells.edge());
         const double reach = kLayers.farthest_layer * between, touching = std::sqrt(6.0) * cells.edge();
@@ -44,7 +44,7 @@ public:
         });
     }
 
-    /// Connected ones, those with most points first.
+    /// Connected groups of opposed cells, those with the most points first.
     [[nodiscard]] std::vector<Patch> patches() const {
         std::vector<Patch> all;
         std::vector<char> seen(opposed_.size(), 0);
@@ -83,8 +83,8 @@ struct Level {
             if (!points.any_within(middles.back(), reach)) bare += side * side;
         });
     }
-    std::vector<Vec3> middles;  // of the cells that it passes
-    double bare = 0;            // of them, in the area of the finest cells
+    std::vector<Vec3> middles;  // centres of the cells crossed by the surface
+    double bare = 0;            // area without points, in faces of the finest cells
 };
 
 void turn(const Patch& patch, Orientation& orientation) {

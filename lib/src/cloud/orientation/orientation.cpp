@@ -28,21 +28,21 @@ using cloud::Iteration;
 using cloud::normals_of;
 using cloud::Stage;
 
-/// What is tried until few normals turn.
-struct Try {
-    double cell;         // of those
-    double enclosed;     // on the first lattice
-    bool is_propagated;  // the first guess; else points point away from where the others are
+/// Parameters of an attempt; attempts end once few normals turn.
+struct Attempt {
+    double cell;         // in cells of the first attempt
+    double enclosed;     // threshold of the first stage
+    bool is_propagated;  // initial normals; otherwise they point away from the other points
 };
 
-/// Every few points of those that lie together, and what each stands for.
+/// A subset of the points that is even in space, with the area that each represents.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
         : step(every), order(cloud::PointCells(all, kOrientation.sample_spacings * spacing).order()) {
         for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
         areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
     }
-    /// Of all points.
+    /// The areas of all points.
     [[nodiscard]] std::vector<double> all_areas() const {
         std::vector<double> all(order.size());
         for (std::size_t n = 0; n < order.size(); ++n)
@@ -54,19 +54,19 @@ struct Sample {
     std::vector<Vec3> points;
     std::vector<double> areas;
 };
-struct Tried {
+struct AttemptResult {
     Orientation orientation;
     std::vector<Vec3> normals;  // of all points
     std::vector<double> off;    // Consistency::off()
     double mean_off = 0;
 };
 
-/// The most consistent one, with what others have that is more consistent still.
-Orientation best_of(std::vector<Tried> tried, const std::vector<Vec3>& points, const Sample& sample,
+/// The most consistent attempt, with those patches of the others that are more consistent.
+Orientation best_of(std::vector<AttemptResult> tried, const std::vector<Vec3>& points, const Sample& sample,
                     cloud::Consistency& consistency, const RunContext& run) {
     std::stable_sort(tried.begin(), tried.end(),
-                     [](const Tried& a, const Tried& b) { return a.mean_off < b.mean_off; });
-    Tried& first = tried.front();
+                     [](const AttemptResult& a, const AttemptResult& b) { return a.mean_off < b.mean_off; });
+    AttemptResult& first = tried.front();
     for (std::size_t n = 1; n < tried.size(); ++n) consistency.take_better(tried[n].normals, first.normals, first.off);
     Orientation best = std::move(first.orientation), whole;
     whole.normals = std::move(first.normals);
@@ -85,9 +85,9 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         throw Error(Errc::InvalidInput, "all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
-        // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
+        // Noise is hard to distinguish from thin parts; if normals keep turning, a finer lattice may resolve them.
         const double first = first_cell(scale, points);
-        // Parts thinner than the first cells need those that the points' spacing allows.
+        // Parts thinner than the first cells require cells as small as the points' spacing allows.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
         const double fraction = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
                                          kOrientation.max_sampled / double(points.size()));
@@ -97,20 +97,21 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
         std::optional<cloud::Consistency> consistency;
         std::vector<std::tuple<double, double, bool>> lattices;
-        std::vector<Tried> tried;
-        std::vector<Try> tries{{1, kOrientation.enclosed, true},
-                               {1, kOrientation.surely_enclosed, false},
-                               {kOrientation.strain_cells, kOrientation.surely_enclosed, true},
-                               {kOrientation.thin_cells, kOrientation.enclosed, false}};
-        if (first > kOrientation.coarse * finest) tries.push_back({finest / first, kOrientation.surely_enclosed, true});
-        const auto judged = [&](Orientation orientation, std::vector<Vec3> normals) {
+        std::vector<AttemptResult> tried;
+        std::vector<Attempt> attempts{{1, kOrientation.enclosed, true},
+                                      {1, kOrientation.surely_enclosed, false},
+                                      {kOrientation.strain_cells, kOrientation.surely_enclosed, true},
+                                      {kOrientation.thin_cells, kOrientation.enclosed, false}};
+        if (first > kOrientation.coarse * finest)
+            attempts.push_back({finest / first, kOrientation.surely_enclosed, true});
+        const auto evaluated = [&](Orientation orientation, std::vector<Vec3> normals) {
             std::vector<double> off = consistency->off(normals);
             const double mean_off = std::accumulate(off.begin(), off.end(), 0.0) / double(off.size());
-            return Tried{std::move(orientation), std::move(normals), std::move(off), mean_off};
+            return AttemptResult{std::move(orientation), std::move(normals), std::move(off), mean_off};
         };
         const std::vector<Vec3> propagated =
             cloud::propagated_normals(sample.points, scale, scale.spacing * std::sqrt(double(sample.step)));
-        for (const Try& attempt : tries) {
+        for (const Attempt& attempt : attempts) {
             const double tried_cell = cloud::indicator_cell(
                 points, std::max(first * attempt.cell, kOrientation.min_spacings * scale.spacing));
             const std::tuple lattice{tried_cell, attempt.enclosed, attempt.is_propagated};
@@ -134,10 +135,10 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             }
             if (!consistency) {
                 consistency.emplace(points, sample.all_areas(), kOrientation.strain_cells * finest, reach, run);
-                // Iterated, normals beside thin parts may end on a wrong side on which they did not begin.
-                tried.push_back(judged(now, cloud::propagated_normals(points, scale, scale.spacing)));
+                // Iterations may turn normals beside thin parts to a wrong side even if they were right initially.
+                tried.push_back(evaluated(now, cloud::propagated_normals(points, scale, scale.spacing)));
             }
-            tried.push_back(judged(std::move(now), std::move(normals)));
+            tried.push_back(evaluated(std::move(now), std::move(normals)));
         }
         if (consistency && tried.size() > 1) {
             best = best_of(std::move(tried), points, sample, *consistency, run);
@@ -149,7 +150,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                             std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
         for (double& area : best.areas) area *= half;
-        if (best.mended > 0) best.mended = cloud::mend_torn(points, scale.spacing, best.normals);
+        if (best.mended > 0) best.mended = cloud::repair_torn(points, scale.spacing, best.normals);
     });
     return best;
 }

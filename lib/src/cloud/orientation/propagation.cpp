@@ -18,19 +18,19 @@
 namespace covol::cloud {
 namespace {
 
-/// Sets of points, and for each point whether its sign is that of its set.
+/// Sets of points, with the sign of each point relative to that of its set.
 class SignedSets {
 public:
     explicit SignedSets(std::size_t count) : parent_(count), is_opposite_(count, 0) {
         std::iota(parent_.begin(), parent_.end(), 0U);
     }
-    /// (its set, whether its sign is opposite to that)
+    /// The set of a point and whether its sign is opposite to that of the set.
     [[nodiscard]] std::pair<std::uint32_t, bool> find(std::uint32_t n) {
         std::uint32_t root = n;
         bool opposite = false;
         for (; parent_[root] != root; root = parent_[root]) opposite ^= is_opposite_[root] != 0;
         bool left = opposite;
-        while (parent_[n] != root && n != root) {  // shortens the way for the next time
+        while (parent_[n] != root && n != root) {  // path compression
             const bool own = is_opposite_[n] != 0;
             const std::uint32_t next = parent_[n];
             parent_[n] = root;
@@ -40,7 +40,7 @@ public:
         }
         return {root, opposite};
     }
-    /// If they are two sets: one whose points n and m have opposite signs, or equal ones.
+    /// Merges the sets of points n and m, if they differ, such that the points have opposite or equal signs.
     void unite(std::uint32_t n, std::uint32_t m, bool opposite) {
         const auto [a, a_opposite] = find(n);
         const auto [b, b_opposite] = find(m);
@@ -83,7 +83,7 @@ std::vector<Edge> edges_of(const std::vector<Vec3>& points, const std::vector<Ve
 }  // namespace
 
 std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const CloudScale& scale) {
-    const double radius = kPropagation.plane_noises * scale.noise / scale.spacing;  // spacings
+    const double radius = kPropagation.plane_noises * scale.noise / scale.spacing;  // in spacings
     const auto count = std::size_t(std::clamp(M_PI * radius * radius, kPropagation.fewest, kPropagation.maximum));
     const PointCells cells(points, kNear.first_radius * scale.spacing);
     std::vector<Vec3> normals(points.size());

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kBeside = 16;
 
-/// Of a sample of the points.
+/// Median distance to the last neighbour, over a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
     const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
     std::vector<double> reach(count, -1);
@@ -29,23 +29,23 @@ double usual_reach(const PointCells& cells, double spacing) {
     return median(std::move(reach));
 }
 
-/// Whether fewer points than that lie within a distance.
-bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
+/// Whether fewer than kStray.neighbours points lie within a distance.
+bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
     const Vec3& p = cells.sorted()[n];
     std::size_t found = 0;
-    const auto has_company = [&](std::size_t begin, std::size_t end) {
+    const auto has_enough_neighbours = [&](std::size_t begin, std::size_t end) {
         for (std::size_t m = begin; m < end && found < kStray.neighbours; ++m) {
             const Vec3 to = minus(cells.sorted()[m], p);
             found += m != n && dot(to, to) <= distance * distance;
         }
         return found >= kStray.neighbours;
     };
-    // Most have it beside them in their cell.
-    if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
+    // For most points, the neighbours in the sorted order are sufficient.
+    if (has_enough_neighbours(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
     found = 0;
     cells.find(p, distance, ranges);
     return std::none_of(ranges.begin(), ranges.end(),
-                        [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
+                        [&](const PointCells::Range& range) { return has_enough_neighbours(range.begin, range.end); });
 }
 
 }  // namespace
@@ -56,10 +56,10 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
     const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, kStray.cell_noises * scale.noise));
     const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
-    std::vector<char> lonely(points.size());
+    std::vector<char> isolated(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& some) {
         std::vector<PointCells::Range> ranges;
-        for (std::size_t n = some.begin(); n < some.end(); ++n) lonely[n] = is_lonely(cells, n, far_reach, ranges);
+        for (std::size_t n = some.begin(); n < some.end(); ++n) isolated[n] = is_isolated(cells, n, far_reach, ranges);
     });
     run.check();
     for_nearest(
@@ -73,11 +73,11 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
             const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])),
                          reach = std::sqrt(near.back().squared);
-            // The farther the neighbours, the flatter they have to lie.
+            // The farther the neighbours, the flatter they must be.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
             stray[point] = off * reach / far_reach > kStray.off_plane;
         },
-        [&](std::size_t n) { return lonely[n] != 0; });
+        [&](std::size_t n) { return isolated[n] != 0; });
     return stray;
 }
 

@@ -18,10 +18,10 @@
 namespace covol::cloud {
 namespace {
 
-/// What tells points of a sheet from each other.
+/// Distance at which points of one sheet are distinct.
 double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
 
-/// Evenly over the sphere: a Fibonacci spiral.
+/// Directions distributed evenly over the sphere: a Fibonacci spiral.
 std::vector<Vec3> directions() {
     std::vector<Vec3> all;
     const double golden = M_PI * (3 - std::sqrt(5.0));
@@ -32,13 +32,13 @@ std::vector<Vec3> directions() {
     return all;
 }
 
-/// Of length 1; 0 where as much is free on one side as on the other.
+/// Unit directions; 0 if about as much is free on one side as on the other.
 std::vector<Vec3> towards(std::vector<Vec3> free) {
     for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.min_free ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
 
-/// The cells with points, as a dense mask.
+/// A dense mask of the cells with points.
 class Occupied {
 public:
     Occupied(const std::vector<Vec3>& points, double cell)
@@ -64,7 +64,7 @@ public:
     }
 
 private:
-    /// < 0: beyond the box.
+    /// Negative outside the box.
     [[nodiscard]] std::ptrdiff_t index(const Vec3& at) const {
         std::ptrdiff_t n = 0;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -112,7 +112,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
     const Occupied occupied(points, cell);
     const PointCells cells(points, occupied.cell());
     const std::vector<Vec3> rays = directions();
-    std::vector<double> seen(rays.size());  // points, less those that are seen from the opposite direction
+    std::vector<double> seen(rays.size());  // points with a free view minus those with the opposite one
     tbb::parallel_for(std::size_t(0), rays.size(), [&](std::size_t r) {
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             const auto [begin, end] = cells.cell(c);
@@ -147,7 +147,7 @@ void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, cons
                   const StackField* start, Orientation& result, const RunContext& run) {
     WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * apart(scale)));
     const double cell = fine.indicator().stack().cell();
-    // A view tells the side alone; which way the surface lies its neighbours know better.
+    // A view determines only the side of a normal; its direction is estimated better from its neighbours.
     std::vector<double> screen(points.size());
     std::size_t against = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {

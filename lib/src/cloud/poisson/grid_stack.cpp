@@ -12,10 +12,11 @@
 namespace covol::cloud {
 namespace {
 
-// Cells of each level around a point's splines, which reach -1 to 2: splines of twice the cell then end within them.
+// Margin, in cells, of each level around a point's splines, which reach nodes -1 to 2: splines of twice the cell size
+// then end within the level.
 constexpr int kAround = 3;
-constexpr int kCoarsestCells = kBlockSide - 1;  // along the longest side: a block of nodes
-constexpr int kGrading = 2;                     // coarser cells around a block
+constexpr int kCoarsestCells = kBlockSide - 1;  // along the longest side: one block of nodes
+constexpr int kGrading = 2;                     // margin around each block, in cells of the coarser level
 
 std::size_t hash(const BlockAt& at) {
     std::uint64_t h = std::uint64_t(std::uint32_t(at[0])) * 0x9e3779b97f4a7c15ULL;
@@ -63,7 +64,7 @@ void GridLevel::index() {
     }
 }
 
-/// Points and their levels.
+/// Points with their levels.
 struct GridStack::Placed {
     [[nodiscard]] std::uint8_t level_of(std::size_t n) const { return levels.empty() ? 0 : levels[n]; }
     const std::vector<Vec3>& points;
@@ -106,7 +107,7 @@ std::array<std::int32_t, 3> GridStack::base(std::size_t level, const Vec3& world
     return node;
 }
 
-/// Near the points of this level, and around the blocks of the finer one.
+/// Adds blocks near the points of this level and around the blocks of the finer one.
 void GridStack::add_blocks(std::size_t level, const Placed& placed) {
     std::vector<BlockAt>& blocks = levels_[level].blocks;
     const int last = (1 << (levels_.size() - 1 - level)) - 1;  // along each axis
@@ -127,7 +128,8 @@ void GridStack::add_blocks(std::size_t level, const Placed& placed) {
             add(shifted(first, -kGrading, -kGrading, -kGrading),
                 shifted(first, 4 + kGrading, 4 + kGrading, 4 + kGrading));
         }
-    // Of each block's points, which of its neighbours they need: blocks first, so that few are listed twice.
+    // For each block with points, which of its neighbours they need, without duplicates so that few blocks are listed
+    // twice.
     std::vector<std::pair<BlockAt, std::uint32_t>> needs;
     for (std::size_t n = 0; n < placed.points.size(); ++n) {
         if (std::min<std::size_t>(placed.level_of(n), levels_.size() - 1) != level) continue;

@@ -1,14 +1,14 @@
 #pragma once
-// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+// The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
 #include "base/heuristic.h"
 
 namespace covol {
 
 /// Multigrid for the Poisson equation of the indicator: winding_field.cpp.
 struct WindingFieldHeuristics {
-    /// [sweeps] Of Gauss-Seidel before and after each correction.
+    /// [sweeps] Gauss-Seidel sweeps before and after each correction.
     int sweeps = heuristic("winding_field.sweeps", 1);
-    /// [sweeps] On the coarsest grid, a block.
+    /// [sweeps] Gauss-Seidel sweeps on the coarsest grid, which is one block.
     int coarsest_sweeps = heuristic("winding_field.coarsest_sweeps", 32);
 };
 COVOL_HEURISTICS WindingFieldHeuristics kWinding{};

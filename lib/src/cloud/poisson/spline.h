@@ -1,5 +1,5 @@
 #pragma once
-// Cubic B-splines on the nodes around a place.
+// Cubic B-splines on the nodes around a position.
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -16,9 +16,9 @@ inline Float4 load4(const float* p) {
 
 inline double sum_of(Float4 v) { return double((v[0] + v[1]) + (v[2] + v[3])); }
 
-/// Weights of 4 nodes along each axis, and their derivatives in cells.
+/// Weights of 4 nodes along each axis, and their derivatives per cell.
 struct Spline {
-    /// @param within  its cell, 0 to 1 along each axis
+    /// @param within  position in the cell, 0 to 1 along each axis
     explicit Spline(const std::array<double, 3>& within) {
         for (std::size_t a = 0; a < 3; ++a) {
             const auto t = float(within[a]), s = 1 - t;

@@ -1,5 +1,5 @@
 #pragma once
-// Points' splines, summed at the nodes of a level.
+// Sums of the points' splines at the nodes of a level.
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace covol::cloud {
 
-/// Adds row(spline, point, i, j), a Float4, to the nodes around each point of a level, in the same order whatever the
-/// number of threads.
+/// Adds row(spline, point, i, j), a Float4, to the nodes around each point of a level. The order of summation does not
+/// depend on the number of threads.
 template <typename Row>
 void spread_on(const GridStack& stack, const std::vector<Vec3>& points, std::size_t l, std::vector<float>& nodes,
                Row row) {

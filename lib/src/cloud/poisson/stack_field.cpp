@@ -10,14 +10,14 @@
 namespace covol::cloud {
 namespace {
 
-/// The 4^3 nodes around a place and its place in their middle cell.
+/// The 4^3 nodes around a position, and the position within their middle cell.
 struct Surrounding {
     float nodes[64];
     std::array<double, 3> within;
     double cell;
 };
 
-/// @return whether all blocks around it exist; where not and `whole`, nodes that do not are 0
+/// @return whether all blocks around the position exist; if not and `whole`, missing nodes are 0
 bool collect(const GridLevel& level, const float* values, const Vec3& origin, const Vec3& world, bool whole,
              Surrounding& s) {
     BlockAt at;

@@ -25,13 +25,13 @@ std::size_t beside_at(int i, int j, int k) {
 }
 std::size_t node_at(int i, int j, int k) { return std::size_t((i & 7) * 64 + (j & 7) * 8 + (k & 7)); }
 
-/// The nodes low..low+count-1 along each axis, in the frame of a block; 0 where none are.
+/// The nodes low..low+count-1 along each axis, relative to a block; 0 if they do not exist.
 void collect_nodes(const GridLevel& grid, const std::vector<float>& values, std::size_t block,
                    const std::array<int, 3>& low, int count, float* out) {
     for (int i = low[0]; i < low[0] + count; ++i)
         for (int j = low[1]; j < low[1] + count; ++j)
             for (int k = low[2], run = 0; k < low[2] + count; k += run, out += run) {
-                run = std::min(8 - (k & 7), low[2] + count - k);  // of one block
+                run = std::min(8 - (k & 7), low[2] + count - k);  // within one block
                 const std::uint32_t b = grid.beside[block][beside_at(i, j, k)];
                 if (b == kNoBlock)
                     std::fill_n(out, run, 0.0F);
@@ -40,7 +40,7 @@ void collect_nodes(const GridLevel& grid, const std::vector<float>& values, std:
             }
 }
 
-/// Where a block's node 0 is in the block of the coarser grid that it lies in.
+/// The position of a block's node 0 within the block of the coarser grid that contains it.
 std::array<int, 3> place_in_coarser(const BlockAt& at) { return {(at[0] & 1) * 4, (at[1] & 1) * 4, (at[2] & 1) * 4}; }
 
 }  // namespace
@@ -60,7 +60,7 @@ const float* WindingField::screen_of(std::size_t l, std::size_t block) const {
     return levels_[l].screen.empty() ? nullptr : levels_[l].screen.data() + block * kBlockNodes;
 }
 
-/// Of the solution, with what lies across the faces.
+/// Copies the block's solution and the values across its faces.
 void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
     const std::vector<float>& u = solution_.values[l];
     const float* own = u.data() + block * kBlockNodes;
@@ -70,7 +70,7 @@ void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
     constexpr std::size_t kFaces[6] = {4, 22, 10, 16, 12, 14};
     constexpr std::size_t kNodeStep[3] = {64, 8, 1}, kPaddedStep[3] = {100, 10, 1};
     for (std::size_t face = 0; face < 6; ++face) {
-        const std::size_t axis = face / 2, b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;  // along the face
+        const std::size_t axis = face / 2, b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;  // b, c: along the face
         const std::uint32_t other = grid(l).beside[block][kFaces[face]];
         const bool high = (face & 1) != 0;
         const float* from;
@@ -89,7 +89,7 @@ void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
 }
 
 void WindingField::sweep(std::size_t l) {
-    for (const std::vector<std::uint32_t>& colour : grid(l).colours)  // blocks of one have no faces in common
+    for (const std::vector<std::uint32_t>& colour : grid(l).colours)  // blocks of a colour have no common faces
         for_blocks(colour.size(), [&](std::size_t n) {
             const std::size_t block = colour[n];
             float padded[kPadded];
@@ -111,9 +111,9 @@ void WindingField::find_residual(std::size_t l) {
     });
 }
 
-/// Trilinear interpolation of the coarser grid beyond the faces where this one ends.
+/// Sets the values beyond the faces at which this grid ends by trilinear interpolation of the coarser grid.
 void WindingField::set_ghosts(std::size_t l) {
-    if (l + 1 == levels_.size()) return;  // 0
+    if (l + 1 == levels_.size()) return;  // the border values are 0
     const GridLevel& fine = grid(l);
     for_blocks(fine.blocks.size(), [&](std::size_t block) {
         if (std::all_of(fine.ghost[block].begin(), fine.ghost[block].end(), [](auto g) { return g == kNoBlock; }))
@@ -139,13 +139,13 @@ void WindingField::set_ghosts(std::size_t l) {
     });
 }
 
-/// What level l - 1 makes of this one's nodes below it: its solution, and a right-hand side of which that is the
-/// solution where it has no residual.
+/// Full approximation storage: sets the nodes that level l - 1 covers to its solution, and their right-hand side such
+/// that this solution is exact if level l - 1 has no residual.
 void WindingField::restrict_from(std::size_t l) {
     const GridLevel& fine = grid(l - 1);
     const GridLevel& own = grid(l);
     std::vector<float>& u = solution_.values[l];
-    const auto for_covered = [&](std::size_t block, auto visit) {  // visit(finer block, its first node here)
+    const auto for_covered = [&](std::size_t block, auto visit) {  // visit(finer block, its first node on this level)
         for (std::size_t child = 0; child < 8; ++child)
             if (own.finer[block][child] != kNoBlock)
                 visit(own.finer[block][child],
@@ -159,7 +159,7 @@ void WindingField::restrict_from(std::size_t l) {
             for (std::size_t n = 0; n < 64; ++n) {
                 const std::size_t i = n / 16, j = n / 4 % 4, k = n % 4, to = first + i * 64 + j * 8 + k;
                 u[to] = solution_.values[l - 1][child * kBlockNodes + i * 128 + j * 16 + k * 2];
-                // The stencil is h times the weak form's, and h doubles.
+                // The stencil is h times that of the weak form, and h doubles.
                 levels_[l].right[to] = 0.5F * sums[n];
             }
         });
@@ -180,7 +180,7 @@ void WindingField::restrict_from(std::size_t l) {
     });
 }
 
-/// Adds what level l + 1 has changed since.
+/// Adds the change of level l + 1 since the restriction.
 void WindingField::correct(std::size_t l) {
     std::vector<float>& change = levels_[l + 1].before;
     tbb::parallel_for(std::size_t(0), change.size(),

@@ -1,10 +1,11 @@
 #pragma once
-// The indicator function of a solid from points with normals on its border: the solution of the Poisson equation
-// div grad chi = -div V for V = sum of area * normal at the points (Kazhdan, Bolitho and Hoppe, Poisson surface
-// reconstruction, SGP 2006), which is the generalised winding number of the same points (Barill and others 2018).
-// Solved on a stack of grids, each of which ends near the points that need it: the finest one there holds the
-// equation, those below it its correction (full approximation storage; Brandt, Multi-level adaptive solutions to
-// boundary-value problems, Math. Comp. 31, 1977); nodes beyond a grid's end are interpolated from the next coarser one.
+// The indicator function of a solid from points with normals on its border: the solution of the Poisson equation div
+// grad chi = -div V for V = sum of area * normal at the points (Kazhdan, Bolitho and Hoppe, Poisson surface
+// reconstruction, SGP 2006), which is the generalised winding number of the same points (Barill et al., 2018). It is
+// solved on a stack of grids, each of which ends near the points that need it. The finest grid at each position
+// represents the equation and the coarser ones its correction (full approximation storage; Brandt, Multi-level adaptive
+// solutions to boundary-value problems, Math. Comp. 31, 1977); nodes beyond a grid's end are interpolated from the next
+// coarser one.
 #include <vector>
 
 #include "cloud/poisson/grid_stack.h"
@@ -23,20 +24,20 @@ public:
     /// @throws Error Cancelled
     void solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles,
                const RunContext& run = {});
-    /// From now on the indicator is drawn to 1/2 at the points; weight 1 on each node as strongly as its neighbours
-    /// draw it to themselves.
+    /// From now on, a penalty pulls the indicator to 1/2 at the points; a weight of 1 at a node is as strong as its
+    /// coupling to one neighbour.
     void screen(const std::vector<Vec3>& points, const std::vector<double>& weights);
-    /// Takes another one's solution as the first guess.
+    /// Uses another field as the initial value.
     void start_from(const StackField& other);
     [[nodiscard]] const StackField& indicator() const { return solution_; }
-    /// Of the solution.
+    /// Multiplies the solution by `factor`.
     void multiply(double factor);
 
 private:
     struct Level {
         std::vector<float> right, residual;
-        std::vector<float> before;  ///< solution before it was corrected
-        std::vector<float> ghosts;  ///< of each face beyond which no block is 8^2 nodes
+        std::vector<float> before;  ///< solution before its correction
+        std::vector<float> ghosts;  ///< 8^2 nodes for each face without a block beyond it
         std::vector<float> screen;  ///< weights at the nodes, or empty
     };
     void cycle(std::size_t l);

@@ -20,7 +20,7 @@ COVOL_INLINE Float8 square_root(Float8 x) {
     return x;
 }
 
-/// visit(row, y to the foot squared plus x squared) for each row that the piece reaches.
+/// visit(i, j, x squared plus y squared, relative to the foot) for each row that the piece reaches.
 template <typename Visit>
 COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
     int first[3], last[3];
@@ -36,7 +36,7 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
-/// First-order distance of a place, or of a row of places, to a sheet.
+/// First-order distance of a position, or of a row of positions, to a sheet.
 template <typename Real>
 COVOL_INLINE Real distance_to(const BlendSheet& s, float x, float y, Real z) {
     x -= s.origin[0], y -= s.origin[1], z -= s.origin[2];
@@ -84,7 +84,7 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
                 nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
             });
     }
-    // Rows of which the nearest pieces say that they are far from the surface need not hear the others.
+    // In rows that are far from the surface according to their nearest pieces, the others are not evaluated.
     bool is_near[64];
     for (int row = 0; row < 64; ++row) {
         bool any = false;

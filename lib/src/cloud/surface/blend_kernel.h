@@ -1,6 +1,6 @@
 #pragma once
-// Quadrics blended over the voxels of one leaf, eight at a time. Lengths are world units in the frame of the leaf's
-// first voxel, voxel (i, j, k) of 8^3 at index 64 i + 8 j + k.
+// Quadrics blended over the voxels of one leaf, eight at a time. Lengths are world units relative to the leaf's first
+// voxel; voxel (i, j, k) of 8^3 is at index 64 i + 8 j + k.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,7 @@ struct BlendSheet {
 struct BlendPiece {
     float foot[3], reach, normal[3];
     BlendSheet sheets[3];
-    int count;                                ///< of sheets
+    int count;                                ///< number of sheets
     bool first_is_convex, others_are_convex;  ///< as in Crease
 };
 
@@ -23,10 +23,10 @@ struct BlendLeaf {
     alignas(32) std::array<float, 512> fraction;  ///< squared distance from the nearest foot over its squared reach
     alignas(32) std::array<std::int32_t, 512> nearest;         ///< its piece; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< of the nearest piece
-    alignas(32) std::array<float, 512> sum, weight;  ///< of the signed distances to those on the nearest one's side
+    alignas(32) std::array<float, 512> sum, weight;            ///< sums over the pieces on the nearest one's side
 };
 
-/// Fills a leaf of voxels of edge h. Rows that are farther than `limit` from their nearest pieces hear of these alone.
+/// Fills a leaf of voxels of edge h. Rows farther than `limit` from their nearest pieces use these alone.
 void blend(const BlendPiece* pieces, std::size_t count, float h, float limit, BlendLeaf& leaf);
 
 }  // namespace covol::cloud

@@ -24,7 +24,7 @@ namespace covol::cloud {
 using openvdb::Coord;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Quadrics where they act, sorted into cells.
+/// Quadrics with the distance up to which they apply, sorted into cells.
 class CloudField::Pieces {
 public:
     Pieces(std::vector<Quadric> quadrics, double h)
@@ -47,13 +47,14 @@ public:
     [[nodiscard]] const Quadric& operator[](std::size_t n) const { return quadrics_[n]; }
     [[nodiscard]] double reach(std::size_t n) const { return double(reach_[n]); }
     [[nodiscard]] const Vec3& foot(std::size_t n) const { return cells_.sorted()[n]; }
-    /// How far beside its foot a piece may be the nearest: where the surface goes on there is a nearer one.
+    /// Maximum distance to the side at which a piece may be the nearest: if the surface continues there, another piece
+    /// is nearer.
     [[nodiscard]] double own_radius(std::size_t n) const {
         const Quadric& q = quadrics_[n];
         return std::max(
             {kBlend.beside_of_min * q.min_radius, kBlend.min_reach_voxels * h_, kBlend.beside_of_apart * q.apart});
     }
-    /// Half the sides of a box around the foot that holds what the piece alone says of the band around the surface.
+    /// Half the sides of a box around the foot that contains the piece's own part of the narrow band.
     [[nodiscard]] Vec3 own_box(std::size_t n) const {
         const Quadric& q = quadrics_[n];
         const double beside = std::min(own_radius(n), reach(n));
@@ -65,7 +66,7 @@ public:
         }
         return half;
     }
-    /// Those that may reach the box.
+    /// The pieces that may reach the box.
     void find(const WorldBox& box, std::vector<PointCells::Range>& ranges) const {
         WorldBox wide = box;
         for (int a = 0; a < 3; ++a) {
@@ -91,9 +92,9 @@ private:
 
 namespace {
 
-constexpr double kMaxLeaves = 2e7;  // in a list, before those that are listed twice are gone
+constexpr double kMaxLeaves = 2e7;  // length of the list before duplicates are removed
 
-/// Leaves of the domain, from boxes of voxels.
+/// Collects leaves of the domain from boxes of voxels.
 class LeafList {
 public:
     explicit LeafList(const Domain& domain) : domain_(domain) {}
@@ -104,14 +105,14 @@ public:
             first[a] = std::max(int(std::floor(low[a])), domain_.min[a]) & ~7;
             last[a] = std::min(int(std::ceil(high[a])), domain_.max[a]) & ~7;
         }
-        if (first == first_ && last == last_) return;  // boxes come in the order of their places
+        if (first == first_ && last == last_) return;  // consecutive boxes are often in the same leaves
         first_ = first, last_ = last;
         for (int i = first.x(); i <= last.x(); i += 8)
             for (int j = first.y(); j <= last.y(); j += 8)
                 for (int k = first.z(); k <= last.z(); k += 8) leaves_.emplace_back(i, j, k);
         if (leaves_.size() > 2 * settled_ + 100000) settle();
     }
-    /// Sorted, each once.
+    /// Sorted, without duplicates.
     std::vector<Coord> take() {
         settle();
         return std::move(leaves_);
@@ -129,7 +130,7 @@ private:
     Coord first_ = Coord::max(), last_ = Coord::min();
 };
 
-/// visit(part) for the parts of a box, of at most that edge, that the indicator's level 1/2 may pass.
+/// visit(part) for the parts of a box, with edges of at most `edge`, that the indicator's level 1/2 may cross.
 template <typename Visit>
 void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, const Visit& visit) {
     const double side = box.max[0] - box.min[0];
@@ -141,14 +142,14 @@ void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, c
         WorldBox half = box;
         for (int a = 0; a < 3; ++a) ((part >> a & 1) != 0 ? half.min : half.max)[a] = 0.5 * (box.min[a] + box.max[a]);
         const Indicator::Sample at = indicator.at(times(0.5, plus(half.min, half.max)));
-        // A corner is at 0.43 sides.
+        // The corners are 0.43 sides from the centre.
         if (std::abs(at.inside - 0.5) <= 0.6 * side * length(at.gradient)) add_crossed(indicator, half, edge, visit);
     }
 }
 
-/// The leaves of the domain where quadrics alone have their surface's band, or the indicator's surface passes.
-/// @throws Error InvalidInput where the indicator's cells are so much larger than the voxels that its surface alone has
-/// more leaves than memory holds: of parts that are small and far apart.
+/// The leaves of the domain that contain the band of a quadric or are crossed by the indicator's surface.
+/// @throws Error InvalidInput if the indicator's cells are so much larger than the voxels that the leaves of its
+/// surface do not fit into memory, as for small parts that are far apart
 std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
     constexpr std::size_t kParts = 32;
     std::vector<std::vector<Coord>> parts(kParts + 1);
@@ -183,8 +184,8 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
     return leaves;
 }
 
-/// Steps to the leaves across those faces of a leaf where the band around the surface goes on.
-std::vector<Coord> ways_on(const Leaf& leaf, float limit) {
+/// Offsets to the leaves across the faces at which the narrow band continues.
+std::vector<Coord> continuing_faces(const Leaf& leaf, float limit) {
     const float* values = leaf.buffer().data();
     const auto inside = [&](int i, int j, int k) { return std::abs(values[i << 6 | j << 3 | k]) < limit; };
     bool on[6] = {};
@@ -204,7 +205,7 @@ std::vector<Coord> ways_on(const Leaf& leaf, float limit) {
     return ways;
 }
 
-/// In a leaf's frame.
+/// The sheet relative to a leaf.
 BlendSheet blend_sheet(const Sheet& sheet, const Vec3& leaf) {
     BlendSheet result;
     for (int a = 0; a < 3; ++a) {
@@ -221,7 +222,7 @@ public:
     Blend(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain)
         : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
-    /// Values within the domain; beyond its end is outside, so that what reaches it is closed there.
+    /// Sets all values. Beyond the domain is outside, so that the surface is closed at its end.
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
         const Coord origin = leaf.origin();
@@ -239,21 +240,21 @@ public:
                         faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
             }
             double value = trust * own;
-            if (trust < 1) value += (1 - trust) * by_indicator(place(origin, at), limit);
+            if (trust < 1) value += (1 - trust) * indicator_distance(place(origin, at), limit);
             leaf.setValueOn(openvdb::Index(at), float(std::max(value, std::min(beyond_end(origin, at) * h, limit))));
         }
     }
 
 private:
-    /// Distance from its level 1/2, -limit to limit, which is where nothing but inside or outside is left.
-    [[nodiscard]] double by_indicator(const Vec3& world, double limit) const {
+    /// Distance from its level 1/2, limited to the range -limit to limit, whose ends mean only inside or outside.
+    [[nodiscard]] double indicator_distance(const Vec3& world, double limit) const {
         const Indicator::Sample at = indicator_.at(world);
         const double off = 0.5 - at.inside, beyond = (std::abs(off) - kBlend.sure) / kBlend.sure;
         const double far = std::max(std::abs(off) * at.cell / kBlend.slope, limit * beyond);
         return std::copysign(std::min(far, limit), off);
     }
 
-    /// Of the domain, in voxels; less than 0 within.
+    /// Distance beyond the end of the domain, in voxels; negative within.
     [[nodiscard]] double beyond_end(const Coord& origin, int at) const {
         const Coord voxel = origin.offsetBy(at >> 6, at >> 3 & 7, at & 7);
         int beyond = std::numeric_limits<int>::min();
@@ -261,13 +262,13 @@ private:
         return beyond - 0.5;
     }
 
-    /// 1 below the share that is trusted, 0 from 1 on.
+    /// 1 below the trusted fraction, 0 from 1 on.
     static double faded(double fraction) {
         const double beyond = std::clamp((fraction - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
-    /// How far a place lies beside the nearest foot, not above it, as a share of what it may.
+    /// Lateral distance of a position from the piece's foot, as a fraction of its maximum.
     [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
         const Vec3 to = minus(world, pieces_.foot(piece));
         const double up = dot(to, pieces_[piece].axes[2]);
@@ -279,7 +280,7 @@ private:
             {double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
     }
 
-    /// The pieces that may reach the voxels of the box, in its frame.
+    /// The pieces that may reach the voxels of the box, relative to it.
     void gather(const WorldBox& box) {
         pieces_.find(box, ranges_);
         near_.clear();
@@ -322,18 +323,18 @@ private:
     BlendLeaf leaf_;
 };
 
-/// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's
-/// band.
+/// The distance according to the pieces where they apply, and elsewhere according to the indicator's level 1/2; not yet
+/// the narrow band of a level set.
 FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& within,
                           const RunContext& run) {
     const auto limit = float(kHalfWidthVoxels * within.voxel_size);
     FloatGridPtr field = make_grid(within, limit, "u");
-    // A surface that leaves it is closed so far beyond that no value within tells.
+    // A surface that leaves the domain is closed so far outside that no value within changes.
     constexpr int kBeyond = int(kHalfWidthVoxels) + 1;
     const Domain domain = widened(within, kBeyond);
     openvdb::CoordBBox box = detail::box_of(domain);
     box.expand(kBeyond);
-    // From leaf to leaf, as far as the band goes.
+    // Proceeds from leaf to leaf as far as the band continues.
     for (std::vector<Coord> front = leaves_of(pieces, indicator, domain); !front.empty();) {
         std::vector<Leaf*> leaves;
         for (const Coord& origin : front) leaves.push_back(field->tree().touchLeaf(origin));
@@ -343,7 +344,7 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
             Blend blend(pieces, indicator, domain);
             for (std::size_t n = range.begin(); n < range.end(); ++n) {
                 blend.fill(*leaves[n]);
-                ways[n] = ways_on(*leaves[n], limit);
+                ways[n] = continuing_faces(*leaves[n], limit);
             }
         });
         run.check();
@@ -363,8 +364,8 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
     return field;
 }
 
-/// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
-/// be nodes all through the layer that they fill.
+/// Moves the points to the indicator's surface, as far as noise can have displaced them: otherwise there would be nodes
+/// throughout the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
     const double maximum = kBlend.max_noises * noise;
     points.squares_off.clear();
@@ -382,7 +383,7 @@ OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, doubl
     return points;
 }
 
-/// Of the points to the indicator's level 1/2, by its slope; infinite where it has none.
+/// Squared distances of the points to the indicator's level 1/2, to first order; infinite where its slope is 0.
 std::vector<float> squared_distances(const std::vector<Vec3>& points, const Indicator& indicator) {
     std::vector<float> squares(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {

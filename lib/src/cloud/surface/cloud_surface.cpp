@@ -25,24 +25,24 @@
 namespace covol {
 namespace {
 
-/// Pieces, cavities and handles.
+/// Numbers of pieces, cavities and handles.
 struct Complexity {
     Complexity(const FloatGrid& level_set, const RunContext& run) {
         try {
             const MeshMeasures m = measure_surface(level_set, 0, run).measures;
             pieces = m.components;
             all = m.components + std::max(0, m.genus);
-        } catch (const NoSurface&) {  // none, of no complexity
+        } catch (const NoSurface&) {  // no surface: the counts stay 0
         }
     }
-    int pieces = 0;  ///< and cavities
+    int pieces = 0;  ///< including cavities
     int all = 0;
 };
 
 /// Gives a level set the topology of an indicator that has fewer pieces and handles.
 struct TopologyOf {
     Complexity own;
-    std::size_t minimum;  // points, on a piece
+    std::size_t minimum;  // number of points on a piece
     const std::vector<Vec3>& points;
     const RunContext& run;
 
@@ -53,21 +53,21 @@ struct TopologyOf {
         detail::drop_bare_pieces(*rough, points, minimum);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
-        // Small pieces may be torn off, large ones are bodies that the indicator's cells are too wide to tell apart.
+        // Small pieces may be torn off, but large ones are bodies that the indicator's cells are too wide to separate.
         if (simpler.pieces < own.pieces &&
             cloud::count_large_pieces(*rough, run) < cloud::count_large_pieces(level_set, run))
             return;
-        // Surfaces that lie more than a voxel apart on the mean are not two versions of one: each may close a scan of
-        // one side in its own way.
+        // Surfaces more than a voxel apart on average are not two versions of one surface: each may close a scan of one
+        // side in a different way.
         const auto layer = std::size_t(double(level_set.activeVoxelCount()) / (2 * kHalfWidthVoxels));
         report.held_voxels += cloud::hold_topology(*rough, level_set, run, layer);
         own = simpler;
     }
 };
 
-/// Whether some of the surface is far from all points.
+/// Whether a considerable part of the surface is far from all points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const RunContext& run) {
-    constexpr std::uint64_t kTriangles = 100000;  // so many tell the share to a thousandth
+    constexpr std::uint64_t kTriangles = 100000;  // sufficient for a fraction accurate to a thousandth
     const double reach = kBlend.far_spacings * points.scale.spacing;
     const cloud::PointCells cells(points.points, reach);
     double all = 0, bare = 0;
@@ -102,7 +102,8 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     const auto minimum =
         std::size_t(std::max({kBlend.min_resting, fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);
-    // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
+    // Joins before the indicator's topology is imposed, which may lack torn parts, and after, since that may tear
+    // others.
     const auto join = [&] {
         const std::size_t joined = cloud::join_pieces(field, cloud.points, std::max(report.spacing, report.noise), run);
         report.joined_pieces += joined;
@@ -112,7 +113,7 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
     topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
                   report);
-    // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
+    // Around gaps in the points, a lattice as fine as their spacing creates small handles.
     if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
         topology.hold(
             field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),

@@ -18,26 +18,27 @@ using Eigen::Vector3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t kPlanePoints = 5;     // on a sheet, the fewest
-constexpr std::size_t kQuadricPoints = 10;  // likewise, of a curved one
-constexpr double kFlat = 1e-3;              // radii: misfit of what fits perfectly
-constexpr int kRobustTurns = 3;             // of weights by distance
-constexpr int kTurns = 6;                   // of k-planes; they end when no point changes
+constexpr std::size_t kPlanePoints = 5;     // minimum on a sheet
+constexpr std::size_t kQuadricPoints = 10;  // minimum on a curved sheet
+constexpr double kFlat = 1e-3;              // [radii] misfit of a perfect fit
+constexpr int kRobustTurns = 3;             // iterations of reweighting by distance
+constexpr int kTurns = 6;                   // maximum number of iterations of k-planes
 
-/// Points, and to which sheet each belongs.
+/// Points, with the sheet to which each belongs.
 struct Parts {
-    static constexpr std::size_t kAll = 3;  // in place of a part's number
+    static constexpr std::size_t kAll = 3;  // all points, instead of the number of a part
     const std::vector<CreasePoint>& points;
     double radius;
     std::vector<std::uint8_t> of;
-    std::vector<double> weights;  // of the points
+    std::vector<double> weights;  // of the points, adapted to their distances
 
     Parts(const std::vector<CreasePoint>& all, double r) : points(all), radius(r) {
         for (const CreasePoint& p : points) weights.push_back(p.weight);
     }
 
-    /// A few points beyond a further crease tilt no sheet: weights fall with the distance (Cauchy's, squared).
-    void mistrust(const std::array<Sheet, 3>& sheets) {
+    /// Prevents a few points beyond another crease from tilting a sheet: weights decrease with the distance (Cauchy's
+    /// weights, squared).
+    void reweight(const std::array<Sheet, 3>& sheets) {
         std::vector<double> off(points.size());
         for (std::size_t n = 0; n < points.size(); ++n) off[n] = std::abs(sheets[of[n]].distance(points[n].place));
         const double scale = std::max(kFlat * radius, 2 * median(off));
@@ -77,7 +78,7 @@ struct Parts {
         return true;
     }
 
-    /// Bends a plane to a quadric.
+    /// Fits a quadric over a plane.
     void bend(std::size_t part, Sheet& sheet) const {
         Matrix6 m = Matrix6::Zero();
         Vector6 right = Vector6::Zero();
@@ -101,7 +102,7 @@ struct Parts {
         sheet.c = {x[0] * radius, x[1], x[2], x[3] / radius, x[4] / radius, x[5] / radius};
     }
 
-    /// Each to the sheet that it is closest to. @return whether any changed
+    /// Assigns each point to its closest sheet. @return whether any changed
     template <typename Distance>
     bool assign(const std::array<Sheet, 3>& sheets, std::size_t count, const Distance& distance) {
         bool changed = false;
@@ -120,8 +121,8 @@ struct Parts {
     }
 };
 
-/// Divided by the normals: those that differ most, and what is closer to each.
-/// @return false if these do not differ as those of a crease do
+/// Divides the points by their normals, starting from those that differ most.
+/// @return false if the normals differ less than those of a crease
 bool divide(Parts& parts, std::size_t count) {
     const std::vector<CreasePoint>& points = parts.points;
     Vector3d mean = Vector3d::Zero();
@@ -158,7 +159,7 @@ bool divide(Parts& parts, std::size_t count) {
     return true;
 }
 
-/// Whether the points of each of two sheets lie below the other.
+/// Whether the points of each of the two sheets lie below the other.
 bool is_convex(const Parts& parts, const std::array<Sheet, 3>& sheets, std::size_t a, std::size_t b) {
     double above = 0;
     for (std::size_t n = 0; n < parts.points.size(); ++n)
@@ -174,11 +175,11 @@ void combine(const Parts& parts, Crease& crease) {
         return;
     }
     const bool with[3] = {is_convex(parts, sheets, 1, 2), is_convex(parts, sheets, 0, 2),
-                          is_convex(parts, sheets, 0, 1)};  // of the other two
+                          is_convex(parts, sheets, 0, 1)};  // index: the remaining sheet
     const int convex = with[0] + with[1] + with[2];
     crease.first_is_convex = convex >= 2;
     crease.others_are_convex = convex == 3 || convex == 1;
-    // The pair that differs from the other two is the inner one.
+    // The sheet of the pair that differs from the other two pairs must come first.
     for (std::size_t n = 0; n < 3; ++n)
         if (convex % 3 != 0 && with[n] == (convex == 1)) std::swap(sheets[0], sheets[n]);
 }
@@ -193,7 +194,7 @@ double misfit_of(const std::vector<CreasePoint>& points, const auto& shape) {
     return std::sqrt(squares / weight);
 }
 
-/// @param misfit  of one quadric: planes that are no better are not bent
+/// @param misfit  of one quadric: planes with a larger misfit are rejected
 std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double radius, std::size_t count,
                                  double misfit) {
     Parts parts(points, radius);
@@ -213,15 +214,15 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
             break;
     }
     for (int turn = 0; turn < kRobustTurns; ++turn) {
-        parts.mistrust(crease.sheets);
+        parts.reweight(crease.sheets);
         for (std::size_t s = 0; s < count; ++s)
             if (!parts.plane(s, crease.sheets[s])) return {};
     }
     combine(parts, crease);
     crease.misfit = misfit_of(points, crease);
-    // What few points bend is of no use beyond them.
+    // Quadrics that few points determine are useless beyond them; they are used only if planes fit badly.
     if (crease.misfit > kFlat * radius) {
-        Crease bent = crease;  // All its sheets are fitted anew, because combine() may have swapped them.
+        Crease bent = crease;  // All its sheets are fitted again because combine() may have swapped them.
         for (std::size_t n = 0; n < points.size(); ++n) parts.weights[n] = points[n].weight;
         for (int turn = 0; turn < kRobustTurns; ++turn) {
             for (std::size_t s = 0; s < count; ++s) {
@@ -230,7 +231,7 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
             }
             parts.assign(bent.sheets, count,
                          [](const Sheet& sheet, const Vec3& place) { return sheet.distance(place); });
-            parts.mistrust(bent.sheets);
+            parts.reweight(bent.sheets);
         }
         combine(parts, bent);
         bent.misfit = misfit_of(points, bent);

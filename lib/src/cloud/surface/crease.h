@@ -1,5 +1,5 @@
 #pragma once
-// Where two or three sheets meet: edges, grooves and corners.
+// Edges, grooves and corners, where two or three sheets meet.
 #include <optional>
 #include <vector>
 
@@ -12,13 +12,13 @@ struct CreasePoint {
     double weight;
 };
 
-/// The sheets that meet among the points, if these explain them better than one quadric, which has about as many
-/// parameters as two planes have: points are divided by their normals, then each goes to the sheet that it is closest
-/// to, in turns with the fit of each sheet (k-planes: Bradley and Mangasarian, J. Global Optimization 16, 2000). As
-/// sharp features of Ohtake and others, Multi-level partition of unity implicits, ACM Trans. Graphics 22(3), 2003, they
-/// are combined by maximum where the solid is convex and by minimum where it is concave.
+/// The sheets that meet among the points, if they fit the points better than one quadric, which has about as many
+/// parameters as two planes. Points are divided by their normals; then assignment of each point to its closest sheet
+/// alternates with the fit of the sheets (k-planes: Bradley and Mangasarian, J. Global Optimization 16, 2000). Like the
+/// sharp features of Ohtake et al., Multi-level partition of unity implicits, ACM Trans. Graphics 22(3), 2003, sheets
+/// are combined by the maximum where the solid is convex and by the minimum where it is concave.
 /// @param origin  of the neighbourhood
-/// @param radius  of it, > 0
+/// @param radius  of the neighbourhood, > 0
 [[nodiscard]] std::optional<Crease> fit_crease(const std::vector<CreasePoint>& points, const Vec3& origin,
                                                double radius);
 

@@ -23,7 +23,7 @@ COVOL_INLINE Double4 dot(const Double4 (&a)[3], const Double4 (&b)[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// By a mask of lanes: halves of lanes, those of the mask first.
+/// For each mask of lanes: indices of the half lanes in the mask, in order, to move them to the front.
 struct LanesFirst {
     alignas(32) std::int32_t halves[16][8] = {};
     std::size_t count[16] = {};
@@ -67,14 +67,14 @@ void FitPoints::clear(std::size_t room) {
 
 void FitPoints::fill_up() {
     for (std::size_t n = size; n % kFitLanes != 0; ++n) {
-        u[n] = 1;  // where the weight is 0
+        u[n] = 1;  // gives weight 0
         v[n] = t[n] = count[n] = 0;
     }
 }
 
 COVOL_CLONES void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame,
                               FitPoints& near) {
-    // In variables of its own, for what is stored might be any of it.
+    // Copied to local variables because the compiler must assume that stores may alias the originals.
     const double scale = 1 / frame.radius;
     Double4 axes[3][3], origin[3];
     const double *place[3], *normals[3], *counts = cloud.count.data();
@@ -160,7 +160,7 @@ COVOL_CLONES FitResidual fit_residual(const FitPoints& points, const double x[6]
         const Double4 u = load(&points.u[n]), v = load(&points.v[n]), t = load(&points.t[n]);
         const Double4 inside = 1 - u * u - v * v;
         const Double4 off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
-        // Points that fill up have u = 1 and no weight.
+        // Padding points have u = 1 and thus no weight.
         const Double4 near = inside * inside, w = load(&points.count[n]) * near;
         squares += w * off * off;
         weight += w;

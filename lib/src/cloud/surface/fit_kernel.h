@@ -7,36 +7,36 @@ namespace covol::cloud {
 
 inline constexpr std::size_t kFitLanes = 4;
 
-/// A cloud, coordinate by coordinate.
+/// A cloud in arrays of coordinates.
 class FitCloud {
 public:
     void reserve(std::size_t count);
     void add(const double (&place)[3], const double (&normal)[3], double count);
-    /// After the last one: vectors of kFitLanes may be read from any point on.
+    /// Call after the last add(): vectors of kFitLanes may then be read from any point on.
     void finish();
 
     std::vector<double> place[3], normal[3], count;
 };
 
-/// Where a quadric is fitted.
+/// The neighbourhood to which a quadric is fitted.
 struct FitFrame {
     double origin[3], axes[3][3];  ///< u, v and the normal
     double radius;
 };
 
-/// Points in a frame in which the neighbourhood is the unit ball, filled up with points of no count to a multiple of
+/// Points in a frame in which the neighbourhood is the unit ball, padded with points of count 0 to a multiple of
 /// kFitLanes.
 struct FitPoints {
     std::vector<double> u, v, t, count;
-    std::size_t size = 0;  ///< without those that fill up, and without what the arrays hold beyond
+    std::size_t size = 0;  ///< without the padding; the arrays may be longer
 
-    /// Room for so many. What was there is lost.
+    /// Reserves memory for `room` points; all points are lost.
     void clear(std::size_t room);
     void fill_up();
 };
 
-/// Appends the cloud's points begin..end-1 that lie in the ball and whose normals are on the frame's side.
-/// @pre room for all of them
+/// Appends those of the cloud's points begin..end-1 that lie in the ball and whose normals are on the frame's side.
+/// @pre clear() has reserved memory for all of them
 void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame, FitPoints& near);
 
 /// Weight of a point: count * near, near = (1 - u^2 - v^2 - t^2)^2.
@@ -48,12 +48,12 @@ struct FitSums {
 };
 [[nodiscard]] FitSums fit_sums(const FitPoints& points);
 
-/// Of t - height, height = x0 + x1 u + x2 v + x3 uu + x4 uv + x5 vv; near is (1 - u^2 - v^2)^2 here, without t: else
-/// noise would seem smaller where the ball is hardly larger than it.
+/// Residual of t - height, height = x0 + x1 u + x2 v + x3 uu + x4 uv + x5 vv. Here near is (1 - u^2 - v^2)^2 without t:
+/// otherwise noise would be underestimated in balls that are hardly larger than it.
 struct FitResidual {
     double squares = 0;  ///< sum of count * near * (t - height)^2
-    double weight = 0;   ///< of count * near
-    double near = 0;     ///< of near
+    double weight = 0;   ///< sum of count * near
+    double near = 0;     ///< sum of near
 };
 [[nodiscard]] FitResidual fit_residual(const FitPoints& points, const double x[6]);
 

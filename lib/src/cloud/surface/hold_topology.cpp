@@ -18,9 +18,9 @@ namespace {
 
 using openvdb::Coord;
 
-constexpr std::size_t kCheckEvery = 10'000;  // voxels, between two looks at whether the run was cancelled
+constexpr std::size_t kCheckEvery = 10'000;  // voxels between two checks for cancellation
 
-/// The 26 neighbours of a voxel, one bit each, and which of them are neighbours of each other.
+/// The 26 neighbours of a voxel, one bit each, with their adjacency.
 struct Neighbourhood {
     std::array<Coord, 26> offset;
     std::array<std::uint32_t, 26> beside6{}, beside18{};
@@ -47,7 +47,7 @@ struct Neighbourhood {
     }
 
 private:
-    /// The number of axes along which two voxels differ; 9 where they are no neighbours.
+    /// The number of axes along which two voxels differ; 9 if they are not neighbours.
     static int steps(const Coord& a, const Coord& b) {
         int axes = 0;
         for (int n = 0; n < 3; ++n) {
@@ -61,15 +61,15 @@ private:
 
 const Neighbourhood kAround;
 
-/// The voxels beside any of the front.
+/// The voxels adjacent to any of the front.
 std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& neighbours) {
     std::uint32_t all = 0;
     for (; front != 0; front &= front - 1) all |= neighbours[std::size_t(__builtin_ctz(front))];
     return all;
 }
 
-/// Whether the voxels of the set that are next to the centre hang together by paths of at most `steps` from there, and
-/// there are any.
+/// Whether the voxels of the set that are adjacent to the centre are connected by paths of at most `steps`, and there
+/// are any.
 bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::uint32_t, 26>& neighbours, int steps) {
     const std::uint32_t touching = set & next;
     if (touching == 0) return false;
@@ -82,7 +82,7 @@ bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::u
     return (touching & ~reached) == 0;
 }
 
-/// Whether a voxel may change sides.
+/// Whether a voxel can change sides without a change of topology.
 bool is_simple(std::uint32_t inside) {
     return is_one_piece(inside, kAround.faces, kAround.beside6, 3) &&
            is_one_piece(~inside & 0x3FFFFFFU, kAround.faces_and_edges, kAround.beside18, 2);
@@ -94,14 +94,14 @@ struct Waiting {
     bool operator<(const Waiting& other) const { return depth != other.depth ? depth < other.depth : other.at < at; }
 };
 
-/// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra):
-/// its values end with its band.
+/// Depth of voxels below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra),
+/// because target's own values end with its band.
 FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target, const RunContext& run) {
     FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
     auto depth_at = depth->getAccessor();
     auto target_at = target.getConstAccessor();
     const auto h = float(target.voxelSize()[0]);
-    std::priority_queue<Waiting> queue;  // the least depth last, so of its negative
+    std::priority_queue<Waiting> queue;  // of the negated depth, since the queue returns the maximum first
     for (const Coord& at : voxels) {
         const float value = target_at.getValue(at);
         bool is_beside = false;
@@ -131,10 +131,10 @@ FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& targe
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run, std::size_t maximum) {
     auto rough_at = rough.getConstAccessor();
     auto target_at = target.getAccessor();
-    // Where a surface is cut off, as at a domain's end, what lies beyond has no side.
+    // Beyond a cut through a surface, as at a domain's end, voxels have no side.
     openvdb::CoordBBox box = target.evalActiveVoxelBoundingBox();
     box.expand(rough.evalActiveVoxelBoundingBox());
-    openvdb::MaskGrid kept;  // voxels that have rough's sign still, and not target's
+    openvdb::MaskGrid kept;  // voxels that still have rough's sign instead of target's
     auto kept_at = kept.getAccessor();
     std::vector<Coord> found;
     const auto compare = [&](const Coord& at) {
@@ -148,13 +148,13 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
         if (value.isVoxelValue()) compare(value.getCoord());
     for (auto value = rough.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
-    // What lies between the two surfaces, far from both, is active in neither.
+    // Voxels between the two surfaces but far from both are active in neither.
     for (std::size_t n = 0; n < found.size(); ++n) {
         if (found.size() > maximum) return 0;
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
     }
-    // The deepest first: what is left in the end, to keep two fronts apart, are the narrowest places.
+    // The deepest voxels first: those that finally remain, to separate two fronts, are then at the narrowest places.
     const FloatGrid::Ptr depth = depth_of(found, target, run);
     auto depth_at = depth->getConstAccessor();
     std::priority_queue<Waiting> queue;

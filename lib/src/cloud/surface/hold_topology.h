@@ -7,13 +7,14 @@
 
 namespace covol::cloud {
 
-/// Gives `target` the topology of `rough`, a level set of the same lattice: starting from rough's sign each voxel takes
-/// target's while that leaves all pieces, cavities and handles as they are (simple points: Bertrand and Malandain, A
-/// new characterization of three-dimensional simple points, Pattern Recognition Letters 15, 1994; Han, Xu and Prince, A
+/// Gives `target` the topology of `rough`, a level set on the same lattice: starting from rough's sign, each voxel
+/// takes target's if that preserves all pieces, cavities and handles (simple points: Bertrand and Malandain, A new
+/// characterization of three-dimensional simple points, Pattern Recognition Letters 15, 1994; Han, Xu and Prince, A
 /// topology preserving level set method, IEEE PAMI 25, 2003). Inside is 6-connected, outside 18-connected, as
-/// extract_mesh() joins voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is
-/// narrowest. Both are active near their surface and signed everywhere.
-/// @param most  voxels whose signs may differ: time goes by them, and where there are more nothing is changed
+/// extract_mesh() joins voxels. The voxels deepest in target change first, so that cuts and fillings are at the
+/// narrowest places. Both level sets are active near their surface and signed everywhere.
+/// @param maximum  number of voxels whose signs may differ, which limits the time; if there are more, nothing is
+/// changed
 /// @return the number of voxels that keep rough's sign; their value is small
 /// @throws Error Cancelled
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run,

@@ -27,17 +27,18 @@ struct Gap {
 
 struct Piece {
     std::vector<Vec3> surface;
-    double volume = 0;  ///< a cavity's is negative
-    Gap gap;            ///< to what it may be joined to
-    /// @param most  length of a gap
-    void meet(const detail::KdTree& other, double maximum) {
+    double volume = 0;  ///< negative for a cavity
+    Gap gap;            ///< to the piece to which it may be joined
+    /// Finds the shortest gap to `other`.
+    /// @param maximum  length of a gap
+    void find_gap(const detail::KdTree& other, double maximum) {
         for (const Vec3& v : surface)
             if (const Vec3* near = other.nearest_within(v, std::min(gap.length, maximum)))
                 gap = {std::sqrt(detail::squared_distance(*near, v)), v, *near};
     }
 };
 
-/// The largest first; without cavities.
+/// The largest piece first; without cavities.
 std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     detail::DisjointSets joined(mesh.vertices.size());
     for (const auto& t : mesh.triangles)
@@ -56,13 +57,13 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     return solid;
 }
 
-/// Of pieces, the largest first.
+/// The pieces are sorted by size, the largest first.
 std::vector<Piece>::iterator first_small_of(std::vector<Piece>& pieces) {
     return std::find_if(pieces.begin(), pieces.end(),
                         [&](const Piece& p) { return p.volume < kJoin.small * pieces.front().volume; });
 }
 
-/// Squared distance from a segment.
+/// Squared distance from the gap's segment.
 double squared_from(const Gap& gap, const Vec3& place) {
     const Vec3 along = minus(gap.to, gap.from), to = minus(place, gap.from);
     const double squared = dot(along, along), t = squared > 0 ? std::clamp(dot(to, along) / squared, 0.0, 1.0) : 0;
@@ -79,7 +80,7 @@ WorldBox box_around(const Gap& gap, double reach) {
     return box;
 }
 
-/// A rod of the solid from end to end.
+/// Adds a rod with round ends along the gap to the solid.
 void fill(FloatGrid& level_set, const Gap& gap, double radius) {
     const Domain domain = domain_of(level_set);
     const WorldBox box = box_around(gap, radius + domain.voxel_size);
@@ -112,12 +113,12 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
     std::vector<Piece> small(std::make_move_iterator(first_small), std::make_move_iterator(pieces.end()));
     const detail::KdTree whole(std::move(large));
     const double max_gap = kJoin.max_gap * apart;
-    for (Piece& piece : small) piece.meet(whole, max_gap);
+    for (Piece& piece : small) piece.find_gap(whole, max_gap);
 
     const double voxel = domain_of(level_set).voxel_size;
     const PointCells cells(points, apart);
     std::vector<PointCells::Range> ranges;
-    const auto goes_on = [&](const Gap& gap) {
+    const auto has_points_along = [&](const Gap& gap) {
         const int steps = 1 + int(2 * gap.length / voxel);
         for (int n = 0; n <= steps; ++n)
             if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))),
@@ -132,8 +133,8 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
                                            [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
         const Gap gap = next->gap;
         if (!(gap.length < max_gap)) break;
-        if (!goes_on(gap)) {
-            next->gap = {};  // it may be joined to one that is joined later
+        if (!has_points_along(gap)) {
+            next->gap = {};  // it may still be joined to a piece that is joined later
             continue;
         }
         std::vector<double> around;
@@ -146,7 +147,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         ++joined;
         const detail::KdTree own(std::move(next->surface));
         small.erase(next);
-        for (Piece& piece : small) piece.meet(own, max_gap);
+        for (Piece& piece : small) piece.find_gap(own, max_gap);
     }
     return joined;
 }

@@ -7,17 +7,16 @@
 
 namespace covol::cloud {
 
-/// Joins small pieces of a solid to what is nearest to them, where points lie all along the gap: parts as thin as the
-/// points are apart tear. What is less than a tenth of the largest piece is small; others stay for themselves, however
-/// close.
-/// @param level_set  active near its surface and signed everywhere; values where something was joined are of the right
-/// sign,
-///                   but no distances
-/// @param apart  what points of one surface are apart, and off it: their spacing or noise
+/// Joins small pieces of a solid to the nearest other piece if there are points all along the gap: parts as thin as the
+/// spacing of the points tear. Pieces of less than a tenth of the volume of the largest are small; others remain
+/// separate, however close.
+/// @param level_set  active near its surface and signed everywhere; the values of joined parts have the right sign but
+/// are no distances
+/// @param apart  spacing of the points or their noise, if that is larger
 /// @return how many were joined
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run);
 
-/// How many pieces of a solid are not small.
+/// The number of pieces of a solid that are not small.
 [[nodiscard]] std::size_t count_large_pieces(const FloatGrid& level_set, const RunContext& run);
 
 }  // namespace covol::cloud

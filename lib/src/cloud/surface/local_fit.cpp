@@ -25,7 +25,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 struct Fit {
     std::array<double, 6> c{};
     double noise = 0;      // standard deviation of the points
-    double misfit = 0;     // of their means, in which noise is averaged and what the quadric lacks is not
+    double misfit = 0;     // of means of points, which averages noise but not the quadric's error
     double deviation = 0;  // of c0
     bool good = false;
 };
@@ -46,8 +46,8 @@ struct Level {
     }
     double radius;
     PointCells cells;
-    FitCloud sorted;                 // in the cells' order
-    std::vector<float> squares_off;  // the same, or empty
+    FitCloud sorted;                 // in the order of the cells
+    std::vector<float> squares_off;  // in the same order, or empty
 };
 
 struct Scratch {
@@ -56,7 +56,7 @@ struct Scratch {
     std::vector<CreasePoint> crease;
 };
 
-/// Those of the ranges' points within the radius whose normals are on this side.
+/// Keeps the points of the ranges that lie within the radius and whose normals are on this side.
 void keep_near(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
     std::size_t all = 0;
     for (const PointCells::Range& range : scratch.ranges) all += range.end - range.begin;
@@ -83,7 +83,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
     if (std::hypot(m(0, 1), m(0, 2)) > kFit.max_off_centre * sum) return result;
-    // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
+    // For narrow bodies, the quadric is undetermined across the points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
@@ -93,7 +93,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
     const Vector6 first = solver.solve(Vector6::Unit(0));
-    const FitResidual residual = fit_residual(near, x.data());  // a mean of c points is off by 1 / c of their variance
+    const FitResidual residual = fit_residual(near, x.data());  // the variance of a mean of c points is 1 / c of theirs
     const double effective = sums.near * sums.near / sums.near_squares;
     if (effective < 7) return result;
     result.noise = r * std::sqrt(residual.squares / residual.near * effective / (effective - 6));
@@ -104,7 +104,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     return result;
 }
 
-/// Whether most points beside this one on its own sheet have a normal like it; -1: too few to tell.
+/// Whether most points beside this one on its own sheet have a similar normal; -1: too few points.
 int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
                    const std::vector<PointCells::Range>& ranges) {
     const double r2 = level.radius * level.radius, height = kFit.sheet_height * level.radius;
@@ -118,7 +118,7 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
     return same + opposite < kFit.min_majority ? -1 : same >= opposite;
 }
 
-/// Distance of the neighbourhood's points on this side of a sheet to the indicator's surface, root mean square.
+/// Root mean square distance of the neighbourhood's points on this side of a sheet to the indicator's surface.
 double off_indicator(const Level& level, const Vec3& origin, const Vec3& normal,
                      const std::vector<PointCells::Range>& ranges) {
     if (level.squares_off.empty()) return std::numeric_limits<double>::infinity();
@@ -159,7 +159,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             break;
         }
         if (seen.empty()) {
-            // Over the plane that it tells itself.
+            // Fits again over the tangent plane of the first fit.
             Vec3 tilted;
             for (int a = 0; a < 3; ++a)
                 tilted[a] = best.axes[2][a] - now.c[1] * best.axes[0][a] - now.c[2] * best.axes[1][a];
@@ -181,19 +181,19 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
-        if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
+        if (seen.empty()) best.noise = now.noise;  // wider neighbourhoods also contain the surface's own shape
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
     }
-    // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half
+    // Noise along a curved surface brings in points from where it is lower or higher: their mean height is off by half
     // the variance times the Laplacian.
     const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), maximum = kFit.max_unbent * best.noise;
     best.c[0] -= std::clamp(lower, -maximum, maximum);
     return best;
 }
 
-/// What lies around a node where sheets meet. Points on the other side of a thin body point away from it.
+/// The sheets that meet around a node, if any. Points on the other side of a thin body are excluded by their normals.
 std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec3& normal, Scratch& scratch) {
     level.cells.find(place, level.radius, scratch.ranges);
     std::vector<CreasePoint>& points = scratch.crease;
@@ -209,13 +209,13 @@ std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec
     return fit_crease(points, place, level.radius);
 }
 
-/// A crease where the quadric could not grow, if there is one.
+/// Replaces a quadric that could not grow by a crease, if there is one.
 void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& scratch) {
     if (q.radius > level.radius) return;
     const std::optional<Crease> crease = crease_at(level, q.origin, normal, scratch);
     if (!crease) return;
     const std::array<Vec3, 3> axes = frame_of(crease->mean_normal());
-    // Up or down to where they are.
+    // Moves along the normal to the sheets.
     double height = 0;
     for (int step = 0; step < 4; ++step) {
         const Vec3 at = plus(q.origin, height, axes[2]);
@@ -232,8 +232,8 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
     q.crease = std::make_shared<const Crease>(*crease);
 }
 
-/// So wide that noise leaves the misfit of sheets below its limit, but not so wide that it holds other creases; 0:
-/// noise is too large for that.
+/// A radius so large that noise keeps the misfit of sheets below its limit, but too small for other creases; 0 if the
+/// noise is too large for both.
 double crease_radius_for(double spacing, double noise) {
     const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
     if (noise > kCrease.max_misfit * widest) return 0;
@@ -250,13 +250,13 @@ public:
         double radius = kFit.first_spacings * spacing;
         for (int n = 0; n < kFit.levels; ++n, radius *= kFit.growth) {
             run.check();
-            // Averages of averages cost little and miss nothing that a radius this large could see.
+            // Averages of averages are fast to compute and lose nothing at the scale of this radius.
             last = thinned(n == 0 ? cloud : last, kFit.thinned_fraction * radius);
             levels_.emplace_back(last, radius);
         }
     }
 
-    /// Of neighbourhoods in which creases are looked for; 0: in none.
+    /// Radius of the neighbourhoods in which creases are sought; 0: none.
     [[nodiscard]] double crease_radius() const { return every_ ? every_->radius : 0; }
 
     [[nodiscard]] std::vector<Quadric> fit(const OrientedCloud& nodes, bool with_creases, const RunContext& run) const {
@@ -276,10 +276,10 @@ public:
 
 private:
     std::vector<Level> levels_;
-    std::optional<Level> every_;  // without thinning, which takes means across creases
+    std::optional<Level> every_;  // not thinned, because that averages across creases
 };
 
-/// The nodes that no quadric is so close to that it tells of their place, too.
+/// The nodes that are not yet represented by a nearby quadric.
 OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quadric>& quadrics) {
     std::vector<Vec3> feet;
     double reach = 0;
@@ -313,8 +313,8 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
     return left;
 }
 
-/// Without those that a few points far from others made where others tell more: such a quadric reaches as far as its
-/// neighbourhood, and may be of another side.
+/// Removes quadrics from a few isolated points where others have more data: such a quadric reaches as far as its
+/// neighbourhood and may belong to another side.
 std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
     if (quadrics.empty()) return {};
     std::vector<Vec3> feet;
@@ -356,7 +356,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
         double count = 0, squares_off = 0;
     };
     const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
-        std::array<Mean, 6> means;  // by the direction that is closest to the normal's
+        std::array<Mean, 6> means;  // by the axis direction closest to the normal
         const auto [begin, end] = cells.cell(n);
         for (std::uint32_t at = begin; at < end; ++at) {
             const std::uint32_t point = cells.order()[at];
@@ -373,7 +373,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
             mean.count += c;
             if (is_off_known) mean.squares_off += c * double(cloud.squares_off[point]);
         }
-        // Normals that are close, on either side of the limit between two directions, are one side of a sheet.
+        // Normals at a small angle, on both sides of the limit between two directions, belong to one side of a sheet.
         for (std::size_t m = 0; m < 6; ++m)
             for (std::size_t o = 0; o < m; ++o)
                 if (means[m].count > 0 && means[o].count > 0 && dot(means[m].normal, means[o].normal) > 0) {

@@ -18,16 +18,16 @@ namespace covol {
 namespace cloud {
 namespace {
 
-// In voxels.
-constexpr double kOnSurface = 1;      // from a crease's sheets, of a vertex that lies on them
-constexpr double kBeside = 2;         // from the second sheet, of one beside the crease
-constexpr double kOnCrease = 0.3;     // from all its sheets, of one that is moved onto it
-constexpr double kSame = 0.02;        // of distances to sheets on both of which a vertex lies
-constexpr double kLongestMove = 1.5;  // of marching cubes' vertices
+// Lengths are in voxels.
+constexpr double kOnSurface = 1;      // maximum distance of a vertex on a crease's sheets from them
+constexpr double kBeside = 2;         // maximum distance of a vertex beside the crease from the second sheet
+constexpr double kOnCrease = 0.3;     // maximum distance from all its sheets of a vertex that is moved onto the crease
+constexpr double kSame = 0.02;        // maximum difference of distances for a vertex on both sheets
+constexpr double kLongestMove = 1.5;  // maximum move of a vertex of marching cubes
 
-constexpr double kNeedle = 0.2;       // length of a line's shortest edge that is drawn together
-constexpr double kLineHeight = 0.02;  // height of a triangle that is a line
-constexpr int kMendings = 10;         // until no triangle is folded or flat
+constexpr double kNeedle = 0.2;       // maximum length of a degenerate triangle's shortest edge that is collapsed
+constexpr double kLineHeight = 0.02;  // height of a triangle that counts as degenerate
+constexpr int kMendings = 10;         // maximum number of passes until no triangle is folded or flat
 
 std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {
     std::vector<Vec3> feet;
@@ -36,7 +36,7 @@ std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {
     return feet;
 }
 
-/// The point nearest to a place where these sheets meet, by Newton's method.
+/// The point nearest to a position at which these sheets meet, by Newton's method.
 std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& from, double longest) {
     Vec3 at = from;
     for (int step = 0; step < 5; ++step) {
@@ -49,7 +49,7 @@ std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& f
                 normals.row(count) = Eigen::Vector3d(n[0], n[1], n[2]);
                 off[count++] = crease.sheets[s].distance(at);
             }
-        // The shortest step: along the normals.
+        // The shortest step is along the normals.
         Eigen::Matrix3d gram = normals * normals.transpose();
         for (int a = count; a < 3; ++a) gram(a, a) = 1;
         for (int a = 0; a < count; ++a) gram(a, a) += 1e-9;
@@ -98,14 +98,14 @@ private:
             if (std::has_single_bit(crease->sheets_at(place, kBeside * h_))) return;
             const unsigned on = crease->sheets_at(place, kOnCrease * h_);
             std::optional<Vec3> moved = meeting(*crease, on, place, kLongestMove * h_);
-            // What lies on two sheets need not lie on the solid's border.
+            // A point on two sheets need not be on the solid's border.
             if (!moved || std::abs(crease->distance(*moved)) > kSame * h_)
                 moved = meeting(*crease, 1U << crease->nearest(place), place, kLongestMove * h_);
             if (moved) put(v, *moved);
         });
     }
 
-    /// Where an edge crosses a crease.
+    /// The point at which an edge crosses a crease.
     std::optional<Vec3> division(std::uint32_t a, std::uint32_t b) const {
         const Vec3 from = mesh_.place(a), to = mesh_.place(b), middle = times(0.5, plus(from, to));
         const Crease* crease = creases_.nearest(middle);
@@ -149,7 +149,7 @@ private:
                 divided += found != divided_.end();
             }
             if (divided == 0) continue;
-            // Turned so that the first edge is divided, and of two the last is, too: they share the first corner.
+            // Rotate such that the first edge is divided, and with two, also the last: they share the first corner.
             while (on[0] == kNone || (divided == 2 && on[2] == kNone)) {
                 std::rotate(t.begin(), t.begin() + 1, t.end());
                 std::rotate(on.begin(), on.begin() + 1, on.end());
@@ -171,7 +171,7 @@ private:
 
     [[nodiscard]] bool is_near(std::uint32_t vertex) const { return vertex >= near_.size() || near_[vertex] != 0; }
 
-    /// Three sheets of which no triangle's corners have one in common meet within it.
+    /// If a triangle's corners have no sheet in common, three sheets meet within it.
     void insert_corners() {
         std::vector<Vec3> corners;
         const std::size_t count = mesh_.triangles.size();
@@ -196,9 +196,9 @@ private:
         }
     }
 
-    /// Vertices on a crease may have passed each other, and those of a triangle may be three: the edge across such a
-    /// line is flipped, or its shortest edge is drawn together, and vertices of triangles that face the wrong way move
-    /// to the middle of their neighbours on the crease.
+    /// Vertices on a crease may have passed each other, and all three vertices of a triangle may lie on it. The longest
+    /// edge of such a degenerate triangle is flipped or its shortest edge collapsed, and vertices of triangles that
+    /// face the wrong way move to the mean of their neighbours on the crease.
     void mend() {
         meshing::CornerTable table(mesh_.triangles, mesh_.vertices.size());
         for (std::uint32_t v = 0; v < table.vertices(); ++v)
@@ -221,7 +221,8 @@ private:
         meshing::remove_gone(mesh_.triangles, mesh_.vertices);
     }
 
-    /// Draws what is closer to a corner than marching cubes tell into it: edges between its creases would cut it off.
+    /// Collapses vertices that are closer to a corner than marching cubes resolve: edges between its creases would cut
+    /// it off.
     void clear_around(meshing::CornerTable& table, std::uint32_t vertex) {
         for (bool any = true; any;) {
             std::uint32_t close = meshing::CornerTable::kNone;
@@ -242,7 +243,7 @@ private:
             std::uint32_t corner = 3 * triangle + shape.at_shortest;
             const std::uint32_t across = table.opposite(corner), kept = table.vertex(table.next(corner)),
                                 gone = table.vertex(table.previous(corner));
-            // What lies on more sheets stays.
+            // The vertex on more sheets is kept.
             if (across != meshing::CornerTable::kNone && count_sheets(gone) > count_sheets(kept)) corner = across;
             if (table.can_collapse(corner)) return table.collapse(corner);
         }
@@ -257,9 +258,9 @@ private:
     }
 
     struct Shape {
-        std::uint32_t at_longest, at_shortest;  ///< corners that face these edges
-        double shortest;                        ///< length
-        double height;                          ///< over the longest
+        std::uint32_t at_longest, at_shortest;  ///< corners opposite to these edges
+        double shortest;                        ///< length of the shortest edge
+        double height;                          ///< over the longest edge
     };
 
     [[nodiscard]] Shape shape_of(const std::array<std::uint32_t, 3>& t) const {
@@ -329,8 +330,8 @@ private:
     TriangleMesh& mesh_;
     const Creases& creases_;
     double h_;
-    std::vector<char> near_;                 // a crease, vertex by vertex
-    std::map<Edge, std::uint32_t> divided_;  // by which vertex
+    std::vector<char> near_;                 // for each vertex, whether it is near a crease
+    std::map<Edge, std::uint32_t> divided_;  // the vertex that divides each edge
 };
 
 }  // namespace

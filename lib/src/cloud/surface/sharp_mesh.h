@@ -9,14 +9,14 @@
 
 namespace covol {
 
-/// The creases of a cloud, by place.
+/// The creases of a cloud, by position.
 class Creases {
 public:
     /// @param quadrics  those with a crease
-    /// @param reach     how far from its foot each holds
+    /// @param reach     distance from the foot of each up to which it is valid
     Creases(std::vector<cloud::Quadric> quadrics, std::vector<double> reach);
     [[nodiscard]] std::size_t size() const { return quadrics_.size(); }
-    /// The one with the nearest foot of those that hold there; null if none does.
+    /// The valid crease with the nearest foot; null if there is none.
     [[nodiscard]] const cloud::Crease* nearest(const Vec3& place) const;
 
 private:
@@ -28,12 +28,12 @@ private:
 
 namespace cloud {
 
-/// Gives a mesh of marching cubes, which cuts edges and corners off, those of the creases: vertices beside a crease
-/// move to their sheet, or onto the crease where they nearly lie on it, and triangles across it are divided where its
-/// sheets meet (as by Attene and others, Sharpen and Bend, IEEE TVCG 11(2), 2005, whose planes are guessed from the
-/// mesh). The mesh stays as closed and manifold as it was.
-/// @param h  voxel size of the level set that the mesh was made of
-/// @return how many edges were divided
+/// Restores edges and corners, which marching cubes cut off, from the creases: vertices beside a crease move to their
+/// sheet, or onto the crease if they nearly lie on it, and triangles across it are divided where its sheets meet (as by
+/// Attene et al., Sharpen and Bend, IEEE TVCG 11(2), 2005, who estimate the planes from the mesh). A closed or manifold
+/// mesh remains so.
+/// @param h  voxel size of the level set from which the mesh was extracted
+/// @return number of divided edges
 std::size_t sharpen(TriangleMesh& mesh, const Creases& creases, double h);
 
 }  // namespace cloud

@@ -1,5 +1,5 @@
 #pragma once
-// A piece of a smooth surface, and creases of several.
+// A piece of a smooth surface, and creases between several.
 #include <array>
 #include <cstddef>
 
@@ -7,24 +7,24 @@
 
 namespace covol::cloud {
 
-/// Two directions across a unit normal, and the normal.
+/// Two directions perpendicular to a unit normal, and the normal.
 [[nodiscard]] std::array<Vec3, 3> frame_of(const Vec3& normal);
 
-/// A height over a plane: t = c0 + c1 u + c2 v + c3 u^2 + c4 uv + c5 v^2, world units.
+/// Height over a plane: t = c0 + c1 u + c2 v + c3 u^2 + c4 uv + c5 v^2, world units.
 struct Sheet {
     Vec3 origin;
     std::array<Vec3, 3> axes;  ///< u, v and the normal, outward
     std::array<double, 6> c;
     /// First-order signed distance, > 0 outside.
     [[nodiscard]] double distance(const Vec3& world) const;
-    /// Its gradient where the sheet is, a unit vector.
+    /// Its gradient on the sheet, a unit vector.
     [[nodiscard]] Vec3 normal(const Vec3& world) const;
-    [[nodiscard]] double curvature() const;  ///< the larger one at the foot, absolute, nearly
+    [[nodiscard]] double curvature() const;  ///< larger absolute principal curvature at the foot, approximately
     [[nodiscard]] Vec3 foot() const;         ///< above the origin
 };
 
-/// Two or three sheets that meet. The solid is first & second, first | second; of three first & (second & third) with
-/// either sign at either place.
+/// Two or three sheets that meet. The solid is first & second or first | second; with three sheets it is first &
+/// (second & third) with either operator at either position.
 struct Crease {
     std::array<Sheet, 3> sheets;
     std::size_t count = 0;
@@ -32,10 +32,10 @@ struct Crease {
     bool others_are_convex = true;  ///< between the second and the third
     double misfit = 0;              ///< root mean square distance of the points
     [[nodiscard]] double distance(const Vec3& world) const;
-    /// The sheet that the distance is taken from.
+    /// The sheet that determines the distance.
     [[nodiscard]] std::size_t nearest(const Vec3& world) const;
-    /// The sheets that the distance would be taken from if theirs changed by at most `within`, one bit each: one on a
-    /// face, two on an edge. What only goes on beyond a crease is none of them.
+    /// The sheets that could determine the distance if theirs changed by at most `within`, one bit each: one on a face,
+    /// two on an edge. The continuation of a sheet beyond a crease does not count.
     [[nodiscard]] unsigned sheets_at(const Vec3& world, double within) const;
     [[nodiscard]] Vec3 mean_normal() const;
 };

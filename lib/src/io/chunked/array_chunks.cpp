@@ -9,7 +9,7 @@
 namespace covol::detail {
 namespace {
 
-/// Elements as they are stored, to pixels, `step` elements apart.
+/// Converts stored elements that are `step` elements apart to pixels.
 template <typename Stored, typename Pixel, typename Convert>
 void convert_row(const char* from, std::uint64_t step, std::uint64_t count, bool swap, char* to,
                  const Convert& convert) {
@@ -47,7 +47,8 @@ void convert_row(const ChunkedArray& array, const char* from, std::uint64_t step
     if (array.swap) swap_bytes(to, count, array.stored_bytes());
 }
 
-/// The one chunk of an axis may be longer than the image, by any amount in a damaged file: what is beyond is not held.
+/// If an axis has a single chunk, that chunk may be longer than the image, by any amount in a damaged file. The chunk
+/// size is therefore limited to the image.
 Index3 chunk_size_of(const ChunkedArray& array, const ArrayAxes& axes, const Index3& size) {
     Index3 chunk;
     for (int a = 0; a < 3; ++a)
@@ -114,7 +115,7 @@ bool ArrayChunks::read(const Index3& chunk, void* out) const {
     return stored.has_value();
 }
 
-/// This channel and frame of a chunk, i fastest.
+/// Copies this channel and frame of a chunk, i fastest.
 void ArrayChunks::gather(const char* elements, char* out) const {
     const Index3& n = chunk_size();
     const std::uint64_t stored = array_.stored_bytes(), row = std::uint64_t(n[0]) * pixel_bytes(array_.type);

@@ -12,35 +12,36 @@
 
 namespace covol::detail {
 
-/// How elements that are no pixels are stored.
-enum class StoredAs { Pixels, Half, Int64, UInt64 };  ///< halfs are told as Float, 64-bit integers as Double
+/// How elements are stored whose type is no pixel type.
+enum class StoredAs { Pixels, Half, Int64, UInt64 };  ///< Half is converted to Float, 64-bit integers to Double
 
-/// An array of any number of dimensions, in chunks of one size.
+/// An array with any number of dimensions, in chunks of one size.
 struct ChunkedArray {
     PixelType type = PixelType::UInt8;
     StoredAs stored_as = StoredAs::Pixels;
-    bool swap = false;  ///< the other byte order
+    bool swap = false;  ///< stored in the other byte order
     std::vector<std::uint64_t> shape;
-    std::vector<std::uint64_t> chunk;    ///< elements along each dimension
-    std::vector<std::uint64_t> strides;  ///< elements of a chunk between neighbours along each dimension
-    double fill = 0;                     ///< of chunks that are missing
+    std::vector<std::uint64_t> chunk;  ///< elements along each dimension
+    std::vector<std::uint64_t>
+        strides;      ///< distance in elements between neighbours within a chunk, along each dimension
+    double fill = 0;  ///< value of missing chunks
 
-    [[nodiscard]] std::uint64_t stored_bytes() const;  ///< of an element
-    [[nodiscard]] std::uint64_t chunk_bytes() const;   ///< of a chunk, unpacked
+    [[nodiscard]] std::uint64_t stored_bytes() const;  ///< bytes of an element
+    [[nodiscard]] std::uint64_t chunk_bytes() const;   ///< bytes of an unpacked chunk
 };
 
-/// Which dimensions of an array are the axes x, y, z, and its channels and frames where it has them.
+/// The dimensions of an array that are the axes x, y, z, and those of channels and frames if there are any.
 struct ArrayAxes {
     std::array<std::size_t, 3> space{};
     std::optional<std::size_t> channel, frame;
 };
 
-/// Sets size, channels, frames, order and chunk size of an image with one letter for each dimension: x, y, z, c, t, or
-/// ? for one of a single element. @throws Error InvalidInput, Unsupported, with `path`.
+/// Sets size, channels, frames, order and chunk size of an image. `letters` has one letter for each dimension: x, y, z,
+/// c, t, or ? for a dimension with a single element. @throws Error InvalidInput, Unsupported, with `path`.
 ArrayAxes describe_axes(const std::string& path, const std::string& letters, const ChunkedArray& array,
                         ImageInfo& info);
 
-/// The chunks of one channel and frame. Dimensions that are no axes have one element.
+/// The chunks of one channel and frame. Dimensions other than the axes have one element.
 class ArrayChunks : public ChunkSource {
 public:
     [[nodiscard]] bool read(const Index3& chunk, void* out) const final;
@@ -50,7 +51,8 @@ protected:
     ArrayChunks(const std::string& path, const ChunkedArray& array, const ArrayAxes& axes, const Index3& size,
                 std::uint64_t channel, std::uint64_t frame);
 
-    /// The chunk at this place of the grid: chunk_bytes(), as they are stored; nothing where there is none.
+    /// The stored bytes, chunk_bytes() of them, of the chunk at this position in the grid; empty if the chunk is
+    /// missing.
     /// @throws Error as read().
     [[nodiscard]] virtual std::optional<Bytes> elements(const std::vector<std::uint64_t>& place) const = 0;
 
@@ -59,8 +61,8 @@ private:
 
     const ChunkedArray array_;
     const ArrayAxes axes_;
-    std::vector<std::uint64_t> place_;  ///< of the channel and frame on the grid of chunks
-    std::uint64_t first_ = 0;           ///< their first element in a chunk
+    std::vector<std::uint64_t> place_;  ///< position of the channel and frame in the grid of chunks
+    std::uint64_t first_ = 0;           ///< index of their first element within a chunk
 };
 
 }  // namespace covol::detail

@@ -16,11 +16,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxAxes = 16, kMaxLevels = 64, kMaxChannels = 4096;
 
-/// A group's attributes, with OME's where there are any, and the file they are from.
+/// A group's attributes, including those of OME if there are any, and the file that they come from.
 struct Attributes {
     Json json;
     std::string file;
-    std::string version;  ///< of OME-Zarr from 0.5 on
+    std::string version;  ///< from OME-Zarr 0.5 on
 };
 
 std::optional<Attributes> read_attributes(const std::string& folder) {
@@ -40,7 +40,7 @@ std::optional<Attributes> read_attributes(const std::string& folder) {
     return found;
 }
 
-/// One list of multiscales while it is read.
+/// Reads one entry of the list `multiscales`.
 class MultiscaleReader {
 public:
     MultiscaleReader(OmeImage& image, const Json& multiscale) : image_(image), json_(multiscale) {}
@@ -91,7 +91,7 @@ private:
         return values;
     }
 
-    /// Transformations, one after the other. @returns whether a translation was among them.
+    /// Applies transformations one after the other. @returns whether there was a translation among them.
     bool apply(const Json& transformations, OmeLevel& level) const {
         bool translated = false;
         if (transformations.is_null()) return translated;

@@ -7,42 +7,43 @@ namespace covol::detail {
 
 /// An axis of an OME-Zarr image.
 struct OmeAxis {
-    std::string name, type, unit;  ///< unit as normal_unit() has it
+    std::string name, type, unit;  ///< unit as returned by normal_unit()
 };
 
 /// world = scale * index + translation, along each axis of the array.
 struct OmeLevel {
-    std::string path;  ///< of its array, below the group
+    std::string path;  ///< of its array, relative to the group
     std::vector<double> scale, translation;
     bool has_scale = false;
-    bool has_translation = false;  ///< of its own, not of the whole pyramid's
+    bool has_translation = false;  ///< a translation of this level itself, not of the whole pyramid
 };
 
-/// The first image of a group, as its metadata describes it. https://ngff.openmicroscopy.org/0.5/
+/// The first image of a group, as described by its metadata. https://ngff.openmicroscopy.org/0.5/
 struct OmeImage {
     std::string group;     ///< the folder
-    std::string metadata;  ///< the file that all this is from
-    std::string version;   ///< "0.4"
-    int images = 0;        ///< that the group describes
+    std::string metadata;  ///< the file that the metadata comes from
+    std::string version;   ///< for example "0.4"
+    int images = 0;        ///< number of images in the group
     std::vector<OmeAxis> axes;
     std::vector<OmeLevel> levels;  ///< the finest first
     std::vector<std::string> channels;
 };
 
-/// @returns nothing where the folder has no metadata of an image. @throws Error InvalidInput, Io, Unsupported.
+/// @returns nothing if the folder has no metadata of an image. @throws Error InvalidInput, Io, Unsupported.
 std::optional<OmeImage> read_ome_image(const std::string& folder);
 
-/// The image that a folder is a level of, and which. Its group may be up to three folders above.
+/// The image that a folder is a level of, and the number of that level. The image's group may be up to three folders
+/// above.
 struct OmePlace {
     OmeImage image;
     std::size_t level = 0;
 };
 std::optional<OmePlace> find_ome_image(const std::string& array_folder);
 
-/// What to say of a group that is no image: names of what lies in it.
+/// Contents of a group that is not an image itself, for messages.
 struct OmeGroup {
     std::vector<std::string> images;  ///< folders in it that are images or arrays
-    bool is_series = false;           ///< images 0, 1, ... as bioformats2raw writes them
+    bool is_series = false;           ///< images are named 0, 1, ... as bioformats2raw writes them
     bool is_plate = false;
 };
 OmeGroup read_ome_group(const std::string& folder);

@@ -71,8 +71,8 @@ std::vector<OmeAxis> axes_without_ome(const ZarrArray& array) {
     return axes;
 }
 
-/// Whether a group is one image that lies in a folder of its own, as bioformats2raw writes it.
-/// @throws Error Unsupported where it is none: lists what there is.
+/// The path of the image if a group holds a single image in a subfolder, as written by bioformats2raw. @throws Error
+/// Unsupported otherwise: lists the contents.
 std::string only_image_of(const std::string& path) {
     const OmeGroup group = read_ome_group(path);
     if (group.is_series && group.images.size() == 1) return path + "/" + group.images.front();
@@ -120,7 +120,7 @@ protected:
     }
 
 private:
-    /// Finds the array and, where there is one, the OME-Zarr image that it belongs to.
+    /// Finds the array and the OME-Zarr image that it belongs to, if there is one.
     void find(std::string folder) {
         if (!is_zarr_array(folder)) {
             ome_ = read_ome_image(folder);
@@ -145,7 +145,7 @@ private:
         info_.spacing_known = {false, false, false};
     }
 
-    /// A level's numbers along x, y, z, in the unit of the whole.
+    /// A level's numbers along x, y, z, in the common unit of the image.
     [[nodiscard]] Vec3 along_axes(const std::vector<double>& numbers) const {
         Vec3 along{};
         for (int a = 0; a < 3; ++a) along[a] = numbers[axes_.space[a]] * in_unit_[a];
@@ -193,7 +193,7 @@ private:
         }
     }
 
-    /// "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2". A level that is damaged does not matter until it is read.
+    /// "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2". Errors in a level are ignored until that level is read.
     [[nodiscard]] std::string level_text(const OmeLevel& level) const {
         std::string text = level.path + ": ";
         try {
@@ -207,8 +207,8 @@ private:
         }
     }
 
-    /// A level that is made of means, and of which no translation is stated, lies half a voxel off: the centre of its
-    /// first voxel is that of several voxels of level 0.
+    /// If no translation is stated for a level that was computed by averaging, its position is off by half a voxel: the
+    /// centre of its first voxel is the centre of several voxels of level 0.
     void describe_shift(bool correct, const RunContext& run) {
         if (!ome_ || level_ == 0 || ome_->levels[level_].has_translation) return;
         const Vec3 own = along_axes(ome_->levels[level_].scale), finest = along_axes(ome_->levels[0].scale);
@@ -233,7 +233,7 @@ private:
     std::size_t level_ = 0;
     std::string letters_;
     ArrayAxes axes_;
-    Vec3 in_unit_{1, 1, 1};  ///< lengths along x, y, z in the unit of the whole
+    Vec3 in_unit_{1, 1, 1};  ///< lengths along x, y, z in the common unit
 };
 
 }  // namespace

@@ -17,9 +17,10 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kMaxDimensions = 16;
-constexpr std::uint64_t kMaxIndexed = std::uint64_t(1) << 22;  ///< chunks of a shard: an index of 64 MiB
+constexpr std::uint64_t kMaxIndexed = std::uint64_t(1)
+                                      << 22;  ///< maximum number of chunks in a shard: an index of 64 MiB
 
-/// The metadata of one array while it is read.
+/// Reads the metadata of one array.
 class ArrayReader {
 public:
     ArrayReader(ZarrArray& array, const Json& json) : array_(array), json_(json) {}
@@ -101,7 +102,7 @@ void ArrayReader::set_strides(const std::vector<std::size_t>& slowest_first) {
         array_.strides[slowest_first[n]] = stride;
 }
 
-/// Zarr 3 may state a float's bits.
+/// Zarr 3 may give a floating-point number by its bits.
 double ArrayReader::bits_as_number(const std::string& text) const {
     std::uint64_t bits = 0;
     const std::string digits = text.substr(2);
@@ -142,7 +143,7 @@ void ArrayReader::set_fill(const Json& value) {
         throw wrong("its fill_value " + std::to_string(array_.fill) + " is no " + to_string(array_.type));
 }
 
-/// All of a chunk is unpacked at once, its channels and frames too.
+/// A chunk is unpacked as a whole, including its channels and frames, so its size is limited.
 void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -190,7 +191,7 @@ void ArrayReader::read_2() {
 
 // ---- Zarr 3 -------------------------------------------------------------------------------------------------------
 
-/// A codec, a grid or a way to name files: an object with a name, or the name alone.
+/// The name of a codec, a grid or a chunk key encoding, which is either an object with a name, or the name alone.
 std::string ArrayReader::codec_name(const Json& codec) const {
     return codec.is_string() ? text_of(codec) : text_of(member(codec, "name"));
 }
@@ -234,7 +235,7 @@ void ArrayReader::read_keys() {
     if (name == "default") array_.key_begin = std::string("c") + array_.separator;
 }
 
-/// The dimensions of a chunk as it is stored, slowest first.
+/// The dimensions of a chunk in the order in which they are stored, slowest first.
 std::vector<std::size_t> ArrayReader::transposed(const Json& codec) const {
     const Json& order = member(member(codec, "configuration"), "order");
     const std::size_t count = array_.shape.size();
@@ -278,7 +279,8 @@ void ArrayReader::read_codecs(const Json& codecs) {
             is_transposed = true;
             slowest_first = transposed(codec);
         } else if (name == "sharding_indexed" && array_.shards.counts.empty() && !is_transposed) {
-            // It has codecs of its own, and the last of them for bytes: read_codecs() comes back for these.
+            // A shard has codecs of its own, the last of which is for bytes: read_shards() calls read_codecs() for
+            // these.
             read_shards(member(codec, "configuration"));
             has_bytes = true;
         } else {

@@ -8,32 +8,32 @@
 
 namespace covol::detail {
 
-/// How the chunks of a Zarr 3 array lie in shards: files that hold several, and an index of where.
-/// https://zarr-specs.readthedocs.io/en/latest/v3/codecs/sharding-indexed/
+/// How the chunks of a Zarr 3 array are grouped into shards: files that hold several chunks and an index of their
+/// positions. https://zarr-specs.readthedocs.io/en/latest/v3/codecs/sharding-indexed/
 struct ZarrShards {
-    std::vector<std::uint64_t> counts;  ///< chunks of a shard along each dimension; empty: each chunk is a file
+    std::vector<std::uint64_t> counts;  ///< chunks of a shard along each dimension; empty if each chunk is a file
     bool index_at_end = true;
     bool index_has_checksum = false;
     bool index_is_big_endian = false;
 };
 
-/// What the metadata of an array says.
+/// The metadata of an array.
 /// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html, https://zarr-specs.readthedocs.io/en/latest/v3/core/
 struct ZarrArray : ChunkedArray {
     std::string folder;
-    std::string metadata;  ///< the file that all this is from
+    std::string metadata;  ///< the file that the metadata comes from
     int version = 2;
     std::vector<ZarrCodec> codecs;
     ZarrShards shards;
-    std::string key_begin;  ///< of a chunk's file name: "c/"
+    std::string key_begin;  ///< beginning of a chunk's file name: "c/"
     char separator = '.';
     std::vector<std::string> dimension_names;  ///< empty, or one for each dimension
 
-    /// The file of the chunk or shard at this place of the grid.
+    /// The file of the chunk or shard at this position in the grid.
     [[nodiscard]] std::string file_of(const std::vector<std::uint64_t>& place) const;
 };
 
-/// Whether a folder is an array, and no group.
+/// Whether a folder is an array, not a group.
 bool is_zarr_array(const std::string& folder);
 
 /// @throws Error InvalidInput, Io, Unsupported.

@@ -12,13 +12,13 @@
 namespace covol::detail {
 namespace {
 
-/// Where a chunk lies in its shard.
+/// Position and size of a chunk in its shard.
 struct ShardEntry {
     std::uint64_t begin = 0, bytes = 0;
 };
 using ShardIndex = std::vector<ShardEntry>;
 
-/// The indices of the shards that were read last.
+/// The indices of the most recently read shards.
 class ShardIndices {
 public:
     explicit ShardIndices(const ZarrArray& array) : shards_(array.shards), count_(1) {
@@ -86,7 +86,7 @@ private:
     }
 
     [[nodiscard]] std::optional<Bytes> read_shard(std::vector<std::uint64_t> place, std::string& path) const {
-        std::uint64_t number = 0;  // in the shard, the last dimension fastest
+        std::uint64_t number = 0;  // within the shard, the last dimension fastest
         for (std::size_t d = 0; d < place.size(); ++d) {
             const std::uint64_t count = array_.shards.counts[d];
             number = number * count + place[d] % count;
@@ -115,7 +115,7 @@ private:
                                  std::to_string(bytes) + (array_.codecs.empty() ? "" : " that are packed"));
     }
 
-    /// A chunk that was never written has the fill value. One that cannot be found any more has none.
+    /// A missing file means that the chunk has the fill value, unless the array itself no longer exists.
     void check_missing(const std::string& path) const {
         std::error_code status;
         if (!std::filesystem::exists(array_.metadata, status))

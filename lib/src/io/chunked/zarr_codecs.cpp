@@ -15,16 +15,16 @@
 namespace covol::detail {
 namespace {
 
-/// One packed piece, and what is known of what it holds.
+/// Packed bytes, and what is known of their contents.
 struct Packed {
     const std::string& path;
     const Bytes& bytes;
-    std::uint64_t maximum;  ///< bytes that may come out
+    std::uint64_t maximum;  ///< maximum number of unpacked bytes
 
     [[nodiscard]] Error damaged(const char* codec, const std::string& what) const {
         return read_error(Errc::InvalidInput, path, std::string("damaged ") + codec + " data: " + what);
     }
-    /// @throws Error InvalidInput when a header claims more bytes than there may be.
+    /// @throws Error InvalidInput if a header claims more bytes than the maximum.
     void check_claim(const char* codec, std::uint64_t claimed) const {
         if (claimed > maximum)
             throw damaged(codec, "expected " + std::to_string(maximum) + " bytes when unpacked, its header says " +
@@ -32,8 +32,9 @@ struct Packed {
     }
 };
 
-/// Of one byte, by the codec's format: zlib's 258 bytes take two bits at least, LZ4 adds 255 to a length with a byte,
-/// zstd repeats a byte over a block of 128 KiB with 4. Blosc may hold zstd.
+/// Maximum number of unpacked bytes for one packed byte, by the codec's format: zlib needs at least two bits for 258
+/// bytes, LZ4 adds 255 to a length with one byte, zstd repeats a byte over a block of 128 KiB with 4 bytes. Blosc may
+/// contain zstd.
 std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     switch (codec) {
         case ZarrCodec::Deflate: return 1032;
@@ -45,7 +46,7 @@ std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     return 1;
 }
 
-/// The last codec gives all of the chunk, which it cannot from next to nothing. @throws Error InvalidInput.
+/// The last codec has to produce the whole chunk; a few bytes cannot be enough for that. @throws Error InvalidInput.
 void check_ratio(const Packed& packed, ZarrCodec codec) {
     if (packed.maximum / max_unpacked_of_byte(codec) > packed.bytes.size())
         throw packed.damaged("packed", std::to_string(packed.bytes.size()) + " bytes cannot hold a chunk of " +
@@ -55,7 +56,7 @@ void check_ratio(const Packed& packed, ZarrCodec codec) {
 Bytes unpack_blosc(const Packed& packed) {
     std::size_t claimed = 0;
     const Bytes& in = packed.bytes;
-    // Both look at the header, which they take for whole.
+    // The functions of Blosc read the header without checking that it is complete.
     if (in.size() < BLOSC_MIN_HEADER_LENGTH) throw packed.damaged("blosc", "its header is truncated");
     if (blosc_cbuffer_validate(in.data(), in.size(), &claimed) != 0)
         throw packed.damaged("blosc", "its header does not fit " + std::to_string(in.size()) + " bytes");
@@ -74,7 +75,7 @@ Bytes unpack_zstd(const Packed& packed) {
     const Bytes& in = packed.bytes;
     const unsigned long long claimed = ZSTD_getFrameContentSize(in.data(), in.size());
     if (claimed == ZSTD_CONTENTSIZE_ERROR) throw packed.damaged("zstd", "it has no header");
-    // Several frames may follow each other, and one that was written as a stream does not say its size.
+    // There may be several frames in a row, and a frame that was written as a stream does not state its size.
     if (claimed != ZSTD_CONTENTSIZE_UNKNOWN) packed.check_claim("zstd", claimed);
     Bytes out(packed.maximum);
     const std::size_t got = ZSTD_decompress(out.data(), out.size(), in.data(), in.size());
@@ -91,7 +92,7 @@ Bytes unpack_deflate(const Packed& packed) {
     if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib does not start");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
     Bytes out(packed.maximum);
-    char more = 0;  // one byte that must not come out
+    char more = 0;  // one more byte, to detect excess output
     std::uint64_t read = 0, written = 0;
     for (bool ended = false; !ended;) {
         const std::uint64_t room = out.size() - written, left = in.size() - read;
@@ -108,7 +109,7 @@ Bytes unpack_deflate(const Packed& packed) {
                                  "expected " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
         written += made;
         if (status == Z_STREAM_END) {
-            // gzip files may be several streams behind each other
+            // gzip files may be several streams in a row
             ended = read == in.size();
             if (!ended && inflateReset(&stream) != Z_OK) throw packed.damaged("zlib", "zlib does not go on");
         } else if (status != Z_OK || (taken == 0 && made == 0)) {
@@ -147,7 +148,7 @@ constexpr std::array<std::uint32_t, 256> crc32c_table() {
 }  // namespace
 
 ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
-    // Zarr 3 knows Zarr 2's codecs under numcodecs' name.
+    // Zarr 3 uses Zarr 2's codecs under numcodecs' prefix.
     constexpr const char* kPrefix = "numcodecs.";
     const std::string own = name.starts_with(kPrefix) ? name.substr(std::string_view(kPrefix).size()) : name;
     if (own == "blosc") return ZarrCodec::Blosc;
@@ -161,7 +162,7 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
 }
 
 std::uint64_t max_packed_bytes(std::uint64_t unpacked) {
-    // What cannot be packed grows by a few per cent and headers; more than double is no codec's doing.
+    // Incompressible data grows by a few per cent and by headers; no codec more than doubles it.
     constexpr std::uint64_t kHeaders = 1U << 16;
     return 2 * unpacked + kHeaders;
 }

@@ -8,12 +8,12 @@
 
 #include "covol/error.h"
 
-// Files of a Zarr store. Whatever stands in them may be wrong on purpose.
+// Files of a Zarr store. Their contents are untrusted.
 namespace covol::detail {
 
 using Json = nlohmann::json;
 
-/// Memory that takes none until it is written to.
+/// Bytes that occupy no physical memory until they are written to.
 class Bytes {
 public:
     Bytes() = default;
@@ -29,10 +29,10 @@ private:
     std::uint64_t size_ = 0;
 };
 
-/// A file, open for reading. It is not mapped: it may be cut short while it is read.
+/// A file that is open for reading. It is not mapped, because it may be truncated by others while it is read.
 class StoreFile {
 public:
-    /// @returns nothing when there is no such file. @throws Error Io.
+    /// @returns nothing if there is no such file. @throws Error Io.
     static std::optional<StoreFile> open(const std::string& path);
     StoreFile(StoreFile&& other) noexcept;
     StoreFile& operator=(StoreFile&&) = delete;
@@ -41,7 +41,7 @@ public:
     ~StoreFile();
 
     [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-    /// @throws Error InvalidInput when fewer bytes are there, Io.
+    /// @throws Error InvalidInput if there are fewer bytes, Io.
     [[nodiscard]] Bytes read(std::uint64_t begin, std::uint64_t count) const;
 
 private:
@@ -51,19 +51,20 @@ private:
     std::uint64_t size_;
 };
 
-/// @returns nothing when there is no such file.
-/// @throws Error InvalidInput (no JSON, or one that is larger or deeper than metadata can be), Io.
+/// @returns nothing if there is no such file. @throws Error InvalidInput (not JSON, or larger or more deeply nested
+/// than metadata can be), Io.
 std::optional<Json> read_json(const std::string& path);
 
-/// An object. @throws Error InvalidInput, with `path`, the text's.
+/// Parses an object. @param path  of the text, for messages @throws Error InvalidInput.
 Json parse_json(const std::string& path, std::string_view text);
 
-/// The value of a key; null when there is none, or `object` is none.
+/// The value of a key; null if there is none, or if `object` is not an object.
 const Json& member(const Json& object, const char* key);
-/// A string; empty when it is none.
+/// The text of a string; empty if `value` is not a string.
 std::string text_of(const Json& value);
 
-/// `inside` below `folder`. @throws Error InvalidInput when it leads out of it: from `path`'s metadata.
+/// The path `inside` relative to `folder`. @throws Error InvalidInput, naming the metadata at `path`, if it leads
+/// outside of `folder`.
 std::string path_within(const std::string& path, const std::string& folder, const std::string& inside);
 
 }  // namespace covol::detail

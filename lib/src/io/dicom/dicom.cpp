@@ -1,4 +1,4 @@
-// DICOM: plain pixels are read here, compressed ones through ITK's GDCM reader, in another program (reader.h).
+// DICOM: uncompressed pixels are read here, compressed ones by ITK's GDCM reader in a separate program (reader.h).
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Objects without an image of their own, which lie beside series: structure sets, plans and treatments, registrations
-/// and segmentations, reports, presentations, documents (PS3.4 B.5).
+/// Whether a file is an object without an image, as they occur next to series: structure sets, plans and treatments,
+/// registrations and segmentations, reports, presentations, documents (PS3.4 B.5).
 bool holds_no_image(const std::string& path) {
     const std::string own = dicom_class(path);
     constexpr std::string_view kClasses = "1.2.840.10008.5.1.4.1.1.";
@@ -36,7 +36,7 @@ std::string kind_of_object(const std::string& sop_class) {
     return "SOP class " + sop_class;
 }
 
-/// All usable files of a folder, by series.
+/// All usable files of a folder, grouped by series.
 std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folder, const RunContext& run) {
     std::error_code status;
     std::vector<std::string> paths;
@@ -55,7 +55,7 @@ std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folde
         }
         for (const DicomSlice& slice : std::get<std::vector<DicomSlice>>(file)) series[slice.series].push_back(slice);
     }
-    // A gap between slices is an error; at an end the volume would be shorter without a word.
+    // A gap between slices is an error, but a missing slice at an end would shorten the volume without a warning.
     if (passed_over > 0)
         run.warn(why + "; passed over" +
                  (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " others of the folder" : "") +
@@ -83,7 +83,7 @@ public:
         info_.frames = int(volumes.size());
         info_.type = first.type;
         for (const DicomSlice& slice : slices_)
-            if (slice.type != first.type) info_.type = PixelType::Float;  // a slope of its own for each slice
+            if (slice.type != first.type) info_.type = PixelType::Float;  // each slice has its own slope
         info_.channels = int(std::max(1U, first.components));
         if (first.file_frames > 1)
             info_.fields.emplace_back("NumberOfFrames (0028,0008)", std::to_string(first.file_frames));
@@ -106,7 +106,7 @@ public:
     }
 
 private:
-    /// Frames that are all times of one plane are no volume.
+    /// Rejects frames that are all time points of one plane, because they are not a volume.
     void check_depth(const std::vector<DicomVolume>& volumes) const {
         if (volumes.size() < 2 || volumes.front().slices.size() > 1) return;
         throw read_error(Errc::InvalidInput, path_,
@@ -115,13 +115,13 @@ private:
                              "orientations");
     }
 
-    /// Calls use(slice, pixels) for slices [begin, end) with all pixels of each, as they are decoded: plain ones one by
-    /// one, packed files some at once.
+    /// Calls use(slice, pixels) for slices [begin, end) with all pixels of each, in the order of decoding: uncompressed
+    /// slices one by one, compressed files several at once.
     template <typename Use>
     void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
         constexpr std::uint64_t kMaxAtOnce = std::uint64_t(256) << 20;
         std::optional<DecodedPixels> packed;
-        std::map<std::string, std::size_t> numbers;  // of the packed files that are decoded
+        std::map<std::string, std::size_t> numbers;  // of the compressed files that are decoded
         for (std::size_t n = begin; n < end; ++n) {
             run.check();
             run.report("image", double(n - begin) / double(end - begin));
@@ -176,7 +176,7 @@ private:
                     auto* target = reinterpret_cast<To*>(values.data());
                     const int unused = slice.unused_bits;
                     for (std::uint64_t n = 0; n < pixels; ++n) {
-                        // what lies in the unused bits is no part of the number
+                        // the unused bits may have any content
                         const From value = From(From(std::make_unsigned_t<From>(source[n]) << unused) >> unused);
                         target[n] = static_cast<To>(place.slope * double(value) + place.intercept);
                     }

@@ -14,7 +14,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // 2^32 - 1 means "not said"
+constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // 2^32 - 1 means "undefined"
 
 template <typename T>
 std::string little_endian(T value) {
@@ -143,7 +143,7 @@ std::string dicom_uid(const std::string& text) {
     }
     bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // version 8
     bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // variant
-    // All 128 bits as one decimal number.
+    // Converts the 128 bits to one decimal number.
     std::string decimal = "0";
     for (const unsigned byte : bytes) {
         unsigned carry = byte;

@@ -7,13 +7,15 @@
 
 #include "covol/fwd.h"
 
-// What DICOM files are written from: PS3.5 7.1, 7.5, and PS3.10 7.1.
+// Elements for writing DICOM files: PS3.5 7.1, 7.5, and PS3.10 7.1.
 namespace covol::detail {
 
 /// The elements of a file, or of an item of a sequence, by their tags (group << 16 | element).
 class DicomItem {
 public:
-    /// Replaces what is there. @param vr  two letters @param bytes  as they stand in the file; padded here
+    /// Replaces an element of the same tag.
+    /// @param vr  two letters
+    /// @param bytes  as in the file; padded here
     void put(std::uint32_t tag, const char* vr, std::string bytes);
     /// Numbers of 16 bits.
     void put_shorts(std::uint32_t tag, const std::vector<std::uint16_t>& values);
@@ -24,38 +26,39 @@ public:
     /// Numbers as decimal text.
     void put_decimals(std::uint32_t tag, const std::vector<double>& values);
     void put_items(std::uint32_t tag, const std::vector<DicomItem>& items);
-    /// Those of another one; they replace what is there.
+    /// Adds the elements of another item; they replace those of the same tag.
     void add(const DicomItem& other);
 
-    /// The elements one after another, little-endian. @param with_vr  explicit VR, else implicit
+    /// The elements one after another, little-endian. @param with_vr  explicit VR, otherwise implicit
     [[nodiscard]] std::string encoded(bool with_vr) const;
 
 private:
     struct Element {
         std::string vr, bytes;
-        std::vector<DicomItem> items;  ///< of a sequence
+        std::vector<DicomItem> items;  ///< items of a sequence
     };
     std::map<std::uint32_t, Element> elements_;
 };
 
-/// Whether an explicit VR has a length of 32 bits behind two empty bytes.
+/// Whether this VR, if explicit, has a length of 32 bits after two empty bytes.
 [[nodiscard]] bool is_long_vr(std::string_view vr);
 
-/// One code of a coding scheme, as an item.
+/// A code of a coding scheme, as an item.
 [[nodiscard]] DicomItem dicom_code(const char* value, const char* scheme, const char* meaning);
 
-/// Bytes of Latin-1 (ISO 8859-1), each one letter.
+/// Converts Latin-1 (ISO 8859-1) to UTF-8.
 [[nodiscard]] std::string latin_to_utf8(std::string_view text);
 
-/// A number of at most 16 characters, as VR DS has them.
+/// A number with at most 16 characters, as the VR DS requires.
 [[nodiscard]] std::string decimal_string(double value);
 
-/// A UID of what a text says: the same for the same text. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
+/// A UID that is derived from a text: the same for equal texts. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
 [[nodiscard]] std::string dicom_uid(const std::string& text);
 
-/// Writes a file of one instance, alone in its series; both get UIDs of what the file holds.
-/// @param with_vr  explicit VR, else implicit, in which texts may be longer than 64 KiB
-/// @throws Error Io, Unsupported where elements do not fit into 32 bits.
+/// Writes a file with one instance, which is the only one of its series. The UIDs of both are derived from the
+/// contents.
+/// @param with_vr  explicit VR, otherwise implicit, which allows texts longer than 64 KiB
+/// @throws Error Io, Unsupported if the length of an element does not fit into 32 bits.
 void write_dicom_instance(const std::string& path, DicomItem& file, bool with_vr, const std::string& sop_class);
 
 }  // namespace covol::detail

@@ -32,16 +32,16 @@ constexpr std::uint64_t kLongestValue = 1 << 12;
 constexpr std::uint64_t kPreamble = 128;
 
 constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
-/// Sequences outside functional groups that say where frames lie: detectors (PS3.3 C.8.4.11), regions of ultrasound
-/// (C.8.5.5). The first item of each counts.
-constexpr std::uint32_t kPlacing[] = {0x00186011, 0x00540022};
+/// Sequences outside functional groups that give the positions of frames: detectors (PS3.3 C.8.4.11), regions of
+/// ultrasound (C.8.5.5). Only the first item of each is used.
+constexpr std::uint32_t kPositionSequences[] = {0x00186011, 0x00540022};
 /// The functional groups that are used: echo, contents, position, orientation, those of volumes, time, pixel measures,
 /// rescaling.
 constexpr std::uint32_t kGroups[] = {0x00189114, 0x00209111, 0x00209113, 0x00209116, 0x0020930E,
                                      0x0020930F, 0x00209310, 0x00289110, 0x00289145};
 
-/// What PS3.6 says of the elements of which an image is made. Debian's GDCM ends the program where a file says
-/// otherwise, in a sequence too.
+/// The value representations in PS3.6 of the elements that describe an image. Debian's GDCM terminates the process if a
+/// file has other ones, even in a sequence.
 struct Representation {
     std::uint32_t tag;
     std::string_view vr;
@@ -58,10 +58,10 @@ constexpr Representation kRepresentations[] = {
     {0x00281102, "US"}, {0x00281103, "US"}, {0x00282110, "CS"}, {0x00282112, "DS"}, {0x00282114, "CS"},
     {0x00409224, "FD"}, {0x00409225, "FD"}, {0x3004000C, "DS"}, {0x3004000E, "DS"}};
 
-/// Unknown, "UN", goes for all.
-bool is_represented_well(std::uint32_t tag, std::string_view vr) {
+/// "UN" (unknown) is accepted for all tags.
+bool has_expected_vr(std::uint32_t tag, std::string_view vr) {
     if (vr == "UN") return true;
-    // The palettes' descriptors are signed where the pixels are.
+    // The descriptors of palettes are signed if the pixels are.
     if (vr == "SS" && tag >= 0x00281101 && tag <= 0x00281103) return true;
     const auto* known = std::lower_bound(std::begin(kRepresentations), std::end(kRepresentations), tag,
                                          [](const Representation& r, std::uint32_t t) { return r.tag < t; });
@@ -103,12 +103,12 @@ public:
             if (e.tag == kTransferSyntax) syntax = value.substr(0, value.find_last_not_of(std::string("\0 ", 2)) + 1);
             go_to(at_ + e.length);
         }
-        if (syntax.empty() && !is_marked) syntax = guessed_syntax();
+        if (syntax.empty() && !is_marked) syntax = inferred_syntax();
         constexpr const char* kDeflated = "1.2.840.10008.1.2.1.99";
         if (syntax.rfind("1.2.840.10008.1.2", 0) != 0 || syntax == kDeflated) return false;
         explicit_ = syntax != "1.2.840.10008.1.2";
         big_ = syntax == "1.2.840.10008.1.2.2";
-        // Compressed syntaxes, and only they, have their pixels in pieces.
+        // Pixels are encapsulated in fragments if and only if the syntax is compressed.
         const bool plain = syntax == "1.2.840.10008.1.2" || syntax == "1.2.840.10008.1.2.1" || big_;
         header_.big_endian = big_;
         return at_ < size_ && walk(size_, false, 0) && describes_pixels() && header_.encapsulated != plain &&
@@ -116,8 +116,9 @@ public:
     }
 
 private:
-    /// Without a meta group: the group's number tells the byte order, two letters behind the tag explicit VR.
-    std::string guessed_syntax() {
+    /// The syntax of a file without a meta group: the group number shows the byte order, and two letters after the tag
+    /// mean explicit VR.
+    std::string inferred_syntax() {
         const std::uint64_t begin = at_;
         char first[6] = {};
         const bool is_read = bool(file_.read(first, sizeof first));
@@ -147,7 +148,7 @@ private:
         tag = group << 16 | number;
         return true;
     }
-    /// Tag, value representation and length; the value comes next.
+    /// Reads tag, value representation and length; the value follows.
     bool read_element(Element& e) {
         if (!read_tag(e.tag)) return false;
         if (e.tag >> 16 == 0xFFFE || !explicit_) return read_number(4, e.length);
@@ -159,7 +160,7 @@ private:
         if (is_long_vr(e.vr)) return read_number(2, reserved) && reserved == 0 && read_number(4, e.length);
         return is_one_of(e.vr, kShort) && read_number(2, e.length);
     }
-    /// The numbers of the image pixel module fit each other.
+    /// Whether the numbers of the image pixel module are consistent.
     [[nodiscard]] bool describes_pixels() const {
         const auto number = [&](std::uint32_t tag) { return header_.integer(tag).value_or(kUndefined); };
         const std::uint32_t allocated = number(kBitsAllocated), stored = number(kBitsStored),
@@ -169,7 +170,7 @@ private:
                number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 && number(kRows) > 0 &&
                number(kRows) <= kMaxPixels && number(kColumns) > 0 && number(kColumns) <= kMaxPixels;
     }
-    /// The elements up to `end`, or up to an item's end.
+    /// Reads the elements up to `end`, or up to the end of an item.
     bool walk(std::uint64_t end, bool in_item, int depth) {
         if (depth > kDeepest) return false;
         for (std::uint32_t last = 0; at_ < end;) {
@@ -177,13 +178,13 @@ private:
             if (!read_element(e)) return false;
             if (e.tag == kItemEnd) return in_item && e.length == 0;
             if (e.tag <= last || e.tag >> 16 < 4 || e.tag >> 16 == 0xFFFE) return false;
-            if (explicit_ && !is_represented_well(e.tag, e.vr)) return false;
+            if (explicit_ && !has_expected_vr(e.tag, e.vr)) return false;
             last = e.tag;
             if (!walk_value(e, end, depth)) return false;
         }
         return !in_item && at_ == end;
     }
-    /// Where the elements of an item of sequence `tag` go; nowhere: null.
+    /// Where the elements of an item of sequence `tag` are stored; null if they are not needed.
     DicomValues* values_of_item(std::uint32_t tag, int depth, std::size_t item) {
         const bool outermost = depth == 1;
         if (outermost && tag == kFrameGroups) {
@@ -191,13 +192,13 @@ private:
             return &header_.frames[item];
         }
         if (item > 0) return nullptr;
-        if (outermost) return tag == kSharedGroups || is_one_of(tag, kPlacing) ? &header_.shared : nullptr;
-        return depth == 2 && is_one_of(tag, kGroups) ? into_ : nullptr;
+        if (outermost) return tag == kSharedGroups || is_one_of(tag, kPositionSequences) ? &header_.shared : nullptr;
+        return depth == 2 && is_one_of(tag, kGroups) ? destination_ : nullptr;
     }
     bool walk_value(const Element& e, std::uint64_t end, int depth) {
-        // Without explicit VR only the tag tells a sequence of known length.
+        // With implicit VR, a sequence of known length can only be recognized by its tag.
         const bool is_known = !explicit_ && (e.tag == kSharedGroups || e.tag == kFrameGroups ||
-                                             is_one_of(e.tag, kPlacing) || is_one_of(e.tag, kGroups));
+                                             is_one_of(e.tag, kPositionSequences) || is_one_of(e.tag, kGroups));
         const bool sequence = e.vr == "SQ" || is_known || (e.length == kUndefined && e.tag != kPixelData);
         if (depth == 0 && e.tag == kPixelData && e.length == kUndefined) header_.encapsulated = true;
         if (e.length == kUndefined) return walk_items(e.tag, end, true, sequence, depth + 1);
@@ -205,7 +206,7 @@ private:
         if (depth == 0 && e.tag == kPixelData) {
             header_.pixel_offset = at_;
             header_.pixel_bytes = e.length;
-        } else if (DicomValues* const values = depth == 0 ? &header_.values : into_;
+        } else if (DicomValues* const values = depth == 0 ? &header_.values : destination_;
                    values != nullptr && e.length <= kLongestValue && !sequence) {
             const std::uint64_t begin = at_;
             std::string& value = (*values)[e.tag];
@@ -224,8 +225,8 @@ private:
             if (e.tag == kSequenceEnd) return delimited && e.length == 0;
             if (e.tag != kItem) return false;
             if (e.length != kUndefined && e.length > end - at_) return false;
-            DicomValues* const outer = into_;
-            into_ = of_elements ? values_of_item(tag, depth, item) : nullptr;
+            DicomValues* const outer = destination_;
+            destination_ = of_elements ? values_of_item(tag, depth, item) : nullptr;
             if (e.length == kUndefined) {
                 if (!of_elements || !walk(end, true, depth)) return false;
             } else if (!of_elements) {
@@ -233,7 +234,7 @@ private:
             } else if (!walk(at_ + e.length, false, depth)) {
                 return false;
             }
-            into_ = outer;
+            destination_ = outer;
         }
         return !delimited && at_ == end;
     }
@@ -242,7 +243,7 @@ private:
     std::uint64_t size_, at_ = 0;
     bool explicit_ = true, big_ = false;
     DicomHeader header_;
-    DicomValues* into_ = nullptr;  ///< where the elements of the item go that is walked
+    DicomValues* destination_ = nullptr;  ///< destination for the elements of the current item
 };
 
 }  // namespace
@@ -312,8 +313,8 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 
 std::string dicom_class(const std::string& path) {
     std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status)) return {};  // a pipe waits for whoever writes to it
-    constexpr std::size_t kMeta = 1024;                              // the class stands at its beginning
+    if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a pipe would wait for a writer
+    constexpr std::size_t kMeta = 1024;                              // the class is near the beginning
     std::string begin(kMeta, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), std::streamsize(begin.size()));
@@ -336,7 +337,7 @@ bool is_dicom(const std::string& path) {
     const auto bytes = static_cast<std::size_t>(file.gcount());
     if (bytes == begin.size() && std::memcmp(begin.data() + kPreamble, "DICM", 4) == 0) return true;
     if (bytes < 12) return false;
-    // Group 0002 or 0008 with an element that stands at its beginning, and a length or a representation that fits.
+    // An element of group 0002 or 0008 that occurs at the beginning of a file, with a plausible length or a known VR.
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(begin[at]); };
     const bool big = byte(0) == 0;
     const unsigned group = big ? byte(1) : byte(0), other = big ? byte(0) : byte(1);

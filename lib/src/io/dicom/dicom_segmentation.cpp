@@ -20,10 +20,10 @@ namespace {
 constexpr std::uint32_t kSegmentNumber = 0x0062000B, kSegmentIdentification = 0x0062000A;
 constexpr std::uint32_t kPlanePosition = 0x00209113, kImagePosition = 0x00200032;
 
-/// The voxels of a label in a slice, a bit for each, the first one lowest (PS3.5 8.1.1).
+/// The voxels of a label in a slice, one bit for each, the first voxel in the lowest bit (PS3.5 8.1.1).
 using Bits = std::vector<std::uint8_t>;
 
-/// What the labels hold: of each value its slices.
+/// For each label value, the slices in which it occurs.
 using Planes = std::map<std::int32_t, std::map<std::int32_t, Bits>>;
 
 std::map<std::int32_t, Bits> split(const PixelSource& source, int k) {
@@ -70,7 +70,7 @@ Planes read_planes(const PixelSource& source, const RunContext& run) {
     return planes;
 }
 
-/// Frames have no bytes of their own: each goes on at the bit where the one before it ends.
+/// A stream of frames that are not aligned to bytes: each begins at the bit after the end of the previous one.
 class BitStream {
 public:
     void add(const Bits& bits, std::size_t count) {
@@ -92,7 +92,7 @@ private:
     std::size_t count_ = 0;
 };
 
-/// The labels that have names, and those that have none and were found.
+/// The labels with names, followed by those without names that occur in the image.
 std::vector<NamedLabel> segments_of(const PixelSource& source, const Planes& planes) {
     std::vector<NamedLabel> segments = source.label_names();
     for (const auto& [value, slices] : planes)
@@ -104,7 +104,7 @@ std::vector<NamedLabel> segments_of(const PixelSource& source, const Planes& pla
 
 DicomItem segment_item(const DicomSource& from, std::size_t number, const NamedLabel& label) {
     constexpr std::size_t kLongest = 64;
-    // What the structure is, nobody has said: the most general code.
+    // The kind of structure is unknown, so the most general code is used.
     const DicomItem tissue = dicom_code("85756007", "SCT", "Tissue");
     const auto [l, a, b] = to_cielab(label.color);
     DicomItem item;
@@ -122,7 +122,7 @@ DicomItem shared_groups(const ImageGeometry& g) {
     std::vector<double> cosines;
     for (std::size_t a = 0; a < 2; ++a)
         for (std::size_t r = 0; r < 3; ++r) cosines.push_back(g.direction[r][a]);
-    // Slices of a tilted gantry lean: what counts is how far apart their planes are.
+    // Slices of a tilted gantry are sheared, so the distance between their planes is measured along the normal.
     const Vec3 normal{cosines[1] * cosines[5] - cosines[2] * cosines[4],
                       cosines[2] * cosines[3] - cosines[0] * cosines[5],
                       cosines[0] * cosines[4] - cosines[1] * cosines[3]};
@@ -243,7 +243,7 @@ void write_dicom_segmentation(const std::string& path, const PixelSource& source
     const std::size_t pixels = std::size_t(g.size[0]) * std::size_t(g.size[1]);
     // A file has at least one frame.
     if (planes.empty()) planes[segments.front().value][0].resize((pixels + 7) / 8);
-    std::map<std::int32_t, std::size_t> places;  // of the slices that are there, counted from 1
+    std::map<std::int32_t, std::size_t> places;  // numbers of the slices that occur, from 1
     for (const auto& [value, slices] : planes)
         for (const auto& [k, bits] : slices) places[k] = 0;
     std::size_t place = 0;

@@ -1,5 +1,5 @@
-// What a DICOM file says of each of its planes: by its functional groups where it has them (PS3.3 C.7.6.16), else by
-// its own elements.
+// The properties of each plane of a DICOM file: from its functional groups if it has them (PS3.3 C.7.6.16), otherwise
+// from the elements of the file.
 #include "io/dicom/dicom_slices.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ PixelType rescaled_type(PixelType stored, double slope, double intercept, int st
     return largest < std::ldexp(1.0, 15) ? PixelType::Int16 : PixelType::Int32;
 }
 
-/// Text that sorts as the numbers do.
+/// Text that sorts in the order of the numbers.
 std::string sortable(double value) {
     const auto digits = std::to_string(std::int64_t(std::llround(std::clamp(value, -1e9, 1e9) * 1e6) + (1LL << 60)));
     return std::string(20 - std::min<std::size_t>(20, digits.size()), '0') + digits + " " + number(value);
@@ -53,7 +53,7 @@ Rescaling rescaling_of(const DicomHeader& header, std::size_t frame) {
     return found;
 }
 
-/// Plain pixels, which are read without GDCM; `frames` of them behind each other.
+/// Uncompressed pixels, which are read without GDCM. The file holds `frames` consecutive frames.
 void fill_plain(const DicomHeader& header, std::size_t frames, const std::string& unusable, DicomSlice& slice) {
     const int allocated = int(header.integer(kBitsAllocated).value_or(0)),
               stored = int(header.integer(kBitsStored).value_or(0));
@@ -79,7 +79,7 @@ void fill_plain(const DicomHeader& header, std::size_t frames, const std::string
         throw Error(Errc::Unsupported, slice.path + ": colour planes behind each other");
 }
 
-/// GDCM rescales all frames alike: by `image`.
+/// Compressed pixels. GDCM rescales all frames with the slope and intercept in `image`.
 void fill_packed(const DicomHeader& header, const ItkHeader& image, DicomSlice& slice) {
     slice.components = image.components;
     slice.type = slice.decoded_type = image.type;
@@ -91,8 +91,8 @@ void fill_packed(const DicomHeader& header, const ItkHeader& image, DicomSlice& 
     slice.type = PixelType::Float;
 }
 
-/// Of several frames only each one's own groups count: one position for all of them says nothing of the others, unless
-/// they are times of one plane.
+/// In a file with several frames, only the functional groups of the frame itself are used. A position that is shared by
+/// all frames does not give the position of each, unless the frames are time points of one plane.
 std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bool several) {
     if (several) {
         if (header.frames.size() <= frame) return {};
@@ -105,7 +105,7 @@ std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bo
     return position.size() == 3 ? position : header.doubles(kVolumePosition, frame);
 }
 
-/// The columns' and the rows' directions, and the plane's normal.
+/// The directions of columns and rows, and the normal of the plane.
 void fill_direction(const DicomHeader& header, DicomSlice& slice) {
     std::vector<double> cosines = header.numbers(kOrientation, slice.frame);
     if (cosines.size() != 6) cosines = header.doubles(kVolumeOrientation, slice.frame);
@@ -130,7 +130,7 @@ void fill_step(const DicomHeader& header, DicomSlice& slice) {
         slice.step = {10 * std::abs(x[0]), 10 * std::abs(y[0])};
 }
 
-/// Where the plane lies: by its position; else by the distance between planes, in the file's order.
+/// The position of the plane: as stated, otherwise from the distance between planes, in the order of the file.
 void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     fill_direction(header, slice);
     fill_step(header, slice);
@@ -144,7 +144,7 @@ void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice
     if (first.size() == 3) slice.origin = {first[0], first[1], first[2]};
     double offset = 0;
     if (frames > 1 && offsets.size() == frames) {
-        // Of a dose: relative to the first plane, or places along z.
+        // For doses, the offsets are either relative to the first plane or positions along z.
         offset = offsets[slice.frame] - offsets[0];
         slice.has_origin = true;
         slice.gap_field = "GridFrameOffsetVector (3004,000c)";
@@ -166,7 +166,7 @@ void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice
     }
 }
 
-/// Of several volumes in a series, which one the plane belongs to.
+/// Which of several volumes in a series the plane belongs to.
 void fill_volume(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     const std::size_t n = slice.frame;
     const auto first_of = [](const std::vector<double>& list) { return list.empty() ? "" : sortable(list[0]); };
@@ -207,7 +207,7 @@ std::vector<DicomSlice> slices_of(const std::string& path, const DicomHeader& he
     return slices;
 }
 
-/// @throws Error InvalidInput, with `unusable`.
+/// @throws Error InvalidInput with the message `unusable`.
 std::size_t count_frames(const DicomHeader& header, const std::string& unusable) {
     constexpr double kMax = 65535;
     const std::vector<double> frames = header.numbers(kFrameCount);
@@ -216,7 +216,8 @@ std::size_t count_frames(const DicomHeader& header, const std::string& unusable)
     return static_cast<std::size_t>(frames[0]);
 }
 
-/// GDCM counts as the header does. @throws Error InvalidInput, with `unusable`.
+/// Checks that GDCM finds the same size and number of frames as the header. @throws Error InvalidInput with the message
+/// `unusable`.
 void check_packed(const DicomHeader& header, std::size_t frames, const ItkHeader& image, const std::string& unusable) {
     const std::uint64_t wanted[3] = {header.integer(kColumns).value_or(0), header.integer(kRows).value_or(0), frames};
     for (std::size_t a = 0; a < 3; ++a)
@@ -229,7 +230,7 @@ std::vector<std::variant<std::vector<DicomSlice>, Error>> read_dicom_slices(cons
                                                                             const RunContext& run) {
     std::vector<std::variant<std::vector<DicomSlice>, Error>> files;
     std::vector<Piece> for_gdcm;
-    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // their places among the files
+    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // with their indices among the files
     for (const std::string& path : paths) {
         run.check();
         const std::string unusable = path + ": damaged, truncated, or not a DICOM image";

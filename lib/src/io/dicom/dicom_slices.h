@@ -10,31 +10,32 @@
 
 namespace covol::detail {
 
-/// One plane of a DICOM file: the file's only one, or one of its frames.
+/// One plane of a DICOM file: its only one, or one of its frames.
 struct DicomSlice {
     std::string path, series, description;
-    std::string sop_class, sop_instance;  ///< what others refer to it by
-    std::size_t frame = 0;                ///< in the file
-    std::size_t file_frames = 1;          ///< how many the file has
+    std::string sop_class, sop_instance;  ///< by which other objects refer to it
+    std::size_t frame = 0;                ///< index in the file
+    std::size_t file_frames = 1;          ///< number of frames in the file
     Index3 size{};                        ///< columns, rows, 1
-    std::array<double, 2> step{};         ///< along columns and rows, in mm; 0: the file does not say
+    std::array<double, 2> step{};         ///< along columns and rows, in mm; 0 if the file does not state it
     Vec3 origin{};
-    Matrix3 direction{};            ///< the third column is the plane's normal
-    bool has_origin = false;        ///< the file says where this plane lies
-    double gap = 0;                 ///< to the next plane, for files that say it instead of positions; 0: not known
-    std::string gap_field;          ///< which element said it
-    double number = 0;              ///< InstanceNumber
-    std::string time, echo, stack;  ///< which volume of several this plane belongs to; empty: not said
+    Matrix3 direction{};      ///< the third column is the normal of the plane
+    bool has_origin = false;  ///< the file states the position of this plane
+    double gap = 0;         ///< distance to the next plane, for files that state it instead of positions; 0 if unknown
+    std::string gap_field;  ///< the element that states it
+    double number = 0;      ///< InstanceNumber
+    std::string time, echo, stack;  ///< which of several volumes this plane belongs to; empty if not stated
     unsigned components = 1;
-    PixelType type = PixelType::UInt8;  ///< of the rescaled pixels
+    PixelType type = PixelType::UInt8;  ///< after rescaling
     PixelType decoded_type = PixelType::UInt8;
-    bool plain = false;               ///< read here: the fields below; else by GDCM
-    PixelPlace place;                 ///< slope and intercept are the rescaling
-    int unused_bits = 0;              ///< of each stored number, the upper ones
-    double slope = 1, intercept = 0;  ///< from the decoded pixels to the rescaled ones
+    bool plain = false;               ///< uncompressed, read with the fields below; otherwise read by GDCM
+    PixelPlace place;                 ///< its slope and intercept are those of the rescaling
+    int unused_bits = 0;              ///< number of unused upper bits in each stored value
+    double slope = 1, intercept = 0;  ///< from the decoded to the rescaled pixels
 };
 
-/// The planes of each file, in its order, or why it has none. @throws Error Cancelled, Io (GDCM's module is missing).
+/// For each file, its planes in the file's order, or the reason why it has none.
+/// @throws Error Cancelled, Io (GDCM's module is missing).
 std::vector<std::variant<std::vector<DicomSlice>, Error>> read_dicom_slices(const std::vector<std::string>& paths,
                                                                             const RunContext& run);
 

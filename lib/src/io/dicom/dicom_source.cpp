@@ -26,7 +26,7 @@ constexpr std::uint32_t kCharacterSet = 0x00080005, kStudyUid = 0x0020000D, kFra
 struct Copied {
     std::uint32_t tag;
     const char* vr;
-    bool must_be;  ///< of type 2: there, if need be empty
+    bool must_be;  ///< of type 2: required, but may be empty
 };
 /// The modules Patient, General Study and Patient Study: PS3.3 C.7.1.1, C.7.2.1 and C.7.2.2.
 constexpr Copied kPatientAndStudy[] = {
@@ -46,7 +46,7 @@ bool is_valid_uid(const std::string& uid) {
            std::all_of(uid.begin(), uid.end(), [](char c) { return c == '.' || (c >= '0' && c <= '9'); });
 }
 
-/// What tells this image from others on the same lattice.
+/// A text that distinguishes this image from others on the same lattice.
 std::string identity_of(const std::string& like) {
     std::error_code status;
     if (std::filesystem::exists(like, status)) return digest_of(like);
@@ -54,19 +54,19 @@ std::string identity_of(const std::string& like) {
     return like + " " + date + time;
 }
 
-/// The series that an image is of; none of other formats.
+/// The planes of the series that an image belongs to; empty for other formats.
 std::vector<DicomSlice> planes_of(const std::string& like, std::optional<int> frame, const RunContext& run) {
     std::error_code status;
     const bool is_folder = std::filesystem::is_directory(like, status);
     if (is_folder ? is_zarr(like) : !std::filesystem::is_regular_file(like, status) || !is_dicom(like)) return {};
-    RunContext silent = run;  // what there is to say was said when the image was read
+    RunContext silent = run;  // warnings have already been reported when the image was read
     silent.log = {};
     std::vector<DicomVolume> volumes = dicom_volumes(like, read_dicom_series(like, silent));
     const auto chosen = std::size_t(std::max(0, frame.value_or(0)));
     return std::move(volumes[std::min(chosen, volumes.size() - 1)].slices);
 }
 
-/// The elements that are copied, in UTF-8 where their character set allows it.
+/// Copies the elements, converted to UTF-8 if their character set allows it.
 void copy_patient_and_study(const DicomHeader& header, DicomSource& source) {
     const std::string set = header.text(kCharacterSet);
     std::vector<std::pair<Copied, std::string>> texts;
@@ -86,7 +86,7 @@ void copy_patient_and_study(const DicomHeader& header, DicomSource& source) {
 }  // namespace
 
 DicomTime dicom_time() {
-    // As https://reproducible-builds.org/specs/source-date-epoch has it.
+    // As specified by https://reproducible-builds.org/specs/source-date-epoch
     const char* const given = std::getenv("SOURCE_DATE_EPOCH");
     const std::optional<long long> seconds = given == nullptr ? std::nullopt : to_number<long long>(given);
     const std::time_t now = seconds ? std::time_t(*seconds) : std::time(nullptr);
@@ -102,9 +102,9 @@ DicomTime dicom_time() {
 }
 
 std::optional<SourcePlane> DicomSource::plane_of(const ImageGeometry& geometry, int k) const {
-    constexpr double kNear = 0.5;  // voxels: any other slice is farther
+    constexpr double kNear = 0.5;  // voxels; any other slice is farther away
     for (const DicomSlice& plane : planes) {
-        if (!plane.has_origin && plane.file_frames == 1) continue;  // nobody knows where it lies
+        if (!plane.has_origin && plane.file_frames == 1) continue;  // its position is unknown
         const Vec3 at = geometry.world_to_index(plane.origin);
         const double off = std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2] - k)});
         if (off < kNear && is_valid_uid(plane.sop_class) && is_valid_uid(plane.sop_instance))
@@ -198,7 +198,7 @@ ImageGeometry in_millimetres(const std::string& path, const ImageGeometry& geome
                geometry.direction[1][a] * geometry.direction[1][b] +
                geometry.direction[2][a] * geometry.direction[2][b];
     };
-    constexpr double kMax = 1e-3;  // as is_sheared() of NIfTI
+    constexpr double kMax = 1e-3;  // the same limit as is_sheared() for NIfTI
     if (std::abs(along(0, 1)) > kMax)
         throw Error(Errc::Unsupported,
                     path +

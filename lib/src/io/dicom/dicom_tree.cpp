@@ -94,7 +94,7 @@ private:
         }
         return head;
     }
-    /// Those up to `end`, or up to an item's end.
+    /// Reads elements up to `end`, or up to the delimiter of an item.
     void elements(DicomTree& tree, std::size_t end, bool with_vr, bool up_to_mark, int depth) {
         if (depth > kDeepestItem) damaged("more than 16 sequences in each other");
         while (at_ < end) {
@@ -109,7 +109,7 @@ private:
             } else if (head.length != kNoLength && !is_wanted) {
                 (void)take(head.length);
             } else {
-                // An unknown VR without a length is written implicitly: PS3.5 6.2.2.
+                // A value of unknown VR and undefined length is encoded with implicit VR: PS3.5 6.2.2.
                 std::vector<DicomTree> items = read_items(end, head, with_vr && head.vr != "UN", depth + 1);
                 if (is_wanted) tree.sequences[head.tag] = std::move(items);
             }

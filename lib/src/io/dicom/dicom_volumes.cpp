@@ -1,5 +1,5 @@
-// Puts the planes of a DICOM series together: ITK's own helper neither says what lies in a folder nor finds a missing
-// slice, and takes the frames of a file as evenly spaced in its order.
+// Combines the planes of a DICOM series into a volume. ITK's own helper neither reports the contents of a folder nor
+// detects a missing slice, and assumes that the frames of a file are evenly spaced in the order of the file.
 #include "io/dicom/dicom_volumes.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ bool same_direction(const DicomSlice& a, const DicomSlice& b) {
     return maximum < 1e-3;
 }
 
-/// Along the normal of the first plane, of which all have the direction.
+/// Position along the normal of the first plane, whose direction all planes have.
 double depth(const DicomSlice& slice, const DicomSlice& first) {
     double along = 0;
     for (std::size_t a = 0; a < 3; ++a) along += first.direction[a][2] * slice.origin[a];
@@ -52,7 +52,8 @@ bool has_planes_at_one_place(const Slices& slices) {
     return slices.front().has_origin && std::adjacent_find(sorted.begin(), sorted.end(), same_place) != sorted.end();
 }
 
-/// Volumes apart by what `key` says of their planes. Keys of one plane each, or of all, tell no volumes apart.
+/// Splits volumes by the value of `key` in their planes. A key that differs in every plane, or in none, does not
+/// distinguish volumes.
 std::vector<DicomVolume> split_by(const std::vector<DicomVolume>& volumes, const char* what,
                                   std::string DicomSlice::*key, bool only_at_one_place) {
     std::vector<DicomVolume> parts;
@@ -86,7 +87,8 @@ std::vector<DicomVolume> split_by_direction(const DicomVolume& volume) {
     return parts;
 }
 
-/// Frames of one file at the same places without a word of why: the first ones of each place, the second ones, ...
+/// Splits frames of one file at equal positions for which no reason is stated: the first ones of each position, the
+/// second ones, ...
 std::vector<DicomVolume> split_by_order(const std::vector<DicomVolume>& volumes) {
     std::vector<DicomVolume> parts;
     for (const DicomVolume& volume : volumes) {
@@ -128,7 +130,7 @@ void check_gaps(const std::string& path, const Slices& slices) {
     }
 }
 
-/// Slices of a tilted gantry lie on a line that is oblique to them, but on a line.
+/// Slices of a tilted gantry lie on a straight line, although it is oblique to them.
 void check_straight(const std::string& path, const Slices& slices, const Vec3& step) {
     const DicomSlice& first = slices.front();
     const double pixel = std::min(first.step[0], first.step[1]), maximum = pixel > 0 ? pixel / 2 : 0.5;
@@ -146,7 +148,7 @@ void check_straight(const std::string& path, const Slices& slices, const Vec3& s
     }
 }
 
-/// By the positions: order, origin, spacing along k, and its direction, which a tilted gantry shears.
+/// Sets order, origin, spacing along k and its direction from the positions. A tilted gantry shears that direction.
 void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info) {
     sort_by_depth(slices);
     check_gaps(path, slices);
@@ -162,7 +164,7 @@ void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info
                              "order of " + std::to_string(slices.size()) + " slices, origin, spacing along z");
 }
 
-/// In the file's order, or by InstanceNumber, as far apart as the file says.
+/// Orders frames as in the file and slices by InstanceNumber, with the distance that the file states.
 void place_by_order(Slices& slices, ImageInfo& info) {
     const bool are_frames = slices.front().file_frames > 1;
     if (!are_frames)

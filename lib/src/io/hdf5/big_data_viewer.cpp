@@ -1,4 +1,5 @@
-// BigDataViewer: a group for each time point, in it one for each setup (a channel, tile or angle), in it the levels.
+// BigDataViewer: a group for each time point, which contains a group for each setup (a channel, tile or angle), which
+// contains the levels.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,18 +16,18 @@ namespace {
 
 constexpr std::size_t kMaxBdvLevels = 64;
 
-/// A <ViewSetup> of the XML.
+/// A <ViewSetup> element of the XML.
 struct Setup {
     std::string name, unit;
     std::optional<Vec3> voxel;
 };
 
 struct BdvChoice {
-    std::string time, setup;  ///< empty: not chosen
+    std::string time, setup;  ///< empty if not chosen
     int level = 0;
 };
 
-/// "t00012": a letter and digits.
+/// Whether a name is a letter and digits, as "t00012".
 bool is_named(const std::string& name, char letter) {
     return name.size() > 2 && name[0] == letter &&
            std::all_of(name.begin() + 1, name.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
@@ -38,7 +39,7 @@ std::vector<std::string> named(std::vector<std::string> names, char letter) {
     return names;
 }
 
-/// @returns nothing where the path does not lead to an image's data.
+/// @returns nothing if the path does not lead to an image's data.
 std::optional<BdvChoice> parse_bdv(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
     BdvChoice choice;
@@ -46,7 +47,7 @@ std::optional<BdvChoice> parse_bdv(const std::string& inside) {
     if (!parts.empty()) choice.time = parts[0];
     if (parts.size() > 1) choice.setup = parts[1];
     if (parts.size() > 2) {
-        const std::optional<int> level = number_behind(parts[2], "");
+        const std::optional<int> level = number_after(parts[2], "");
         if (!level) return std::nullopt;
         choice.level = *level;
     }
@@ -57,7 +58,7 @@ std::string cells(const std::string& time, const std::string& setup, std::size_t
     return "/" + time + "/" + setup + "/" + std::to_string(level) + "/cells";
 }
 
-/// "0.4 0.4 1"
+/// Parses "0.4 0.4 1".
 std::optional<Vec3> to_vector(const std::string& text) {
     std::string_view rest = text;
     Vec3 vector;
@@ -69,10 +70,10 @@ std::optional<Vec3> to_vector(const std::string& text) {
     return vector;
 }
 
-/// The file of the same name that ends in .xml; empty where there is none.
-std::string xml_beside(const std::string& path) { return path.substr(0, path.rfind('.')) + ".xml"; }
+/// The file of the same name that ends in .xml; empty if there is none.
+std::string xml_path(const std::string& path) { return path.substr(0, path.rfind('.')) + ".xml"; }
 
-/// By their numbers.
+/// The setups by their numbers.
 std::map<int, Setup> read_setups(const std::string& path) {
     constexpr std::uint64_t kMaxXml = std::uint64_t(64) << 20;
     std::map<int, Setup> setups;
@@ -108,7 +109,7 @@ class Reader {
 public:
     Reader(const Hdf5File& file, BdvChoice choice) : file_(file), choice_(std::move(choice)) {}
 
-    /// @returns false where the file is of another kind.
+    /// @returns false if the file is of another kind.
     bool find() {
         times_ = named(file_.members("/"), 't');
         if (choice_.time.empty() && !times_.empty()) choice_.time = times_.front(), chosen_time_ = false;
@@ -163,7 +164,7 @@ private:
                          "expected setups of one size, got several; give the path of one: " + list);
     }
 
-    /// Along x, y, z for each level.
+    /// The factors along x, y, z for each level.
     [[nodiscard]] std::vector<Vec3> factors() const {
         const std::vector<double> numbers = file_.table("/" + setups_.front() + "/resolutions");
         std::vector<Vec3> factors;
@@ -178,9 +179,9 @@ private:
     }
 
     void describe_spacing(ImageInfo& info) {
-        const std::string xml = xml_beside(file_.path());
+        const std::string xml = xml_path(file_.path());
         std::map<int, Setup> setups = read_setups(xml);
-        const auto setup_of = [&](const std::string& name) { return setups[number_behind(name, "s").value_or(-1)]; };
+        const auto setup_of = [&](const std::string& name) { return setups[number_after(name, "s").value_or(-1)]; };
         const Setup own = setup_of(setups_.front());
         bool all_named = true;
         for (const std::string& name : setups_) {
@@ -206,7 +207,8 @@ private:
         for (std::size_t level = 0; level < factor.size(); ++level) {
             Vec3 spacing;
             for (int a = 0; a < 3; ++a) spacing[a] = voxel[a] * factor[level][a];
-            // A voxel is the mean of finer ones, and its centre that of theirs; world 0 is the first fine one's.
+            // A voxel is the mean of finer ones, so its centre is the centre of theirs; the first voxel of the finest
+            // level is at world 0.
             if (int(level) == choice_.level) {
                 info.geometry.spacing = spacing;
                 for (int a = 0; a < 3; ++a) info.geometry.origin[a] = 0.5 * (spacing[a] - voxel[a]);
@@ -214,7 +216,7 @@ private:
             const std::string name = cells(choice_.time, setups_.front(), level);
             try {
                 info.levels.push_back(level_text(name, size_of(setups_.front(), level), spacing));
-            } catch (const Error&) {  // it does not matter until it is read
+            } catch (const Error&) {  // a damaged level is ignored until it is read
                 info.levels.push_back(name + ": cannot be read");
             }
         }

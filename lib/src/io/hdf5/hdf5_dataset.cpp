@@ -34,7 +34,7 @@ std::vector<KnownType> known_types() {
             {H5T_IEEE_F64LE, PixelType::Double}};
 }
 
-/// IEEE 754's binary16, which the library has no name for.
+/// The type binary16 of IEEE 754, for which the library has no name.
 Hdf5Id half_type() {
     Hdf5Id half(H5Tcopy(H5T_IEEE_F32LE), H5Tclose);
     H5Tset_fields(half.get(), 15, 10, 5, 0, 10);
@@ -57,19 +57,20 @@ const char* class_name(H5T_class_t kind) {
     }
 }
 
-/// An enumeration's numbers (Python's bool is one).
+/// The type of the numbers; for an enumeration (Python's bool is one), that of its values.
 Hdf5Id number_type(hid_t type) {
     const bool is_enum = H5Tget_class(type) == H5T_ENUM;
     return {is_enum ? H5Tget_super(type) : H5Tcopy(type), H5Tclose};
 }
 
-/// Whether H5Dget_chunk_storage_size(), which just failed, did so for a chunk that was never written, and not for an
-/// index that is damaged: HDF5 1.10 fails for both, and 1.12 for the second alone. It complains of the first itself,
-/// and of the second after a function that it called. Reading a voxel would tell, too, but fills a whole chunk.
+/// Whether H5Dget_chunk_storage_size(), which just failed, did so for a chunk that was never written, not because of a
+/// damaged index: HDF5 1.10 fails in both cases, 1.12 only in the second. In the first case the function itself reports
+/// the error, in the second a function that it called. Reading a voxel would show the difference, too, but fills a
+/// whole chunk.
 bool is_of_missing_chunk() {
     const auto look_at_first = [](unsigned, const H5E_error2_t* error, void* found) -> herr_t {
         *static_cast<bool*>(found) = error->func_name == std::string_view("H5D__get_chunk_storage_size");
-        return 1;  // no further
+        return 1;  // ends the walk
     };
     bool found = false;
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, look_at_first, &found);
@@ -182,7 +183,7 @@ void Hdf5Dataset::read_filters(hid_t properties) {
     }
 }
 
-void Hdf5Dataset::take_as_unsigned() noexcept {
+void Hdf5Dataset::treat_as_unsigned() noexcept {
     if (array_.type == PixelType::Int16) array_.type = PixelType::UInt16;
 }
 
@@ -197,7 +198,7 @@ std::string Hdf5Dataset::filter_names() const {
     return names;
 }
 
-/// All of a chunk is unpacked at once, its channels and frames too.
+/// A chunk is unpacked as a whole, including its channels and frames, so its size is limited.
 void Hdf5Dataset::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -248,7 +249,7 @@ void Hdf5Dataset::read_fill(hid_t properties) {
         array_.fill = fill;
 }
 
-/// @returns nothing where the file has no such chunk.
+/// @returns nothing if the file has no such chunk.
 std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>& begin, unsigned& skipped) const {
     const std::vector<hsize_t> offset(begin.begin(), begin.end());
     hsize_t stored = 0;
@@ -270,7 +271,7 @@ std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>&
     return packed;
 }
 
-/// A box by the library itself, into memory of this shape; beyond the box nothing is written.
+/// Lets the library read a box into memory of this shape; nothing is written outside of the box.
 void Hdf5Dataset::read_box(const std::vector<std::uint64_t>& begin, const std::vector<std::uint64_t>& shape,
                            void* out) const {
     const std::vector<hsize_t> offset(begin.begin(), begin.end()), memory(shape.begin(), shape.end()),

@@ -14,19 +14,19 @@ namespace covol::detail {
 /// A dataset of grey values.
 class Hdf5Dataset {
 public:
-    /// @throws Error InvalidInput (damaged), Unsupported (types, filters, datasets whose values lie in other files).
+    /// @throws Error InvalidInput (damaged), Unsupported (types, filters, datasets whose values are in other files).
     Hdf5Dataset(std::shared_ptr<const Hdf5File> file, const std::string& name);
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< "FILE.h5:/name", for messages
-    /// Its chunks are those of the file; of a dataset that has none, bricks.
+    /// The array with the chunks of the file; a dataset without chunks is divided into bricks.
     [[nodiscard]] const ChunkedArray& array() const noexcept { return array_; }
-    /// Where in the file all values lie behind each other; none where they do not.
+    /// Position in the file at which all values are stored contiguously; empty if they are not contiguous.
     [[nodiscard]] std::optional<std::uint64_t> offset() const noexcept { return offset_; }
-    /// Integers of 16 bits have no sign, whatever the file says.
-    void take_as_unsigned() noexcept;
+    /// Treats 16-bit integers as unsigned, even if the file declares them as signed.
+    void treat_as_unsigned() noexcept;
     /// "gzip, shuffle"; empty without filters.
     [[nodiscard]] std::string filter_names() const;
-    /// ArrayChunks::elements(). Several threads may call it at once.
+    /// ArrayChunks::elements(). Safe to call from several threads.
     [[nodiscard]] std::optional<Bytes> elements(const std::vector<std::uint64_t>& place) const;
 
 private:
@@ -46,11 +46,11 @@ private:
     Hdf5Id dataset_, type_;
     ChunkedArray array_;
     std::vector<Hdf5Filter> filters_;
-    bool as_packed_ = false;  ///< chunks are taken as they lie in the file, and unpacked here
+    bool as_packed_ = false;  ///< chunks are read in packed form and unpacked here
     std::optional<std::uint64_t> offset_;
 };
 
-/// The shape alone, and whether there are numbers; without what reading them needs.
+/// The shape alone, and whether the elements are numbers, without the information that is needed to read them.
 struct Hdf5Shape {
     std::vector<std::uint64_t> shape;
     bool has_numbers = false;

@@ -19,8 +19,7 @@ std::mutex& library_mutex() {
     return mutex;
 }
 
-// How many locks this thread holds. A recursive mutex would know its owner by a number that is another one in a copy of
-// the process (try_hdf5()).
+// Number of locks that this thread holds; only the first locks the mutex.
 thread_local int held_locks = 0;
 
 herr_t refuse_link(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) { return -1; }
@@ -32,7 +31,7 @@ herr_t add_name(hid_t, const char* name, const H5L_info_t*, void* list) {
     return names.size() < kMaxNames ? 0 : 1;
 }
 
-/// Elements of a simple dataspace; 0 where it is none, or has more than `most`.
+/// Number of elements in a simple dataspace; 0 if it is not simple, or has more than `maximum`.
 std::uint64_t count_of(const Hdf5Id& space, std::uint64_t maximum) {
     if (!space || H5Sget_simple_extent_type(space.get()) == H5S_NULL) return 0;
     const hssize_t count = H5Sget_simple_extent_npoints(space.get());
@@ -44,7 +43,7 @@ bool holds_numbers(const Hdf5Id& type) {
     return kind == H5T_INTEGER || kind == H5T_FLOAT;
 }
 
-/// Up to the first zero.
+/// The text up to the first zero.
 std::string cut(const char* begin, std::size_t size) { return {begin, std::find(begin, begin + size, '\0')}; }
 
 std::vector<std::string> strings_of(const Hdf5Id& attribute) {
@@ -101,7 +100,7 @@ Hdf5File::Hdf5File(std::string path) : path_(std::move(path)) {
     std::error_code status;
     bytes_ = std::filesystem::file_size(path_, status);
     const Hdf5Id how(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    // Objects that are still open keep the file open; some network folders know no locks.
+    // The file stays open until all its objects are closed; some network file systems do not support locks.
     H5Pset_fclose_degree(how.get(), H5F_CLOSE_WEAK);
     H5Pset_file_locking(how.get(), true, true);
     file_ = Hdf5Id(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, how.get()), H5Fclose);
@@ -167,7 +166,7 @@ std::vector<std::string> Hdf5File::datasets(const std::string& group) const {
     constexpr std::size_t kMaxObjects = 100000;
     const Hdf5Lock lock;
     std::vector<std::string> found, groups{group};
-    std::set<haddr_t> seen;  // hard links may lead round in circles
+    std::set<haddr_t> seen;  // hard links may form cycles
     H5O_info_t top{};
     if (H5Oget_info_by_name2(file_.get(), group.c_str(), &top, H5O_INFO_BASIC, access_.get()) >= 0)
         seen.insert(top.addr);

@@ -7,11 +7,11 @@
 
 #include "io/modules/hdf5_calls.h"
 
-// HDF5 files, through the HDF5 library. Whatever stands in them may be wrong on purpose.
+// HDF5 files, through the HDF5 library. Their contents are untrusted.
 namespace covol::detail {
 
-/// While one lives its thread alone is in the HDF5 library, which need not be safe for several, and the library prints
-/// no messages. One thread may hold several. ITK's readers share the library.
+/// While one of these exists, only its thread uses the HDF5 library, which need not be thread-safe, and the library
+/// prints no messages. A thread may hold several. ITK's readers use the same library.
 class Hdf5Lock {
 public:
     Hdf5Lock();
@@ -24,12 +24,12 @@ private:
     void* data_ = nullptr;
 };
 
-/// What the library knows by a number, until this ends.
+/// An object that the library identifies by a number; closed by the destructor.
 class Hdf5Id {
 public:
     using Close = herr_t (*)(hid_t);
     Hdf5Id() = default;
-    /// Takes what a function of the library made; < 0: it failed.
+    /// Takes ownership of what a function of the library returned; < 0 means that it failed.
     Hdf5Id(hid_t id, Close close) : id_(id), close_(close) {}
     Hdf5Id(Hdf5Id&& other) noexcept;
     Hdf5Id& operator=(Hdf5Id&& other) noexcept;
@@ -45,10 +45,10 @@ private:
     Close close_ = nullptr;
 };
 
-/// A file, open for reading. Links into other files are not followed.
+/// A file that is open for reading. Links into other files are not followed.
 class Hdf5File {
 public:
-    /// @throws Error InvalidInput (damaged, truncated, no HDF5).
+    /// @throws Error InvalidInput (damaged, truncated, not HDF5).
     explicit Hdf5File(std::string path);
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
@@ -58,20 +58,20 @@ public:
     /// Whether there is such a group or dataset. Names are paths from the root.
     [[nodiscard]] bool has(const std::string& name) const;
     [[nodiscard]] bool has_dataset(const std::string& name) const;
-    /// @throws Error InvalidInput where there is none, or in another file.
+    /// @throws Error InvalidInput if there is no such object, or if it is in another file.
     [[nodiscard]] Hdf5Id open(const std::string& name) const;
-    /// The names in a group, sorted; 100000 at most. None where it is no group.
+    /// The names in a group, sorted; at most 100000. Empty if it is not a group.
     [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
-    /// The datasets in a group and the groups in it, by their paths from the root, sorted. Not through soft links.
+    /// The paths from the root of the datasets in a group and in its subgroups, sorted. Soft links are not followed.
     [[nodiscard]] std::vector<std::string> datasets(const std::string& group) const;
 
-    /// The numbers of an attribute; empty where there is none, or where it holds others or too many.
+    /// The numbers of an attribute; empty if there is none, or if it has another type or too many elements.
     [[nodiscard]] std::vector<double> numbers(const std::string& object, const char* attribute) const;
-    /// Its text, or the characters of a list; empty where there is none.
+    /// The text of an attribute, which may be a list of characters; empty if there is none.
     [[nodiscard]] std::string text(const std::string& object, const char* attribute) const;
-    /// The texts of a list.
+    /// The texts of an attribute that is a list.
     [[nodiscard]] std::vector<std::string> texts(const std::string& object, const char* attribute) const;
-    /// A small dataset of numbers, the last dimension fastest; empty where it is no such.
+    /// A small dataset of numbers, the last dimension fastest; empty if there is no such dataset.
     [[nodiscard]] std::vector<double> table(const std::string& name) const;
 
 private:

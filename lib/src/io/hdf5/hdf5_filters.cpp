@@ -24,7 +24,8 @@ Error damaged(const std::string& path, const char* codec) {
     return read_error(Errc::InvalidInput, path, std::string("a chunk is damaged: it is no ") + codec + " data");
 }
 
-/// Byte b of all elements behind each other, for each b, to whole elements; what is no whole element stays behind.
+/// Reverses the shuffle filter, which stores byte b of all elements together, for each b. The bytes of an incomplete
+/// last element stay at the end.
 Bytes unshuffle(const Bytes& bytes, std::uint64_t width) {
     if (width < 2) width = 1;
     Bytes out(bytes.size());
@@ -38,7 +39,7 @@ Bytes unshuffle(const Bytes& bytes, std::uint64_t width) {
     return out;
 }
 
-/// M. Lehmann's LibLZF: runs of literals, and references of 13 bits back.
+/// M. Lehmann's LibLZF: runs of literals, and back-references of 13 bits.
 Bytes unpack_lzf(const std::string& path, const Bytes& packed, std::uint64_t expected) {
     constexpr unsigned kLongestRun = 32, kLongLength = 7;
     Bytes out(expected);
@@ -64,7 +65,7 @@ Bytes unpack_lzf(const std::string& path, const Bytes& packed, std::uint64_t exp
         if (in == end) throw damaged(path, "LZF");
         const std::uint64_t back = ((control & 0x1FU) << 8U) + *in++ + 1;
         if (back > made || length > expected - made) throw damaged(path, "LZF");
-        // one after the other: a reference may reach into what it makes
+        // one by one, because a reference may overlap its own output
         for (std::uint64_t n = 0; n < length; ++n, ++made) out.data()[made] = out.data()[made - back];
     }
     out.shrink(made);
@@ -77,7 +78,8 @@ std::uint64_t big_endian(const char* bytes, int width) {
     return value;
 }
 
-/// Big-endian: 8 bytes with the size, 4 with that of a block, and each block behind 4 with its packed size.
+/// Big-endian: 8 bytes with the size, 4 bytes with the size of a block, then each block after 4 bytes with its packed
+/// size.
 Bytes unpack_lz4(const std::string& path, const Bytes& packed, std::uint64_t expected) {
     constexpr std::uint64_t kHeader = 12, kMaxBlock = std::uint64_t(1) << 30;
     if (packed.size() < kHeader || big_endian(packed.data(), 8) != expected) throw damaged(path, "LZ4");

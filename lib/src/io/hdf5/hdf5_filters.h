@@ -7,20 +7,20 @@
 
 namespace covol::detail {
 
-/// A filter that the chunks of a dataset went through.
+/// A filter that was applied to the chunks of a dataset.
 struct Hdf5Filter {
     unsigned id = 0;
     std::vector<unsigned> values;  ///< its parameters
     std::string name;
 };
 
-/// Whether undo_filters() knows them all: shuffle, and at most one of gzip, LZF, Blosc, Zstandard and LZ4. What it does
-/// in parallel the library would do in one thread alone, and some of them not at all.
+/// Whether undo_filters() supports all of them: shuffle, and at most one of gzip, LZF, Blosc, Zstandard and LZ4. It
+/// works in parallel, whereas the library uses a single thread and supports only some of these filters.
 bool can_undo(const std::vector<Hdf5Filter>& filters);
 
-/// Undoes them, the last first. Sizes are compared before memory is taken.
-/// @param passed_over  a bit for each filter that this chunk did not go through
-/// @throws Error InvalidInput, with `path`, unless that gives `expected` bytes.
+/// Reverses the filters, the last first. Sizes are checked before memory is allocated.
+/// @param passed_over  a bit for each filter that was not applied to this chunk
+/// @throws Error InvalidInput, with `path`, unless the result has `expected` bytes.
 Bytes undo_filters(const std::string& path, const std::vector<Hdf5Filter>& filters, unsigned passed_over, Bytes bytes,
                    std::uint64_t expected);
 

@@ -76,7 +76,7 @@ private:
 
     [[nodiscard]] Hdf5Dataset dataset_of(const PixelRequest& request) const {
         Hdf5Dataset dataset(file_, layout_.dataset(request.channel, request.frame));
-        if (layout_.is_unsigned) dataset.take_as_unsigned();
+        if (layout_.is_unsigned) dataset.treat_as_unsigned();
         const std::vector<std::uint64_t>& shape = dataset.array().shape;
         if (shape.size() != layout_.letters.size())
             throw read_error(Errc::InvalidInput, dataset.path(),
@@ -92,7 +92,7 @@ private:
         return dataset;
     }
 
-    /// Values that lie in the file as in an unpacked image, which may be mapped.
+    /// The position of values that are contiguous in the file as in an unpacked image, and so may be mapped.
     [[nodiscard]] std::optional<PixelPlace> place_in(const Hdf5Dataset& dataset, const PixelRequest& request) const {
         const ChunkedArray& array = dataset.array();
         const std::string& letters = layout_.letters;
@@ -114,7 +114,7 @@ private:
         if (*dataset.offset() > file_->bytes() || volumes > file_->bytes() / volume)
             throw read_error(Errc::InvalidInput, dataset.path(), "damaged or truncated: it lies beyond the file's end");
         place.file_offset = *dataset.offset() + volumes * volume;
-        // What cannot be mapped would be read as a whole; bricks are not.
+        // Values that cannot be mapped would be read as a whole; bricks are read when they are needed.
         const bool mappable = place.as_stored() && place.file_offset % width == 0;
         if (!mappable && is_worth_mapping(volume)) return std::nullopt;
         return place;
@@ -138,7 +138,7 @@ std::string level_text(const std::string& name, const Index3& size, const Vec3& 
     return text.str();
 }
 
-std::optional<int> number_behind(const std::string& name, const std::string& word) {
+std::optional<int> number_after(const std::string& name, const std::string& word) {
     if (!name.starts_with(word)) return std::nullopt;
     const std::optional<int> number = to_number<int>(std::string_view(name).substr(word.size()));
     return number && *number >= 0 ? number : std::nullopt;

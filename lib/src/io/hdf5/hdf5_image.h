@@ -7,17 +7,17 @@
 
 namespace covol::detail {
 
-/// "FILE.h5:/path/to/dataset", in its parts.
+/// "FILE.h5:/path/to/dataset", split into its parts.
 struct Hdf5Name {
     std::string path, inside;
 };
-/// @returns an empty `inside` where `text` names a file alone; nothing where its name is not one of HDF5.
+/// @returns an empty `inside` if `text` names only a file; nothing if the name is not that of an HDF5 file.
 std::optional<Hdf5Name> split_hdf5_name(const std::string& text);
 
-/// Whether the file as a whole is an image in ITK's layout, which ITK reads. @throws Error InvalidInput.
+/// Whether the file as a whole is an image in ITK's own layout, which ITK reads. @throws Error InvalidInput.
 bool is_itk_hdf5(const Hdf5Name& name);
 
-/// An image in an HDF5 file: Imaris', BigDataViewer's, ilastik's, or any dataset of grey values.
+/// An image in an HDF5 file in the layout of Imaris, BigDataViewer or ilastik, or any dataset of grey values.
 /// @throws Error InvalidInput (damaged), Io, Unsupported (types, filters, several datasets: lists them).
 std::unique_ptr<ImageFile> open_hdf5(const Hdf5Name& name);
 

@@ -1,4 +1,5 @@
-// Imaris: groups for levels, time points and channels, and attributes whose values are texts, a character an element.
+// Imaris: groups for levels, time points and channels, and attributes whose values are texts, stored as one character
+// per element.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,22 +14,22 @@ namespace {
 constexpr const char *kLevel = "ResolutionLevel ", *kTime = "TimePoint ", *kChannel = "Channel ";
 constexpr int kMaxImarisLevels = 32;
 
-/// What a path chose.
+/// The level, time point and channel that a path chooses.
 struct ImarisChoice {
     int level = 0;
     std::optional<int> time, channel;
 };
 
-/// @returns nothing where the path does not lead to an image's data.
+/// @returns nothing if the path does not lead to an image's data.
 std::optional<ImarisChoice> parse_imaris(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
     ImarisChoice choice;
     for (std::size_t n = 0; n < parts.size(); ++n) {
         std::optional<int> number = 0;
         if (n == 0 && parts[n] != "DataSet") return std::nullopt;
-        if (n == 1) choice.level = (number = number_behind(parts[n], kLevel)).value_or(0);
-        if (n == 2) choice.time = number = number_behind(parts[n], kTime);
-        if (n == 3) choice.channel = number = number_behind(parts[n], kChannel);
+        if (n == 1) choice.level = (number = number_after(parts[n], kLevel)).value_or(0);
+        if (n == 2) choice.time = number = number_after(parts[n], kTime);
+        if (n == 3) choice.channel = number = number_after(parts[n], kChannel);
         if (!number || n > 4 || (n == 4 && parts[n] != "Data")) return std::nullopt;
     }
     return choice;
@@ -40,7 +41,7 @@ std::string channel_name(int level, int time, int channel) {
     return level_name(level) + "/" + kTime + std::to_string(time) + "/" + kChannel + std::to_string(channel);
 }
 
-/// Of the attributes of /DataSetInfo/Image.
+/// The extent of the image, from the attributes of /DataSetInfo/Image.
 class Extent {
 public:
     explicit Extent(const Hdf5File& file) : file_(file) {
@@ -54,7 +55,7 @@ public:
         }
     }
     [[nodiscard]] bool is_known() const { return known_; }
-    /// Of a voxel of the finest level.
+    /// Spacing of the finest level.
     [[nodiscard]] Vec3 spacing(const Index3& size) const {
         Vec3 spacing{1, 1, 1};
         for (int a = 0; known_ && a < 3; ++a) spacing[a] = side_[a] / size[a];
@@ -74,7 +75,7 @@ private:
 
 using Shape = std::array<std::uint64_t, 3>;
 
-/// Of the array, along x, y, z, with the padding to whole chunks.
+/// Size of the array along x, y, z, including the padding to whole chunks.
 Shape padded_size(const Hdf5File& file, int level, int time, int channel) {
     const std::string data = channel_name(level, time, channel) + "/Data";
     const std::vector<std::uint64_t> shape = shape_of(file, data).shape;
@@ -84,16 +85,17 @@ Shape padded_size(const Hdf5File& file, int level, int time, int channel) {
     return {shape[2], shape[1], shape[0]};
 }
 
-/// A count among a group's attributes.
+/// A count that is stored as an attribute of a group.
 std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& group, const std::string& name) {
     const auto count = to_number<std::uint64_t>(trim(file.text(group, name.c_str())));
     return count && *count > 0 ? count : std::nullopt;
 }
 
-/// Without the padding to whole chunks: as the channel says, else by the finest level's size, which the image says.
+/// The size without the padding to whole chunks: stated by the channel, otherwise derived from the size of the finest
+/// level, which the image states.
 struct ImarisSize {
     Index3 size{};
-    std::string field;  ///< where it stands; empty: nowhere, it is the array's
+    std::string field;  ///< the attribute that states it; empty if none does, and the array's size is used
     bool is_known = true;
 };
 
@@ -125,7 +127,8 @@ ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
     return found;
 }
 
-/// Each level has voxels of 1, 2, 4, ... fine ones along each axis, and a last odd one left over or alone.
+/// Each voxel of a level covers 1, 2, 4, ... fine voxels along each axis; a last odd one is either dropped or gets a
+/// voxel of its own.
 Vec3 factors(const Index3& fine, const Index3& coarse) {
     Vec3 factor;
     for (int a = 0; a < 3; ++a)
@@ -152,7 +155,7 @@ void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& f
             const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0)).size;
             info.levels.push_back(level_text(name, size, times(extent.spacing(fine), factors(fine, size))));
             if (level > choice.level) layout.coarser.push_back(name);
-        } catch (const Error&) {  // it does not matter until it is read
+        } catch (const Error&) {  // a damaged level is ignored until it is read
             info.levels.push_back(name + ": cannot be read");
         }
     }
@@ -177,7 +180,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     // ExtMin is the corner of the first voxel.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
-    // Of how many voxels the extent is, is not known where the image is said to be larger than its array.
+    // If the stated size of the image exceeds its array, it is unknown how many voxels the extent covers.
     const bool is_known = extent.is_known() && whole.is_known;
     info.spacing_known = {is_known, is_known, is_known};
     info.geometry.unit = normal_unit(file.text("/DataSetInfo/Image", "Unit"));

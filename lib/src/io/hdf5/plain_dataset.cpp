@@ -1,4 +1,4 @@
-// A dataset of its own, as ilastik, h5py and many others write it.
+// A single dataset, as written by ilastik, h5py and many others.
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +16,7 @@ std::string shape_text(const std::vector<std::uint64_t>& shape) {
     return text;
 }
 
-/// The only dataset of three dimensions or more. @throws Error Unsupported where there are several: lists them.
+/// The only dataset of three dimensions or more. @throws Error Unsupported if there are several: lists them.
 std::string only_dataset(const Hdf5File& file, const std::string& group) {
     constexpr std::size_t kShown = 20;
     std::vector<std::string> names;
@@ -38,7 +38,7 @@ std::string only_dataset(const Hdf5File& file, const std::string& group) {
                          file.path_of(names.front()) + "`: " + list);
 }
 
-/// Which dimension is which.
+/// The meaning of each dimension.
 class Axes {
 public:
     Axes(const Hdf5File& file, std::string name) : file_(file), name_(std::move(name)), shape_(shape_of(file, name_)) {
@@ -54,7 +54,7 @@ public:
     [[nodiscard]] const std::string& letters() const { return letters_; }
     /// "axistags: zyxc"
     [[nodiscard]] const std::string& source() const { return source_; }
-    /// By axistags: along x, y, z; 0 where they say nothing.
+    /// Resolution along x, y, z from axistags; 0 if they do not state it.
     [[nodiscard]] const Vec3& resolution() const { return resolution_; }
 
 private:
@@ -82,7 +82,7 @@ private:
         return true;
     }
 
-    /// HDF5's own names of dimensions.
+    /// From HDF5's own dimension labels.
     bool from_labels() {
         const std::vector<std::string> labels = file_.texts(name_, "DIMENSION_LABELS");
         std::string letters;
@@ -94,7 +94,7 @@ private:
         return true;
     }
 
-    /// z, y, x, and dimensions of one element.
+    /// By the order z, y, x, without the dimensions of one element.
     void by_order() {
         std::vector<std::size_t> wide;
         for (std::size_t d = 0; d < shape_.shape.size(); ++d)
@@ -116,14 +116,14 @@ private:
     Vec3 resolution_{0, 0, 0};
 };
 
-/// The spacing along z, y, x (or all dimensions), under one of the usual names.
+/// Reads the spacing along z, y, x (or all dimensions) from an attribute with one of the usual names.
 void describe_spacing(const Hdf5File& file, const std::string& name, const Axes& axes, ImageInfo& info) {
     info.spacing_known = {false, false, false};
     const std::string unit = file.text(name, "unit"), units = file.text(name, "units");
     for (const char* attribute : {"element_size_um", "spacing", "resolution", "voxel_size"}) {
         const std::vector<double> numbers = file.numbers(name, attribute);
         const std::string& letters = axes.letters();
-        std::string order;  // of the numbers
+        std::string order;  // the order in which the numbers are given
         for (const char letter : letters)
             if (numbers.size() == letters.size() || letter == 'x' || letter == 'y' || letter == 'z') order += letter;
         const bool good = numbers.size() == order.size() &&

@@ -7,21 +7,21 @@
 #include "io/modules/modules.h"
 #include "io/pixels/raw_image.h"
 
-// One function for each family of image files; read_image() picks by the name's end.
+// One function for each family of image files; read_image() chooses by the file name's extension.
 namespace covol::detail {
 
 /// NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
 std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run);
 
-/// NIfTI-1 in one file (.nii, .nii.gz). The sform says where voxels lie if sform_code > 0, else the qform if
-/// qform_code > 0, else pixdim with the image's middle at 0: nibabel's rule. Where both forms have codes and lie more
-/// than half a voxel apart, that is a warning.
+/// NIfTI-1 in one file (.nii, .nii.gz). The positions of voxels are taken from the sform if sform_code > 0, else from
+/// the qform if qform_code > 0, else from pixdim with the image's middle at 0: nibabel's rule. If both forms have codes
+/// and differ by more than half a voxel, a warning is reported.
 std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
-/// ITK's reader for files of this ending.
+/// ITK's reader for files with this extension.
 OpenWithItk* itk_reader_of(const std::string& path);
 
-/// Of ITK's layout or another.
+/// An HDF5 file, in ITK's layout or another.
 std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name);
 
 /// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
@@ -30,13 +30,13 @@ std::unique_ptr<ImageFile> open_mrc(const std::string& path);
 /// NumPy's .npy: an array of three axes z, y, x, in C's or Fortran's order.
 std::unique_ptr<ImageFile> open_npy(const std::string& path);
 
-/// The series in a folder, or the one that a file belongs to; its slices sorted by position.
-/// @throws Error Unsupported when a folder holds several series: lists them.
-/// @param frame  the volume of those that a series has (times, echoes, stacks), whose geometry is told; the first
+/// The series in a folder, or the one that a file belongs to; its slices are sorted by position.
+/// @param frame  the volume (of several times, echoes or stacks) whose geometry is reported; by default the first
+/// @throws Error Unsupported if a folder holds several series: lists them.
 std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int> frame, const RunContext& run);
 
-/// A float grid as an image, on the box of its active voxels.
-/// @param name  the grid's, or empty for the file's first float grid
+/// A float grid as an image, on the bounding box of its active voxels. @param name  the grid's, or empty for the file's
+/// first float grid
 std::unique_ptr<ImageFile> open_vdb_image(const std::string& path, const std::string& name);
 
 }  // namespace covol::detail

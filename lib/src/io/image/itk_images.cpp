@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Unit, whether there is a spacing at all, and the fields that were used.
+/// Reads the unit, whether there is a spacing at all, and the fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
     std::string unit = header.value_of({"distanceunits", "unit"});
     if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
@@ -62,7 +62,7 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
         if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
 }
 
-/// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
+/// Empty for rare variants that are left to ITK: ASCII pixels, one file for each slice, a header to skip.
 std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
     const std::string file = header.data_file();
     if (header.has_value("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
@@ -78,8 +78,8 @@ std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// Empty for the rare kinds that are left to ITK: text and bzip2, many data files, skipped lines, channels that are not
-/// the first axis.
+/// Empty for rare variants that are left to ITK: text and bzip2, several data files, skipped lines, channels that are
+/// not the first axis.
 std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader& header, PixelType type, int channels) {
     const std::string file = header.data_file(), encoding = lower(header.value("encoding"));
     PixelPlace place;
@@ -99,19 +99,19 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// MetaIO says on std::cerr what a header lacks; such headers do not get that far.
+/// MetaIO prints missing fields of a header on std::cerr, so such headers are rejected before they reach it.
 void require_meta_header(const TextHeader& header, const std::string& unusable) {
     for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
         if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
-    // MetaIO makes arrays of whatever number of dimensions stands here.
+    // MetaIO allocates arrays for any number of dimensions that is stated here.
     const std::string dimensions = header.value("ndims");
     if (dimensions.size() > 2 || dimensions.find_first_not_of("0123456789") != std::string::npos ||
         std::stoi(dimensions) < 1 || std::stoi(dimensions) > 10)
         throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
-/// What only ITK reads: all at once, in the reading program, for its readers of text and of lists crash at damaged
-/// files; but HDF5 in boxes, by `reader`.
+/// Images that only ITK can read. They are read as a whole in the separate program, because ITK's readers of text and
+/// of lists crash on damaged files; HDF5 is read in boxes, by `reader`.
 class ItkFile : public ImageFile {
 public:
     ItkFile(std::string path, std::string unusable, ImageInfo info, std::vector<std::uint64_t> size,
@@ -169,12 +169,13 @@ public:
 
 private:
     std::string path_, unusable_;
-    std::vector<std::uint64_t> size_;  // of all dimensions
+    std::vector<std::uint64_t> size_;  // along all dimensions
     std::unique_ptr<ItkReader> reader_;
     std::uint64_t file_bytes_;
 };
 
-/// Size, spacing, origin and direction of the first three dimensions. @throws Error InvalidInput when not 3D.
+/// Size, spacing, origin and direction of the first three dimensions. @throws Error InvalidInput if the image is not
+/// 3D.
 ImageGeometry itk_geometry(const std::string& path, const ItkHeader& header) {
     std::uint64_t size[3] = {1, 1, 1};
     for (std::size_t a = 0; a < std::min<std::size_t>(3, header.size.size()); ++a) size[a] = header.size[a];
@@ -223,7 +224,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     if (is_meta) require_meta_header(*header, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    // Its readers abort, or do not end, where headers contradict themselves; HDF5's was tried before.
+    // ITK's readers abort or do not terminate if headers are inconsistent; an HDF5 file has already been tried.
     std::unique_ptr<ItkReader> reader = is_hdf5 ? itk_reader_of(path)(path, unusable) : nullptr;
     const ItkHeader image = reader ? reader->header() : header_by_itk(path, unusable);
 

@@ -9,7 +9,7 @@ namespace covol::detail {
 namespace {
 
 constexpr std::uint64_t kHeaderBytes = 1024;
-// Byte positions of header words.
+// Byte positions of header fields.
 constexpr int kSize = 0, kMode = 12, kStart = 16, kSampling = 28, kCell = 40, kAngles = 52, kAxes = 64, kMin = 76;
 constexpr int kMax = 80, kSpaceGroup = 88, kExtended = 92, kImodStamp = 152, kImodFlags = 156, kOrigin = 196;
 constexpr int kVolumeStack = 401;
@@ -37,7 +37,7 @@ private:
         if (swap_) swap_bytes(&value, 1, sizeof(T));
         return value;
     }
-    /// In the wrong byte order small numbers are huge.
+    /// Plausibility check of the byte order: small numbers are huge in the wrong one.
     [[nodiscard]] bool is_sound() const {
         constexpr std::int32_t kHuge = 1 << 24;
         bool sound = integer(kMode) >= 0 && integer(kMode) < 128 && integer(kExtended) >= 0;
@@ -52,7 +52,7 @@ private:
 void set_type(const std::string& path, const Header& header, ImageInfo& info, PixelPlace& place) {
     switch (header.integer(kMode)) {
         case 0: {
-            // Signed by the standard; before it, and in IMOD's files unless a flag says otherwise, unsigned.
+            // Signed in the standard; unsigned in older files, and in IMOD's files unless a flag is set.
             const bool imod = header.integer(kImodStamp) == kImod;
             const bool is_unsigned =
                 imod ? (header.integer(kImodFlags) & 1) == 0 : header.number(kMin) >= 0 && header.number(kMax) > 127;
@@ -73,7 +73,7 @@ void set_type(const std::string& path, const Header& header, ImageInfo& info, Pi
     info.type = place.type;
 }
 
-/// Which world axis the file's columns, rows and sections lie along. @throws Error InvalidInput.
+/// The world axis of the file's columns, rows and sections. @throws Error InvalidInput.
 std::array<int, 3> axes_of(const std::string& path, const Header& header) {
     std::array<int, 3> axes{};
     int seen = 0;

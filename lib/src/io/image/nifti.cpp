@@ -1,4 +1,4 @@
-// NIfTI-1. ITK reads headers too, but refuses sheared lattices, and chooses between the forms by a rule of its own.
+// NIfTI-1. ITK reads headers too, but refuses sheared lattices, and has its own rule for choosing between the forms.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,7 +14,7 @@
 namespace covol::detail {
 namespace {
 
-/// voxel (i, j, k) to RAS, in the file's unit
+/// Maps voxel (i, j, k) to RAS, in the file's unit.
 struct NiftiAffine {
     Matrix3 matrix{};
     Vec3 origin{};
@@ -78,7 +78,7 @@ public:
     [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
     [[nodiscard]] int integer(std::size_t at) const { return load<std::int16_t>(bytes_.data() + at, swap_); }
     [[nodiscard]] int dimensions() const { return integer(kDim); }
-    /// Along its dimensions; 1 along those that it has not.
+    /// Sizes along the dimensions; 1 along those that the file does not have.
     [[nodiscard]] std::array<std::uint64_t, 7> sizes() const {
         std::array<std::uint64_t, 7> sizes{1, 1, 1, 1, 1, 1, 1};
         for (int a = 0; a < dimensions(); ++a)
@@ -86,7 +86,7 @@ public:
         return sizes;
     }
     [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-    /// Of kNiftiUnits; 0: not stated
+    /// Index into kNiftiUnits; 0 if not stated.
     [[nodiscard]] std::size_t unit() const {
         const auto code = std::size_t(bytes_[123] & 7);
         return code < kNiftiUnits.size() ? code : 0;
@@ -99,7 +99,7 @@ private:
     bool swap_ = false;
 };
 
-/// Empty when the file is not in one piece or holds no grey values. Adds the fields to `info`.
+/// Empty if the file is not in one piece or does not hold grey values. Adds the fields to `info`.
 std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
     const auto type = nifti_type(header.integer(70));
     const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
@@ -122,7 +122,7 @@ std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace pla
     return place;
 }
 
-/// pixdim, as lengths.
+/// Spacing from pixdim, which may be negative.
 Vec3 pixdim_of(const NiftiHeader& header) {
     return {std::abs(header.number(80)), std::abs(header.number(84)), std::abs(header.number(88))};
 }
@@ -141,7 +141,7 @@ NiftiAffine qform_of(const NiftiHeader& header) {
     double b = header.number(nifti::kQuatern), c = header.number(nifti::kQuatern + 4),
            d = header.number(nifti::kQuatern + 8);
     const double square = b * b + c * c + d * d, a = std::sqrt(std::max(0.0, 1 - square));
-    if (square > 1)  // half a turn, rounded up
+    if (square > 1)  // a rotation by 180 degrees, rounded up
         for (double* part : {&b, &c, &d}) *part /= std::sqrt(square);
     NiftiAffine qform;
     qform.matrix = {{{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
@@ -156,7 +156,7 @@ NiftiAffine qform_of(const NiftiHeader& header) {
     return qform;
 }
 
-/// Where neither form has a code: x to the left, the image's middle at 0.
+/// If neither form has a code: x points to the left, and the image's middle is at 0.
 NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     const Vec3 step = pixdim_of(header);
     NiftiAffine base;
@@ -167,7 +167,7 @@ NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     return base;
 }
 
-/// The largest distance between the places that both give a corner voxel.
+/// The maximum distance between the two positions of a corner voxel.
 double distance_between(const NiftiAffine& p, const NiftiAffine& q, const Index3& size) {
     double maximum = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -189,7 +189,7 @@ bool is_invertible(const NiftiAffine& affine) {
 
 std::string steps_text(const Vec3& v) { return number(v[0]) + " x " + number(v[1]) + " x " + number(v[2]); }
 
-/// Chooses the form, says which, and warns where the header contradicts itself.
+/// Chooses the form, reports the choice, and warns if the header is inconsistent.
 class NiftiPlace {
 public:
     NiftiPlace(const std::string& path, const NiftiHeader& header, ImageInfo& info, const RunContext& run)
@@ -218,7 +218,7 @@ public:
     }
 
 private:
-    /// RAS in the file, LPS here.
+    /// Converts the file's RAS to LPS.
     void use(const NiftiAffine& affine, bool by_sform) {
         ImageGeometry& g = info_.geometry;
         const Vec3 pixdim = pixdim_of(header_);
@@ -261,7 +261,7 @@ private:
     const RunContext& run_;
 };
 
-/// Of the rescaled values.
+/// The type of the rescaled values.
 PixelType rescaled_nifti_type(const PixelPlace& place) {
     if (place.slope == 1 && place.intercept == 0) return place.type;
     return place.type == PixelType::Double ? PixelType::Double : PixelType::Float;

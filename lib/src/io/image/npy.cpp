@@ -12,13 +12,13 @@
 namespace covol::detail {
 namespace {
 
-/// What the dictionary of the header says.
+/// The dictionary in the header.
 struct NpyHeader {
     std::string descr, order, shape;
-    std::uint64_t end = 0;  ///< where the values begin
+    std::uint64_t end = 0;  ///< position of the first value
 };
 
-/// The text between the key's colon and what ends its value.
+/// The text between the colon after a key and the end of its value.
 std::string value_of(const std::string& dictionary, const std::string& key) {
     std::size_t at = dictionary.find("'" + key + "'");
     if (at != std::string::npos) at = dictionary.find(':', at);
@@ -78,7 +78,7 @@ void set_type(const std::string& path, const std::string& descr, PixelPlace& pla
                          "; save array.astype(\"float32\")");
 }
 
-/// As the file counts them.
+/// The shape in the order of the file.
 std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string& shape) {
     std::vector<std::string_view> words;
     std::vector<std::uint64_t> sizes;
@@ -96,7 +96,7 @@ std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string
     return {sizes[0], sizes[1], sizes[2]};
 }
 
-/// An array in Fortran's order is one in C's whose axes are the other way round.
+/// An array in Fortran order, which is an array in C order with the axes reversed.
 class FortranFile : public ImageFile {
 public:
     FortranFile(const std::string& path, const ImageInfo& info, const PixelPlace& place) : path_(path) {

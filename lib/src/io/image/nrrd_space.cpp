@@ -10,7 +10,7 @@
 namespace covol::detail {
 namespace {
 
-/// "(1,0,0) (0,1,0) none": a vector for each axis, none where it has no direction. Empty when it cannot be read.
+/// Parses "(1,0,0) (0,1,0) none": a vector for each axis, or none if it has no direction. Empty if it cannot be parsed.
 std::vector<std::optional<Vec3>> read_vectors(std::string_view text) {
     std::vector<std::optional<Vec3>> vectors;
     while (!(text = trim(text)).empty()) {
@@ -37,7 +37,7 @@ std::vector<std::optional<Vec3>> read_vectors(std::string_view text) {
     return vectors;
 }
 
-/// "um" "um" "mm"
+/// Parses "um" "um" "mm".
 std::vector<std::string> read_units(const std::string& text) {
     std::vector<std::string> units;
     if (text.find('"') == std::string::npos) {
@@ -54,7 +54,7 @@ std::vector<std::string> read_units(const std::string& text) {
     return units;
 }
 
-/// Factors from the axes of the header's space to those of LPS; 1 for spaces that say nothing of a body.
+/// Factors from the axes of the header's space to those of LPS; 1 for spaces that are not anatomical.
 Vec3 to_lps(const std::string& space) {
     Vec3 sign{1, 1, 1};
     std::string letters;
@@ -86,7 +86,7 @@ std::vector<std::size_t> space_axes(const TextHeader& header, const std::vector<
     return axes.size() == 3 ? axes : std::vector<std::size_t>{0, 1, 2};
 }
 
-/// How many of the first axis' unit each axis' unit is; 0 where that is not known.
+/// Each axis' unit relative to the first axis' unit; 0 if unknown.
 Vec3 unit_factors(const std::array<std::string, 3>& units) {
     Vec3 factors{1, 1, 1};
     const double first = unit_in_metres(units[0]);
@@ -115,7 +115,7 @@ void restore_nrrd_space(const std::string& path, const TextHeader& header, Image
     }
     if (!of_space.empty() || !of_axes.empty()) g.unit = units[0];
     const Vec3 factors = unit_factors(units);
-    std::array<bool, 3> unknown{};  // of the world's axes where of_space is there, else of the image's
+    std::array<bool, 3> unknown{};  // along world axes if of_space is set, otherwise along image axes
     for (std::size_t a = 0; a < 3; ++a) {
         unknown[a] = factors[a] == 0;
         if (unknown[a])

@@ -8,11 +8,12 @@ namespace covol::detail {
 
 /// One segment of a 3D Slicer segmentation as a mask of 0 and 1.
 /// @param file  the segmentation, whose channels are its layers
-/// @param name  the segment's name, or its ID. @throws Error InvalidInput with the names that there are.
+/// @param name  the segment's name, or its ID
+/// @throws Error InvalidInput, with the list of names.
 std::unique_ptr<ImageFile> open_segment(const std::string& path, std::unique_ptr<ImageFile> file,
                                         const std::string& name);
 
-/// What to type for one of the segments, of a file that has several in layers; empty for other files.
+/// How to choose one of the segments of a file that has several layers, for messages; empty for other files.
 std::string advice_on_segments(const std::string& path);
 
 }  // namespace covol::detail

@@ -15,10 +15,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFiles = 100000;
 
-/// "slice%03d.raw 1 12 1": the names of all numbers, as printf() makes them of %d, with a width and zeros or without.
+/// "slice%03d.raw 1 12 1": the names for all numbers, formatted as printf() does with %d, with an optional width and
+/// leading zeros.
 std::vector<std::string> numbered_files(const std::string& text) {
     std::vector<std::string> names;
-    // The numbers go last, names may hold blanks.
+    // The numbers are parsed from the end, because names may contain blanks.
     const std::size_t percent = text.rfind('%'), letter = text.find('d', percent), blank = text.find(' ', letter);
     if (letter == std::string::npos || blank == std::string::npos) return names;
     const std::string width = text.substr(percent + 1, letter - percent - 1);

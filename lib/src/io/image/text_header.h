@@ -6,29 +6,29 @@
 
 namespace covol::detail {
 
-/// The lines of a NRRD's or MetaImage's text header, for what ITK keeps to itself.
+/// The lines of the text header of NRRD or MetaImage, for fields that ITK does not expose.
 struct TextHeader {
     std::vector<std::string> lines;  ///< as written
-    std::uint64_t end = 0;           ///< where the pixels begin, when they are in the same file
+    std::uint64_t end = 0;           ///< position of the pixels if they are in the same file
 
     explicit TextHeader(const std::string& path);
-    /// What follows "key", one of ":", ":=" or "=", and blanks; empty when there is no such line. Keys are lower case.
+    /// The text after "key", one of ":", ":=" or "=", and blanks; empty if there is no such line. Keys are lower case.
     [[nodiscard]] std::string value(const std::string& key) const;
-    /// The first of the keys that there is.
+    /// The value of the first of the keys that is present.
     [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const;
     [[nodiscard]] bool has_value(const std::string& key, const std::string& wanted) const;
-    /// The file with the pixels, as written; empty when they follow the header.
+    /// The name of the file with the pixels, as written; empty if the pixels follow the header.
     [[nodiscard]] std::string data_file() const;
-    /// Paths of all files with pixels that the header names: one, a list of them, or numbered ones. They need not be
-    /// there.
+    /// Paths of all files with pixels that the header names: one, a list, or numbered files. They need not exist.
     [[nodiscard]] std::vector<std::string> data_files() const;
 
 private:
     std::string path_;
-    std::vector<std::string> listed_;  ///< behind "LIST"
+    std::vector<std::string> listed_;  ///< the lines after "LIST"
 };
 
-/// A named pipe would be waited for. @throws Error Io where one of them is there and no regular file.
+/// Rejects named pipes, for example, whose reader would wait. @throws Error Io if one of the files exists but is not a
+/// regular file.
 void require_regular_files(const std::string& path, const std::vector<std::string>& files);
 
 }  // namespace covol::detail

@@ -33,7 +33,7 @@ PixelType pixel_type(const std::string& path, const TiffPage& page) {
                          " bits in sample format " + std::to_string(page.format));
 }
 
-/// Where the pixels of an unpacked page lie when they lie in one piece.
+/// Position of the pixels of an uncompressed page; empty if they are not contiguous.
 std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const TiffPage& page) {
     if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return std::nullopt;
     if (tiff.tag<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) != FILLORDER_MSB2LSB) return std::nullopt;
@@ -110,7 +110,8 @@ public:
     }
 
 private:
-    /// ImageJ writes stacks over 4 GB with a single directory, and the other slices' pixels right behind the first's.
+    /// ImageJ writes stacks over 4 GB with a single directory, and the pixels of the other slices directly after those
+    /// of the first.
     void find_single_directory(const std::string& description) {
         const std::uint64_t images = imagej_images(description);
         if (images < 2 || TIFFLastDirectory(tiff_->get()) == 0) return;
@@ -124,7 +125,7 @@ private:
         contiguous_ = *begin;
     }
 
-    /// Planes that are all channels or time points are often slices.
+    /// Rejects files without slices: planes that are all labelled as channels or time points are often slices.
     void require_slices() const {
         if (stack_.slices > 1 || stack_.channels * stack_.frames < 2) return;
         std::string there = plane_axes(stack_), list, axes = there;
@@ -140,7 +141,7 @@ private:
 
     void fill_info(const std::string& axes) {
         const bool colour = kind_.samples > 1;
-        // Colour: the samples are the channels; OME counts them in SizeC too.
+        // In colour images the samples are the channels; OME counts them in SizeC too.
         if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
             throw read_error(Errc::Unsupported, path_, "channels of several samples each");
         if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
@@ -169,7 +170,7 @@ private:
             info_.chunk_size = tiff_chunk_size(*tiff_, frame_of_kind());
     }
 
-    /// One channel and frame, but for where it lies.
+    /// One channel and frame, without its slices.
     [[nodiscard]] TiffFrame frame_of_kind() const {
         TiffFrame frame;
         frame.path = path_;
@@ -202,8 +203,8 @@ private:
                             stack_.files[plane.file] + ": damaged or truncated at page " + std::to_string(plane.page));
     }
 
-    /// Makes `file` the open one.
-    void turn_to(std::uint32_t file) {
+    /// Opens `file` instead of the current one.
+    void switch_file(std::uint32_t file) {
         if (file == open_) return;
         tiff_ = open_for_reading(stack_.files[file]);
         pages_ = list_pages(stack_.files[file], *tiff_);
@@ -211,7 +212,7 @@ private:
     }
 
     void read_page(const TiffStack::Plane& plane, const PixelRequest& request, char* out) {
-        turn_to(plane.file);
+        switch_file(plane.file);
         if (plane.page >= pages_.size() || !pages_[plane.page].same_kind(kind_)) throw damaged(plane);
         const TiffPage& page = pages_[plane.page];
         if (TIFFSetSubDirectory(tiff_->get(), page.offset) != 1 || !current_page(*tiff_).same_kind(page))
@@ -234,7 +235,7 @@ private:
         }
     }
 
-    /// Large, in one file, and unpacked as far as the first page tells.
+    /// Whether the image is large, in one file, and uncompressed according to its first page.
     [[nodiscard]] bool may_map(const PixelRequest& request) const {
         return is_worth_mapping(std::uint64_t(request.box.size()[2]) * kind_.bytes()) && stack_.files.size() == 1 &&
                kind_.samples == 1 && TIFFIsByteSwapped(tiff_->get()) == 0 &&
@@ -249,7 +250,7 @@ private:
         return pixels_in_one_piece(*tiff_, kind_);
     }
 
-    /// Only where the slices lie at even distances in the file.
+    /// Maps the slices if they are evenly spaced in the file.
     [[nodiscard]] std::optional<Pixels> map(const PixelRequest& request) const {
         const VoxelBox& box = request.box;
         const std::uint64_t width = pixel_bytes(info_.type);
@@ -264,7 +265,7 @@ private:
             if (begins[n] < begins[n - 1] || begins[n] - begins[n - 1] != step) return std::nullopt;
         const std::uint64_t bytes = begins.back() + kind_.bytes() - begins.front();
         if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_))
-            return std::nullopt;  // read() says where
+            return std::nullopt;  // read() reports the position
         const auto slab = map_file(path_, begins.front(), bytes);
         const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * kind_.row_bytes() +
                             std::uint64_t(box.min[0]) * width;
@@ -273,10 +274,10 @@ private:
 
     std::string path_;
     std::unique_ptr<Tiff> tiff_;
-    std::uint32_t open_ = 0;        ///< which of stack_.files tiff_ is
-    TiffPage kind_;                 ///< the first page; all others are alike
-    std::vector<TiffPage> pages_;   ///< of the open file; empty for a single directory
-    std::uint64_t contiguous_ = 0;  ///< where the pixels begin of a stack with a single directory
+    std::uint32_t open_ = 0;        ///< index in stack_.files of the file that is open as tiff_
+    TiffPage kind_;                 ///< the first page; all others have the same properties
+    std::vector<TiffPage> pages_;   ///< pages of the open file; empty for a single directory
+    std::uint64_t contiguous_ = 0;  ///< position of the pixels in a stack with a single directory
     TiffStack stack_;
 };
 

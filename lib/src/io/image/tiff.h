@@ -7,10 +7,9 @@
 
 namespace covol::detail {
 
-/// The pages of a TIFF as one 3D image, straight through libtiff: ITK drops the spacing that ImageJ and OME store, and
-/// reads no hyperstacks. Pages are z unless the description says otherwise (see tiff_stack.h). Samples of a pixel
-/// (colour) are channels.
-/// @param axes  as rename_axes() has it
+/// The pages of a TIFF as one 3D image, read with libtiff directly: ITK drops the spacing that ImageJ and OME store,
+/// and does not read hyperstacks. Pages are slices along z unless the description states otherwise (see tiff_stack.h).
+/// Samples of a pixel (colour) are channels. @param axes  as in rename_axes()
 std::unique_ptr<ImageFile> open_tiff(const std::string& path, const std::string& axes, const RunContext& run);
 
 }  // namespace covol::detail

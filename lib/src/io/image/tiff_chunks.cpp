@@ -1,4 +1,4 @@
-// Large TIFFs that cannot be mapped: parts of pages, each read when it is asked for.
+// Large TIFFs that cannot be mapped: parts of pages are read on demand.
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -12,21 +12,21 @@ namespace covol::detail {
 namespace {
 
 constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;  // of a chunk
-constexpr std::size_t kMaxHandles = 64;                       // kept open while idle
-constexpr std::int32_t kBrick = 256;                          // strips are cut into columns
+constexpr std::size_t kMaxHandles = 64;                       // maximum number of idle open files
+constexpr std::int32_t kBrick = 256;                          // strips are divided into columns of this width
 
-/// Open files: libtiff's handles serve one thread at a time.
+/// Open files. A libtiff handle can be used by one thread at a time.
 class TiffHandles {
 public:
     struct Handle {
         std::uint32_t file = 0;
-        std::uint64_t page = 0;  ///< offset of the directory that it is at; 0: unknown
+        std::uint64_t page = 0;  ///< offset of the current directory; 0 if unknown
         std::unique_ptr<Tiff> tiff;
     };
 
     explicit TiffHandles(std::vector<std::string> files) : files_(std::move(files)) {}
 
-    /// One that is at the page already, if there is one.
+    /// Returns a handle, preferably one that is already at the page.
     Handle take(std::uint32_t file, std::uint64_t page) {
         {
             const std::lock_guard<std::mutex> lock(mutex_);
@@ -48,7 +48,7 @@ public:
         idle_.push_back(std::move(handle));
     }
 
-    /// Where the pages of a file begin: listed once.
+    /// The offsets of the pages of a file, which are listed once.
     std::vector<std::uint64_t> pages(std::uint32_t file, const TiffPage& kind) {
         const std::lock_guard<std::mutex> lock(listing_);
         auto found = pages_.find(file);
@@ -73,7 +73,7 @@ public:
     TiffChunks(const TiffFrame& frame, const Index3& chunk_size)
         : ChunkSource(frame.path, frame.type, frame.size, chunk_size), frame_(frame), handles_(frame.files) {
         if (frame.contiguous > 0) return;
-        // The offsets of all slices now, so that reading one does not walk through the directories before it.
+        // All offsets are determined in advance; otherwise reading a slice would go through all previous directories.
         std::uint32_t listed = std::numeric_limits<std::uint32_t>::max();
         std::vector<std::uint64_t> pages;
         for (const TiffStack::Plane& plane : frame.slices) {
@@ -88,12 +88,12 @@ public:
         return true;
     }
 
-    /// A strip is as wide as the page, and unpacked once for all its columns.
+    /// A strip is as wide as the page, and is unpacked once for all its columns.
     [[nodiscard]] bool in_layers() const noexcept override { return true; }
 
     void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const override {
         const Index3& n = chunk_size();
-        // Row of chunks by row: what lies between them is not unpacked, and of strips nothing twice.
+        // Chunks are read row by row, so that nothing between them is unpacked, and no strip is unpacked twice.
         for (std::size_t first = 0; first < chunks.size();) {
             std::size_t last = first + 1;
             while (last < chunks.size() && chunks[last][1] == chunks[first][1] &&
@@ -158,7 +158,7 @@ private:
 
     TiffFrame frame_;
     mutable TiffHandles handles_;
-    std::vector<std::uint64_t> offsets_;  ///< of the slices' directories
+    std::vector<std::uint64_t> offsets_;  ///< a multiple of the strip height
 };
 
 }  // namespace

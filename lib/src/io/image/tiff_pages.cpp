@@ -7,7 +7,7 @@
 namespace covol::detail {
 namespace {
 
-/// One plane's part: the columns and rows of `box`, one sample of each pixel.
+/// Reads a part of one plane: the columns and rows of `box`, one sample of each pixel.
 class PageReader {
 public:
     PageReader(const Tiff& tiff, const TiffPage& page, const VoxelBox& box, std::uint64_t sample)
@@ -22,7 +22,7 @@ public:
                          : std::min(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
     }
 
-    /// False when the page is damaged or truncated.
+    /// Returns false if the page is damaged or truncated.
     bool read(char* out) {
         // A tile may be larger than the page, but not absurdly so.
         constexpr std::uint64_t kSlack = 65536;
@@ -42,9 +42,9 @@ public:
     }
 
 private:
-    /// Bytes that the file can hold, by its own size.
+    /// Upper bound for the unpacked bytes of the file, from its size.
     [[nodiscard]] std::uint64_t max_in_file() const {
-        constexpr std::uint64_t kMaxOfByte = 32768;  // zstd's, which is beyond those of the other codecs
+        constexpr std::uint64_t kMaxOfByte = 32768;  // for zstd; other codecs have lower ratios
         const std::uint64_t bytes = TIFFGetSizeProc(tiff_.get())(TIFFClientdata(tiff_.get()));
         const bool packed = tiff_.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE;
         return packed ? kMaxOfByte * bytes : bytes;
@@ -64,7 +64,7 @@ private:
                want;
     }
 
-    /// The part of the block at (x, y) that lies in the box.
+    /// Copies the part of the block at (x, y) that lies in the box.
     void copy(std::uint64_t x, std::uint64_t y, char* out) const {
         const std::uint64_t x0 = std::max<std::uint64_t>(x, std::uint64_t(box_.min[0]));
         const std::uint64_t x1 = std::min<std::uint64_t>(x + width_, std::uint64_t(box_.max[0]) + 1);
@@ -110,7 +110,7 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status)
         throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
-    // m: not mapped, for pages of packed tiles that were read once would stay in memory
+    // m: without mapping, because the mapped pages of packed tiles would stay in memory after they were read
     auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kMinLimit, 4 * bytes));
     if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, path + ": not a usable TIFF file");
     return tiff;

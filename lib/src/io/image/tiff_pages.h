@@ -30,14 +30,14 @@ struct TiffPage {
 
 TiffPage current_page(const Tiff& tiff);
 
-/// Opens a file for reading; libtiff's own allocations are bound by the file's size. @throws Error Io, InvalidInput.
+/// Opens a file for reading; the file's size limits libtiff's own allocations. @throws Error Io, InvalidInput.
 std::unique_ptr<Tiff> open_for_reading(const std::string& path);
 
-/// All full-resolution pages, which must be of one kind. @throws Error Unsupported, InvalidInput.
+/// All full-resolution pages, which must all have the same properties. @throws Error Unsupported, InvalidInput.
 std::vector<TiffPage> list_pages(const std::string& path, const Tiff& tiff);
 
-/// Reads the columns and rows of `box`, one sample of each pixel, of the page that `tiff` is at.
-/// @return false when the page is damaged or truncated.
+/// Reads the columns and rows of `box`, one sample of each pixel, from the current page of `tiff`. @return false if the
+/// page is damaged or truncated.
 bool read_page_part(const Tiff& tiff, const TiffPage& page, const VoxelBox& box, std::uint64_t sample, char* out);
 
 /// One channel and frame of a TIFF.
@@ -48,12 +48,12 @@ struct TiffFrame {
     TiffPage kind;                         ///< of every page
     std::uint64_t sample = 0;              ///< of each pixel
     std::vector<std::string> files;        ///< of the image
-    std::vector<TiffStack::Plane> slices;  ///< where slice k lies
-    std::uint64_t contiguous = 0;          ///< not 0: of a single directory, the slices behind each other from here
-    bool swapped = false;                  ///< those in the other byte order
+    std::vector<TiffStack::Plane> slices;  ///< position of each slice
+    std::uint64_t contiguous = 0;          ///< if not 0: a single directory whose slices are contiguous from here
+    bool swapped = false;                  ///< the contiguous slices are in the other byte order
 };
 
-/// Its tiles, or parts of its strips, of some 64 KiB; `tiff` is at one of its pages.
+/// The chunk size: tiles, or parts of strips, of about 64 KiB. `tiff` has to be at one of the frame's pages.
 Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame);
 std::shared_ptr<const ChunkSource> tiff_chunks(const TiffFrame& frame, const Index3& chunk_size);
 

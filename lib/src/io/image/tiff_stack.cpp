@@ -1,4 +1,4 @@
-// The three ways in which programs describe what the pages of a TIFF are.
+// The three ways in which programs describe the pages of a TIFF.
 #include "io/image/tiff_stack.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// More planes than any microscope makes; a damaged description may claim more.
+// More planes than any microscope acquires; a damaged description may claim more.
 constexpr std::uint64_t kMaxPlanes = std::uint64_t(1) << 24;
 
 double to_number(const std::string& text) {
@@ -27,10 +27,10 @@ double to_number(const std::string& text) {
     return status == std::errc() && std::isfinite(value) ? value : 0;
 }
 
-/// Some programs write stacks that go down with a negative distance between slices.
+/// Some programs state a negative distance between slices for stacks that go down.
 double to_length(const std::string& text) { return std::abs(to_number(text)); }
 
-/// Without what a change of units leaves in the last digits.
+/// Removes the rounding error of unit conversions from the last digits.
 double rounded(double length) {
     std::array<char, 32> text{};
     const auto end =
@@ -46,7 +46,7 @@ std::uint64_t to_count(const std::string& text, std::uint64_t otherwise = 1) {
 
 std::uint64_t at_least_one(const std::string& text) { return std::max<std::uint64_t>(1, to_count(text)); }
 
-/// Expresses the lengths along j and k in the unit of i where both units are known.
+/// Converts the lengths along j and k to the unit of i if both units are known.
 void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
     stack.unit = units[0];
     const double first = unit_in_metres(units[0]);
@@ -62,12 +62,12 @@ void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
     }
 }
 
-/// The spacing along x and y from the resolution, in whatever unit.
+/// Reads the spacing along x and y from the resolution, without its unit.
 void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     for (std::size_t a = 0; a < 2; ++a) {
         const float spacing = 1.0F / facts.resolution[a];
         if (!std::isfinite(spacing) || !(spacing > 0)) continue;
-        // libtiff hands out single precision; the shortest text that means this float is what was meant (0.35).
+        // libtiff returns single precision; the shortest text of this float is the number that was intended (0.35).
         std::array<char, 32> text{};
         const auto end = std::to_chars(text.data(), text.data() + text.size(), spacing).ptr;
         std::from_chars(text.data(), end, stack.spacing[a]);
@@ -78,7 +78,7 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
 
 // ---- ImageJ -------------------------------------------------------------------------------------------------------
 
-/// The value of `key=` in ImageJ's description, one key a line.
+/// The value of `key=` in ImageJ's description, which has one key per line.
 std::string imagej_value(const std::string& description, const std::string& key) {
     for (std::size_t begin = 0; begin < description.size();) {
         const std::size_t end = std::min(description.find('\n', begin), description.size());
@@ -108,15 +108,15 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
     if (units[0].empty() && facts.resolution_unit == kInch) units[0] = "inch";
     if (units[0].empty() && facts.resolution_unit == kCentimetre) units[0] = "cm";
     const std::string depth = value("spacing");
-    // One pixel per nothing is what writers leave when they know no spacing.
+    // Writers that do not know the spacing state one pixel per unnamed unit.
     const bool known = !units[0].empty() || facts.resolution[0] != 1.0F || !depth.empty();
     if (!known) return;
     read_resolution(facts, stack);
     stack.spacing[2] = to_length(depth);
-    // ImageJ leaves a depth of 1 out.
+    // ImageJ omits a depth of 1.
     if (stack.spacing[2] == 0 && stack.spacing[0] > 0) stack.spacing[2] = 1;
     unify_units(stack, units);
-    // The origin is told in voxels, as the voxel that lies at 0.
+    // The origin is given in voxels, as the position of the voxel at world 0.
     const std::array<std::string, 3> origin{value("xorigin"), value("yorigin"), value("zorigin")};
     for (int a = 0; a < 3; ++a)
         if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
@@ -124,7 +124,7 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
 
 // ---- tifffile -----------------------------------------------------------------------------------------------------
 
-/// tifffile's own description: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
+/// The description that tifffile writes: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
 void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     const auto json = nlohmann::json::parse(facts.description, nullptr, false);
     if (!json.is_object() || !json.contains("shape") || !json.at("shape").is_array()) return;
@@ -170,7 +170,7 @@ struct OmeUnit {
     const char* text;
     double metres;
 };
-/// UnitsLength of the schema, where upper and lower case differ: "Mm" is a million metres.
+/// UnitsLength of the schema, which is case-sensitive: "Mm" is a million metres.
 /// https://www.openmicroscopy.org/Schemas/OME/2016-06
 constexpr OmeUnit kOmeUnits[] = {{"Ym", 1e24},
                                  {"Zm", 1e21},
@@ -214,8 +214,8 @@ double ome_unit_in_metres(const std::string& text) {
     return 0;
 }
 
-/// The unit of all axes where they agree, else micrometres. Axes of a unit that the schema does not know are unknown;
-/// lengths in a "reference frame" or in pixels have no unit.
+/// The unit of all axes if they agree, otherwise micrometres. The spacing of an axis with a unit that the schema does
+/// not define is unknown; lengths in a "reference frame" or in pixels have no unit.
 void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     const bool alike = texts[0] == texts[1] && texts[1] == texts[2];
     if (alike && (texts[0] == "reference frame" || texts[0] == "pixel")) return;
@@ -233,9 +233,9 @@ void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     }
 }
 
-/// <TiffData>: which pages hold which planes.
+/// A <TiffData> element, which states which pages hold which planes.
 struct TiffData {
-    std::string ifd, plane_count, file;  ///< as written; empty: not given
+    std::string ifd, plane_count, file;  ///< as written; empty if absent
     std::uint64_t z = 0, c = 0, t = 0;
 };
 
@@ -243,11 +243,11 @@ struct OmePixels {
     XmlTag pixels;
     std::vector<std::string> channels;
     std::vector<TiffData> data;
-    std::string metadata_file;  ///< the XML lies in another file
+    std::string metadata_file;  ///< set if the XML is in another file
     int images = 0;
 };
 
-/// The first image of the XML.
+/// Parses the first image of the XML.
 OmePixels parse_ome(const std::string& xml) {
     OmePixels ome;
     XmlTags tags(xml);
@@ -255,7 +255,7 @@ OmePixels parse_ome(const std::string& xml) {
     while (tags.next(tag)) {
         if (tag.closing) continue;
         if (tag.name == "BinaryOnly") ome.metadata_file = tag.value("MetadataFile");
-        // Some writers leave <Image> out.
+        // Some writers omit <Image>.
         if (tag.name == "Image") ++ome.images;
         if (ome.images > 1) continue;
         if (tag.name == "Pixels" && ome.pixels.name.empty()) ome.pixels = tag;
@@ -268,7 +268,7 @@ OmePixels parse_ome(const std::string& xml) {
     return ome;
 }
 
-/// @param files  the one that is read for it is added
+/// @param files  receives the path of the metadata file if one is read
 OmePixels read_ome_xml(const TiffFacts& facts, std::vector<std::string>& files) {
     OmePixels ome = parse_ome(facts.description);
     if (!ome.pixels.name.empty() || ome.metadata_file.empty()) return ome;
@@ -311,7 +311,7 @@ public:
     }
 
 private:
-    /// A single name that is not ours means that the file has been renamed.
+    /// A single name that is not this file's means that the file has been renamed.
     void name_files(const std::vector<TiffData>& data) {
         const std::string own = fs::path(facts_.path).filename().string();
         numbers_[""] = numbers_[own] = 0;
@@ -415,7 +415,8 @@ TiffStack describe_tiff(const TiffFacts& facts) {
     const bool in_order = stack.planes.empty();
     if (in_order && (stack.slices > kMaxPlanes || stack.channels > kMaxPlanes || stack.frames > kMaxPlanes ||
                      stack.slices * stack.channels * stack.frames != facts.pages)) {
-        // The description is stale (a tool that kept it while it changed the pages): the pages are right.
+        // The description is outdated because a tool kept it while it changed the pages, so the number of pages is
+        // used.
         stack.slices = facts.pages;
         stack.channels = stack.frames = 1;
         stack.channel_names.clear();
@@ -452,7 +453,7 @@ void rename_axes(const std::string& path, const std::string& axes, TiffStack& st
                          "file's axes of planes (" +
                              (list.empty() ? "none" : list) + ") before YX, such as ZCYX; got '" + axes + "'");
     if (stack.slices == 1) {
-        // What stands in for a distance between slices that the file has not.
+        // Discards the default for a distance between slices that the file does not state.
         const bool stated = std::any_of(stack.fields.begin(), stack.fields.end(), [](const auto& field) {
             return field.first == "spacing" || field.first == "PhysicalSizeZ";
         });

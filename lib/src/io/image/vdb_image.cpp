@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-// A few far voxels would make a box of nothing but background.
+// Limit for grids with a few distant voxels, whose bounding box is mostly background.
 constexpr std::uint64_t kSparsest = 10000;
 
 class VdbImage : public ImageFile {

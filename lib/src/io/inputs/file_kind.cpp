@@ -32,7 +32,7 @@ constexpr std::array<std::string_view, 17> kPointEndings{".xyz", ".csv",       "
 constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
 constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
 
-/// A file that is neither a mesh nor points is told as a broken mesh.
+/// Whether a file holds a mesh. A file that is neither a mesh nor points is reported as a broken mesh.
 bool holds_triangles(const std::string& path) {
     try {
         return !read_mesh(path).empty();
@@ -55,7 +55,7 @@ FileKind kind_of_file(const std::string& path) {
     if (end == ".nvdb")
         throw Error(Errc::Unsupported, path + ": NanoVDB files are for viewers and are not read; keep the .vdb");
     if (is_one_of(end, kPointEndings) || end == ".laz")
-        return FileKind::Points;  // that LAZ is not read, its reader says
+        return FileKind::Points;  // LAZ is not supported, which its reader reports
     if (end == ".dcm" && detail::dicom_class(path) == detail::kRtStructureSet) return FileKind::Points;
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;

@@ -16,9 +16,9 @@
 namespace covol::mesh_io {
 namespace {
 
-/// glTF 2.0 in one file: the triangles of all meshes, as their nodes hold them.
+/// Reads glTF 2.0 in one file: the triangles of all meshes, placed by their nodes.
 class GlbReader {
-    static constexpr std::uint64_t kShared = 8;  // times that data may be used
+    static constexpr std::uint64_t kMaxReuse = 8;  // maximum number of times that data may be used
 
 public:
     GlbReader(Source& source, std::string_view text) : source_(source), builder_(source), text_(text) {}
@@ -29,7 +29,7 @@ public:
         if (!required.empty()) unsupported("the extension " + required.dump().substr(0, 60));
         const std::vector<Vec3> translations = read_nodes();
         for (std::size_t n = 0; n < translations.size(); ++n) {
-            if (translations[n] != translation_) first_vertex_.clear();  // data that is used again lies elsewhere
+            if (translations[n] != translation_) first_vertex_.clear();  // if data is used again, the positions differ
             translation_ = translations[n];
             for (const Json& primitive : member(list("meshes")[n], "primitives", Json::array())) add(primitive);
         }
@@ -68,7 +68,7 @@ private:
         const std::uint32_t binary_bytes = word(source_.bytes(4));
         if (source_.bytes(4) != std::string_view("BIN\0", 4)) source_.fail("expected a binary chunk second");
         binary_ = source_.bytes(binary_bytes);
-        unread_ = kShared * binary_.size();
+        unread_ = kMaxReuse * binary_.size();
     }
 
     static Json member(const Json& object, const char* key, const Json& otherwise) {
@@ -85,7 +85,8 @@ private:
             source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
         return all[number.get<std::uint64_t>()];
     }
-    /// A length or a place in the binary chunk: no larger than that, so that sums of a few cannot overflow.
+    /// A length or a position in the binary chunk. It is limited to the chunk's size, so that sums of a few of them
+    /// cannot overflow.
     std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
         const Json value = member(object, key, otherwise);
         if (!value.is_number_unsigned() ||
@@ -95,7 +96,7 @@ private:
         return value.get<std::uint64_t>();
     }
 
-    /// Where the nodes put each mesh: a translation, as files have whose coordinates are far from 0.
+    /// The translation of each mesh by its nodes, which is used in files whose coordinates are far from 0.
     [[nodiscard]] std::vector<Vec3> read_nodes() const {
         std::vector<Vec3> translations(list("meshes").size(), Vec3{0, 0, 0});
         std::vector<bool> is_placed(translations.size(), false);
@@ -148,13 +149,13 @@ private:
         return result;
     }
 
-    /// Meshes may share data; used again and again it would make a small file a large mesh.
+    /// Meshes may use the same data, but only a few times, because otherwise a small file could yield a huge mesh.
     void take(const Accessor& data, std::uint64_t width) {
         if (data.count * width > unread_) source_.fail("its meshes use the same data over and over");
         unread_ -= data.count * width;
     }
 
-    /// @return the number of the accessor's first vertex; primitives may share one
+    /// @return the index of the accessor's first vertex, and their number; primitives may use the same accessor
     std::pair<std::uint64_t, std::uint64_t> vertices(const Json& number) {
         const Accessor data = accessor(number, "VEC3", 3);
         if (data.component != 5126) unsupported("positions that are not floats");
@@ -165,7 +166,7 @@ private:
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
                 const Vec3 at{translation_[0] + p[0], translation_[1] + p[1], translation_[2] + p[2]};
-                builder_.vertex({at[0], -at[2], at[1]});  // from y up, which glTF prescribes
+                builder_.vertex({at[0], -at[2], at[1]});  // from y up, as glTF prescribes, to z up
             }
         }
         return {known->second, data.count};
@@ -207,12 +208,14 @@ private:
     std::string_view text_, binary_;
     Json json_;
     std::uint64_t unread_ = 0;
-    Vec3 translation_{0, 0, 0};  ///< of the mesh at hand
+    Vec3 translation_{0, 0, 0};  ///< of the current mesh
     std::unordered_map<std::uint64_t, std::uint64_t> first_vertex_;
 };
 
 nlohmann::json glb_material(const NamedMesh& named) {
-    const auto linear = [](std::uint8_t c) { return std::pow(c / 255.0, 2.2); };  // glTF's factors are linear, not sRGB
+    const auto linear = [](std::uint8_t c) {
+        return std::pow(c / 255.0, 2.2);
+    };  // glTF's colour factors are linear, not sRGB
     return {{"name", named.name},
             {"pbrMetallicRoughness",
              {{"baseColorFactor", {linear(named.color[0]), linear(named.color[1]), linear(named.color[2]), 1.0}},

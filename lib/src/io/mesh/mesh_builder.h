@@ -16,7 +16,7 @@ namespace covol::mesh_io {
 
 using Face = std::array<std::uint32_t, 3>;
 
-/// Makes triangles of vertices and faces, and checks them.
+/// Builds a mesh from vertices and faces, and checks them.
 class MeshBuilder final : public Receiver {
 public:
     explicit MeshBuilder(const Source& source) : source_(source) {}
@@ -33,26 +33,27 @@ public:
         mesh_.vertices.push_back(p);
     }
 
-    /// A vertex as the mesh has it: relative to its origin, which is a whole number near the first vertex where that is
-    /// far from 0. Numbers in single precision lose nothing, for their differences are such numbers too.
+    /// A vertex relative to the mesh's origin. If the first vertex is far from 0, the origin is a point with integer
+    /// coordinates near it. Numbers in single precision lose nothing, because their differences from the origin are
+    /// also in single precision.
     std::array<float, 3> held(const Vec3& position) {
         if (vertex_count() == 0) mesh_.origin = choose_mesh_origin({position, position}, 1);
         return {float(position[0] - mesh_.origin[0]), float(position[1] - mesh_.origin[1]),
                 float(position[2] - mesh_.origin[2])};
     }
 
-    /// Pieces with a repeated corner have no area and are left out.
+    /// Triangles with a repeated corner have no area and are omitted.
     void face(const std::vector<std::uint32_t>& corners) override {
         if (corners.size() == 3) return triangle(corners[0], corners[1], corners[2]);
         for (const std::uint32_t v : corners)
-            if (v >= vertex_count()) {  // it comes later
+            if (v >= vertex_count()) {  // its vertex follows later
                 waiting_.push_back(corners);
                 return;
             }
         polygon(corners);
     }
 
-    /// Faces may come before the vertices that they name, so their numbers are checked here.
+    /// Checks the remaining faces: they may precede the vertices that they refer to.
     TriangleMesh finish() {
         for (const std::vector<std::uint32_t>& corners : waiting_) {
             for (const std::uint32_t v : corners) check(v);
@@ -87,7 +88,7 @@ private:
 
     const Source& source_;
     TriangleMesh mesh_;
-    std::vector<std::vector<std::uint32_t>> waiting_;  ///< polygons of vertices that were yet to come
+    std::vector<std::vector<std::uint32_t>> waiting_;  ///< polygons that refer to vertices not read yet
 };
 
 }  // namespace covol::mesh_io

@@ -1,5 +1,5 @@
 #pragma once
-// A reader and a writer for each format of meshes; clouds are read from PLY, OBJ and OFF by the same readers.
+// A reader and a writer for each format of meshes. The readers of PLY, OBJ and OFF are also used for clouds.
 #include <array>
 #include <cstdint>
 #include <string>
@@ -12,13 +12,13 @@
 
 namespace covol::mesh_io {
 
-/// Counts of the file are checked against its size before the receiver hears of them.
-/// @param source  the file's text from its begin; errors say where in it
-/// @throws Error InvalidInput, Unsupported; what the receiver throws.
+/// Counts in the file are checked against its size before they are passed to the receiver.
+/// @param source  the file's text from its beginning; errors state the position in it
+/// @throws Error InvalidInput, Unsupported; and whatever the receiver throws.
 void read_ply(Source& source, Receiver& receiver);
 void read_obj(Source& source, Receiver& receiver);
 void read_off(Source& source, Receiver& receiver);
-/// @param text  the whole file, whose size tells binary from ASCII
+/// @param text  the whole file, whose size distinguishes binary from ASCII
 [[nodiscard]] TriangleMesh read_stl(Source& source, std::string_view text);
 [[nodiscard]] TriangleMesh read_glb(Source& source, std::string_view text);
 
@@ -28,9 +28,9 @@ void write_off(Output& out, const Prepared& in);
 void write_stl(Output& out, const Prepared& in);
 void write_glb(Output& out, const Prepared& in);
 
-/// Comments without line breaks.
+/// The comments with their line breaks removed.
 std::vector<std::string> one_line_each(std::vector<std::string> comments);
-/// A vertex or a mesh's origin, scaled, and turned where the options say y up.
+/// A vertex or a mesh's origin, scaled, and rotated if the options require y up.
 template <typename Real>
 std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOptions& options) {
     std::array<Real, 3> p = vertex;
@@ -39,23 +39,24 @@ std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOpt
     return p;
 }
 
-/// Tells of a format that holds single precision alone, and so no origin.
+/// Reports the origin of a mesh if the format cannot store it because it holds only single precision.
 void report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
-/// What begins a PLY file, up to its vertices. @throws Error Unsupported (more vertices than its numbers tell apart).
+/// The beginning of a PLY file, up to its vertices. @throws Error Unsupported (more vertices or triangles than its
+/// indices allow).
 struct PlyCounts {
     std::uint64_t vertices, triangles;
 };
 void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const std::vector<std::string>& comments,
                       const std::vector<VertexAttribute>& attributes, bool binary);
 void write_ply_face(Output& out, const Face& triangle);
-/// What begins a binary STL file. @throws Error Unsupported (more than 2^32 - 1 triangles).
+/// Writes the beginning of a binary STL file. @throws Error Unsupported (more than 2^32 - 1 triangles).
 void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<std::string>& comments);
 void write_stl_facet(Output& out, const std::array<std::array<float, 3>, 3>& corners);
-/// @param first  the number of the mesh's first vertex in the file, from 1
+/// @param first  the index of the mesh's first vertex in the file, from 1
 void write_obj_face(Output& out, const Face& triangle, std::uint64_t first);
 
-/// One of several meshes in a file. @param first  the number of its first vertex in the file, from 1
+/// Writes one of several meshes in a file. @param first  the index of its first vertex in the file, from 1
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first);
 
 /// One mesh of a .glb file; without a name it has no material either.

@@ -17,8 +17,8 @@
 #include "io/mesh/mesh_formats.h"
 #include "mesh/vertex_normals.h"
 
-// Own readers and writers: OpenMesh's readers trust the counts in a file's header, drop triangles that are not manifold
-// and print about it, and its writers have no comments.
+// These readers and writers replace those of OpenMesh: its readers trust the counts in a file's header, drop triangles
+// that are not manifold and print messages about it, and its writers do not support comments.
 namespace covol {
 namespace {
 
@@ -58,9 +58,13 @@ Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const W
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
     WriteMeshOptions placing = options;
     placing.y_up = options.y_up.value_or(extension == ".glb");
-    Prepared result{
-        mesh.triangles,     mesh.vertices, Places(placed(mesh.origin, placing)), {}, one_line_each(options.comments),
-        options.attributes, options.binary};
+    Prepared result{mesh.triangles,
+                    mesh.vertices,
+                    PositionWriter(placed(mesh.origin, placing)),
+                    {},
+                    one_line_each(options.comments),
+                    options.attributes,
+                    options.binary};
     for (auto& p : result.vertices) p = placed(p, placing);
     if (extension == ".ply" || extension == ".obj" || extension == ".glb")
         result.normals = meshing::vertex_normals(result.vertices, mesh.triangles);

@@ -1,5 +1,5 @@
 #pragma once
-// What the writers of mesh files share.
+// Code that is common to the writers of mesh files.
 #include <array>
 #include <bit>
 #include <charconv>
@@ -17,11 +17,12 @@ namespace covol::mesh_io {
 
 static_assert(std::endian::native == std::endian::little, "binary mesh files are written in the machine's byte order");
 
-/// A text or binary file that is put together: in memory, or in a file, of which a piece is in memory.
+/// A text or binary file that is being written: in memory, or to a file through a buffer.
 class Output {
 public:
     Output() = default;
-    /// @throws Error Io when it cannot be written to, like all that follows. @param name  the file as errors call it
+    /// @throws Error Io if the file cannot be written; the same holds for all other functions. @param name  of the file
+    /// in error messages
     Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) {
         check();
     }
@@ -42,9 +43,9 @@ public:
     void pad(std::size_t multiple, char fill) {
         while ((flushed_ + data_.size()) % multiple != 0) data_ += fill;
     }
-    /// What is in memory: all, unless there is a file.
+    /// The contents of the buffer: everything, unless there is a file.
     [[nodiscard]] const std::string& data() const { return data_; }
-    /// Bytes so far.
+    /// Number of bytes written so far.
     [[nodiscard]] std::uint64_t size() const { return flushed_ + data_.size(); }
     void close() {
         flush();
@@ -84,10 +85,10 @@ Output& operator<<(Output& out, const std::array<Real, 3>& p) {
     return out << p[0] << " " << p[1] << " " << p[2];
 }
 
-/// Vertices as a file holds them: in single precision, but where the mesh has an origin of its own.
-class Places {
+/// Writes positions as a file stores them: in single precision, unless the mesh has an origin other than 0.
+class PositionWriter {
 public:
-    explicit Places(const Vec3& origin) : origin_(origin) {}
+    explicit PositionWriter(const Vec3& origin) : origin_(origin) {}
     [[nodiscard]] bool is_far() const { return origin_ != Vec3{0, 0, 0}; }
     [[nodiscard]] const Vec3& origin() const { return origin_; }
     [[nodiscard]] Vec3 whole(const std::array<float, 3>& p) const {
@@ -100,11 +101,11 @@ private:
     Vec3 origin_;
 };
 
-/// What every format needs: placed vertices, their normals where it has any, one-line comments.
+/// Input of all formats: placed vertices, normals if there are any, and one-line comments.
 struct Prepared {
     const std::vector<std::array<std::uint32_t, 3>>& triangles;
     std::vector<std::array<float, 3>> vertices;
-    Places places;
+    PositionWriter places;
     std::vector<std::array<float, 3>> normals;
     std::vector<std::string> comments;
     std::vector<VertexAttribute> attributes;

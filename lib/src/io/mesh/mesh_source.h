@@ -1,5 +1,5 @@
 #pragma once
-// What the readers of mesh files share: where they read from, and whom they tell what the file holds.
+// Code that is common to the readers of mesh files: their input, and the interface that receives the contents.
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -13,10 +13,10 @@
 
 namespace covol::mesh_io {
 
-/// A file in memory, read line by line or byte by byte; knows where it is for messages.
+/// A file in memory, read line by line or byte by byte. It keeps the position for messages.
 class Source {
 public:
-    /// @param reader  the function that messages begin with; path and text must outlive this
+    /// @param reader  name of the function, which messages begin with; path and text must outlive this object
     Source(const char* reader, const std::string& path, std::string_view text)
         : reader_(reader), path_(path), lines_(text) {}
 
@@ -39,7 +39,7 @@ public:
         return line;
     }
 
-    /// From here on messages name no line.
+    /// From here on messages do not name a line.
     std::string_view bytes(std::size_t count) {
         is_text_ = false;
         if (count > bytes_left()) fail("the file is cut off");
@@ -58,7 +58,7 @@ public:
         return *value;
     }
 
-    /// The first three numbers of what is left of a line.
+    /// The first three numbers of the remaining line.
     Vec3 three_numbers(std::string_view line) {
         Vec3 p{};
         for (std::size_t a = 0; a < 3; ++a) {
@@ -88,21 +88,21 @@ private:
     bool is_text_ = true;
 };
 
-/// Takes what a file holds, in the file's order: read_mesh() makes triangles of it, read_points() a cloud. What it does
-/// not want is not looked at beyond where it ends.
+/// Receives the contents of a file in the order in which they are stored: read_mesh() makes triangles of them,
+/// read_points() a cloud. Contents that it does not want are only skipped, not checked.
 class Receiver {
 public:
     virtual ~Receiver() = default;
     [[nodiscard]] virtual bool wants_faces() const { return false; }
     [[nodiscard]] virtual bool wants_normals() const { return false; }
-    /// So many at most; the file has room for them.
+    /// Announces the maximum number of vertices; the file is large enough for them.
     virtual void expect_vertices(std::size_t count, bool with_normals) = 0;
     virtual void vertex(const Vec3& position) = 0;
-    /// The next vertex's that has none yet; any length.
+    /// The normal of the first vertex that has none yet; of any length.
     virtual void normal(const Vec3&) {}
-    /// A face gives a vertex another normal than the one of its number.
+    /// Called if a face refers to a normal whose index differs from that of the vertex.
     virtual void mixed_normals() {}
-    /// May name vertices that are yet to come, or that there are not.
+    /// The corners may refer to vertices that follow later, or that do not exist.
     virtual void face(const std::vector<std::uint32_t>&) {}
 };
 

@@ -28,7 +28,7 @@ private:
     Output out_;
 };
 
-/// PLY and OBJ: the faces wait in a file of their own until all vertices are there.
+/// PLY and OBJ: the faces are kept in a temporary file until all vertices are written.
 class IndexedStream : public MeshStream {
 public:
     IndexedStream(const std::string& path, const std::string& name, bool ply, const PlyCounts& counts,
@@ -68,7 +68,7 @@ public:
         faces_.close();
         std::ofstream whole(path_, std::ios::binary | std::ios::app);
         std::ifstream faces(faces_file_, std::ios::binary);
-        // An empty stream buffer would be an error.
+        // Inserting an empty stream buffer would set the error state.
         if (faces.peek() != std::ifstream::traits_type::eof()) whole << faces.rdbuf();
         whole.close();
         if (!whole || faces.bad()) throw Error(Errc::Io, name_ + ": cannot be written");
@@ -77,7 +77,7 @@ public:
 private:
     const std::string path_, name_;
     const bool ply_;
-    const Places places_;
+    const PositionWriter places_;
     const std::string faces_file_;
     Output out_, faces_;
 };

@@ -7,15 +7,15 @@
 
 #include "covol/mesh_io.h"
 
-// Files of meshes that come in pieces: vertices in the order of their numbers, triangles in any.
+// Writes meshes that are produced in pieces: vertices in the order of their indices, triangles in any order.
 namespace covol::mesh_io {
 
 class MeshStream {
 public:
-    /// @param path  to write to, a temporary one
-    /// @param name  of the file, whose ending says the format: .ply, .stl or .obj
+    /// @param path  to write to; a temporary file
+    /// @param name  of the file, whose extension gives the format: .ply, .stl or .obj
     /// @param origin  of the mesh; vertices are relative to it
-    /// @throws Error Io, Unsupported (more than the format holds).
+    /// @throws Error Io, Unsupported (more than the format can hold).
     static std::unique_ptr<MeshStream> open(const std::string& path, const std::string& name, std::uint64_t vertices,
                                             std::uint64_t triangles, const Vec3& origin,
                                             const std::vector<std::string>& comments);

@@ -12,12 +12,12 @@ using detail::lower, detail::next_word, detail::quote, detail::to_number, detail
 
 namespace {
 
-/// The counts may follow on the same line; what is left of it.
+/// The rest of the line with the keyword, which may contain the counts.
 std::string_view read_key(Source& source) {
     std::string_view line = source.content_line();
     const std::string_view key = next_word(line);
     if (!lower(key).ends_with("off")) source.fail("expected 'OFF' in the first line, got " + quote(key));
-    // A small n before OFF stands for n dimensions, a capital one for normals.
+    // A small n before OFF means n dimensions, a capital one normals.
     if (key.find('4') != std::string_view::npos || key.ends_with("nOFF"))
         source.unsupported("expected three coordinates, got " + quote(key));
     std::string_view rest = line;
@@ -25,15 +25,14 @@ std::string_view read_key(Source& source) {
     return trim(line);
 }
 
-/// @param fewest_bytes  that one of them takes
-std::size_t read_count(const Source& source, std::string_view& line, const std::string& what,
-                       std::size_t fewest_bytes) {
+/// @param min_bytes  minimum size of one of them in the file
+std::size_t read_count(const Source& source, std::string_view& line, const std::string& what, std::size_t min_bytes) {
     const std::string_view word = next_word(line);
     const auto count = to_number(word);
     if (!count)
         source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
-    // One too many is told where the file ends.
-    if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / fewest_bytes + 1))
+    // One more is accepted here: the error is then reported at the end of the file.
+    if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / min_bytes + 1))
         source.fail("expected no more than the file has room for, a file of this size cannot hold " + quote(word) +
                     " " + what);
     return std::size_t(*count);

@@ -1,4 +1,4 @@
-// PLY: ASCII and both byte orders, with elements and properties of any kind beside the mesh.
+// PLY: ASCII and both byte orders; the file may hold other elements and properties besides the mesh.
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -21,7 +21,7 @@ enum class PlyType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
 struct PlyProperty {
     std::string name;  ///< in lower case
     PlyType type = PlyType::Float;
-    std::optional<PlyType> count;  ///< of a list
+    std::optional<PlyType> count;  ///< type of a list's length
 };
 struct PlyElement {
     std::string name;
@@ -32,7 +32,7 @@ struct PlyElement {
         return std::any_of(properties.begin(), properties.end(),
                            [](const PlyProperty& p) { return p.count.has_value(); });
     }
-    /// A property's place among all; their number where there is none of that name that is no list.
+    /// Index of the scalar property with this name; the number of properties if there is none.
     [[nodiscard]] std::size_t number_named(std::string_view wanted) const {
         const auto at = std::find_if(properties.begin(), properties.end(),
                                      [&](const PlyProperty& p) { return p.name == wanted && !p.count; });
@@ -98,7 +98,7 @@ public:
     }
 
 private:
-    /// Where a property stands in the row at hand: its first word, or its first byte, behind the length of a list.
+    /// Position of a property in the current row: its first word, or its first byte, after the length of a list.
     struct Place {
         std::size_t at = 0, count = 1;
     };
@@ -151,13 +151,13 @@ private:
         elements_.back().properties.push_back(property);
     }
 
-    /// Refuses counts that the rest of the file has no room for, before any memory is taken.
-    /// @param wanted  as of for_each_row()
+    /// Rejects counts that exceed the remaining file, before any memory is allocated.
+    /// @param wanted  as in for_each_row()
     void check_size(const PlyElement& element, std::size_t wanted) const {
         std::uint64_t minimum = 0, room = source_.bytes_left();
         if (format_ == PlyFormat::Ascii) {
             minimum = 2 * std::max<std::uint64_t>(wanted, 1);
-            ++room;  // the last line may lack its end
+            ++room;  // the last line may lack its line end
         } else {
             for (const PlyProperty& property : element.properties)
                 minimum += size_of(property.count.value_or(property.type));
@@ -172,9 +172,9 @@ private:
                      quote(element.name) + ", got " + std::to_string(got) + "; it is truncated");
     }
 
-    /// Calls visit() for each row, for which value() and values() then hold.
-    /// @param wanted  that many properties, from the first, have to be there in the lines of a text; a row that lacks
-    ///                others is let pass unless it is the last, which tells that the file ends early
+    /// Calls visit() for each row; value() and values() then refer to that row.
+    /// @param wanted  number of properties, from the first, that every line of an ASCII file must have; a row that
+    ///                lacks later ones is accepted unless it is the last, because then the file is truncated
     template <typename Visit>
     void for_each_row(const PlyElement& element, std::size_t wanted, const Visit& visit) {
         if (element.properties.empty()) return;
@@ -226,7 +226,7 @@ private:
         }
     }
 
-    /// All of one size, for which check_size() has found the room.
+    /// Reads rows of a constant size; check_size() has checked that the file holds them.
     template <typename Visit>
     void for_each_record(const PlyElement& element, const Visit& visit) {
         std::size_t bytes = 0;
@@ -252,7 +252,7 @@ private:
         source_.bytes(at);
     }
 
-    /// @return what the row takes; 0 where that is more than there are bytes left
+    /// @return the size of the row; 0 if it exceeds the remaining bytes
     std::size_t find_bytes(const PlyElement& element, std::size_t left) {
         std::size_t at = 0;
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
@@ -274,7 +274,7 @@ private:
         return at;
     }
 
-    /// Of a property's entry of that number; nothing of a word that is no number.
+    /// The value of an entry of a property; nothing if the word is not a number.
     [[nodiscard]] std::optional<double> find_value(const PlyElement& element, std::size_t p,
                                                    std::size_t entry = 0) const {
         const PlyType type = element.properties[p].type;
@@ -334,7 +334,7 @@ private:
     PlyFormat format_ = PlyFormat::Ascii;
     bool swap_ = false;
     std::vector<PlyElement> elements_;
-    // the row at hand
+    // the current row
     std::vector<std::string_view> words_;
     const char* row_ = nullptr;
     std::vector<Place> places_;
@@ -346,7 +346,7 @@ void read_ply(Source& source, Receiver& receiver) { PlyReader(source, receiver).
 
 void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const std::vector<std::string>& comments,
                       const std::vector<VertexAttribute>& attributes, bool binary) {
-    // Many readers keep the numbers of vertices as int, and the count of faces too.
+    // Many readers store vertex indices and the number of faces as int.
     constexpr std::uint64_t kMax = std::numeric_limits<std::int32_t>::max();
     if (counts.vertices > kMax || counts.triangles > kMax)
         throw Error(Errc::Unsupported, "PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +

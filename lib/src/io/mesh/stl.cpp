@@ -14,12 +14,12 @@
 namespace covol::mesh_io {
 namespace {
 
-/// STL repeats a vertex in each of its triangles; equal positions become one.
+/// STL repeats a vertex in each of its triangles; equal positions are merged.
 class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
     void corner(const Vec3& p) {
-        const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };  // -0 is 0
+        const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };  // so that -0 equals 0
         const std::array<float, 3> held = mesh_.held(p);
         const auto [at, is_new] =
             known_.try_emplace({bits(held[0]), bits(held[1]), bits(held[2])}, std::uint32_t(mesh_.vertex_count()));
@@ -89,7 +89,7 @@ void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<st
     if (triangles > std::numeric_limits<std::uint32_t>::max())
         throw Error(Errc::Unsupported, "STL holds at most 2^32 - 1 triangles, the mesh has " +
                                            std::to_string(triangles) + "; decimate it or use larger voxels");
-    // A header that begins with "solid" would be taken for text.
+    // A header that begins with "solid" would be taken for ASCII.
     std::array<char, 80> header{};
     const std::string text = "covol" + (comments.empty() ? std::string() : ": " + comments.front());
     std::copy_n(text.begin(), std::min(text.size(), header.size()), header.begin());

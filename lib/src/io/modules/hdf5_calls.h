@@ -3,9 +3,9 @@
 
 #include "io/modules/modules.h"
 
-// The HDF5 library's functions under their own names, for namespace covol::detail: there a name finds what stands here
-// before the function itself, which is in a module that may not be loaded yet. One that is missing here is found when a
-// program is linked.
+// Wrappers with the names of the HDF5 library's functions. In namespace covol::detail, name lookup finds them before
+// the functions themselves, which are in a module that may not be loaded yet. A call to a function that is missing in
+// this list causes an error when a program is linked.
 // clang-format off
 #define COVOL_HDF5_FUNCTIONS(X) \
     X(H5open) X(H5check_version) X(H5Aclose) X(H5Aexists_by_name) X(H5Aget_space) X(H5Aget_type) \
@@ -19,7 +19,7 @@
     X(H5Sget_simple_extent_npoints) X(H5Sget_simple_extent_type) X(H5Sselect_hyperslab) X(H5Tclose) X(H5Tcopy) \
     X(H5Tequal) X(H5Tget_class) X(H5Tget_order) X(H5Tget_size) X(H5Tget_super) X(H5Tis_variable_str) \
     X(H5Tset_ebias) X(H5Tset_fields) X(H5Tset_order) X(H5Tset_size) X(H5Zfilter_avail) X(H5Zget_filter_info)
-// Variables, set by H5open(), behind H5T_NATIVE_DOUBLE and the like.
+// Variables, set by H5open(), that H5T_NATIVE_DOUBLE and similar macros refer to.
 #define COVOL_HDF5_NUMBERS(X) \
     X(H5P_CLS_FILE_ACCESS_ID_g) X(H5P_CLS_LINK_ACCESS_ID_g) X(H5T_IEEE_F32LE_g) X(H5T_IEEE_F64LE_g) \
     X(H5T_NATIVE_DOUBLE_g) X(H5T_STD_I8LE_g) X(H5T_STD_I16LE_g) X(H5T_STD_I32LE_g) X(H5T_STD_I64LE_g) \

@@ -10,8 +10,8 @@
 
 namespace covol::detail {
 
-/// ITK's own warnings, which it would print, are off while this lives. Visible, and so one for all modules that count
-/// those which live.
+/// Suppresses ITK's own warnings, which it would print, while this object exists. Its visibility makes it unique across
+/// modules, so that they share one count of the existing objects.
 class __attribute__((visibility("default"))) QuietItk {
 public:
     QuietItk() { itk::Object::SetGlobalWarningDisplay(false); }
@@ -23,8 +23,8 @@ private:
     bool before_ = itk::Object::GetGlobalWarningDisplay();
 };
 
-/// Runs one call into ITK. Its warnings, which it would print, are off meanwhile, and its many-lined exceptions become
-/// one line.
+/// Runs one call into ITK. Meanwhile ITK's warnings, which it would print, are suppressed, and its multi-line
+/// exceptions are shortened to one line.
 template <typename Call>
 void with_itk(const std::string& unusable, Call&& call) {
     const WhileAny<QuietItk> quiet;
@@ -42,7 +42,7 @@ void with_itk(const std::string& unusable, Call&& call) {
         throw Error(Errc::InvalidInput, unusable + " (" + one_line(e.GetDescription()) + ")");
     } catch (const std::exception& e) {
         throw Error(Errc::InvalidInput, unusable + " (" + one_line(e.what()) + ")");
-    } catch (...) {  // HDF5's own exceptions have no base
+    } catch (...) {  // HDF5's own exceptions have no base class
         throw Error(Errc::InvalidInput, unusable);
     }
 }
@@ -64,7 +64,7 @@ inline PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase&
     }
 }
 
-/// One of ITK's readers. Made directly: a static library has no registered factories.
+/// One of ITK's readers. It is constructed directly, because a static library has no registered factories.
 template <typename Io>
 class ItkIo : public ItkReader {
 public:

@@ -1,4 +1,4 @@
-// Where the library is static: covol-reader in a folder beside the program's, as the library's would be.
+// For a static library: covol-reader is in a folder next to the program's, in which the library's folder would be, too.
 #include <filesystem>
 
 #include "covol/version.h"

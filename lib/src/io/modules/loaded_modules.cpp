@@ -1,4 +1,4 @@
-// The modules of the shared library, loaded from a folder beside it.
+// The modules of the shared library, loaded from a folder next to it.
 #include <dlfcn.h>
 
 #include <filesystem>
@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder has the version in its name: libcovol and its modules must be of one build.
+/// The folder of the modules. Its name contains the version, because libcovol and its modules must come from one build.
 fs::path folder_of_modules() {
     Dl_info here{};
     std::error_code status;
@@ -24,7 +24,8 @@ fs::path folder_of_modules() {
 
 fs::path path_of_module(const std::string& name) { return folder_of_modules() / (name + ".so"); }
 
-/// It stays loaded until the program ends: libraries below it have threads and handlers of their own.
+/// Loads a module, which stays loaded until the program ends, because the libraries that it uses have threads and
+/// handlers.
 template <typename Module>
 const Module& load(const std::string& name, const char* formats) {
     const fs::path path = path_of_module(name);

@@ -6,21 +6,21 @@
 
 #include "covol/image.h"
 
-// Libraries that are loaded when a file first needs them: ITK, GDCM and HDF5 bring sixty others along, and loading
-// those takes as long as a small job. Each lies behind a module, a shared library that knows nothing else of covol.
-// Where covol is static, and in the tests, the modules are linked instead.
+// Libraries that are loaded when a file first needs them: ITK, GDCM and HDF5 depend on sixty others, and loading those
+// takes as long as a small job. Each is wrapped by a module, a shared library that does not depend on the rest of
+// covol. If covol is static, and in the tests, the modules are linked instead.
 namespace covol::detail {
 
-/// What ITK says of an image; of each dimension where a list.
+/// Description of an image by ITK; lists have one entry for each dimension.
 struct ItkHeader {
-    PixelType type = PixelType::UInt8;  ///< of one component
+    PixelType type = PixelType::UInt8;  ///< type of one component
     unsigned components = 1;
     bool is_rgb = false;
     std::vector<std::uint64_t> size;
     std::vector<double> spacing, origin;
     std::vector<std::vector<double>> axes;  ///< directions, one for each dimension
     std::int64_t bytes = 0;                 ///< of all pixels
-    double slope = 1, intercept = 0;        ///< by which a DICOM file's pixels are rescaled when they are read
+    double slope = 1, intercept = 0;        ///< rescaling that is applied to a DICOM file's pixels when they are read
 };
 
 /// An image file whose header ITK has read.
@@ -32,7 +32,7 @@ public:
     virtual ~ItkReader() = default;
 
     [[nodiscard]] const ItkHeader& header() const noexcept { return header_; }
-    /// The pixels of a box of all dimensions. @throws Error InvalidInput, with `unusable`.
+    /// Reads the pixels of a box, given along all dimensions. @throws Error InvalidInput with the message `unusable`.
     virtual void read(const std::vector<std::uint64_t>& begin, const std::vector<std::uint64_t>& size, void* out) = 0;
     void read_all(void* out) { read(std::vector<std::uint64_t>(header_.size.size(), 0), header_.size, out); }
 
@@ -40,24 +40,24 @@ protected:
     ItkHeader header_;
 };
 
-/// @throws Error InvalidInput, with `unusable`; Unsupported (types).
+/// @throws Error InvalidInput with the message `unusable`; Unsupported (types).
 using OpenWithItk = std::unique_ptr<ItkReader>(const std::string& path, const std::string& unusable);
 
 /// ITK without its heavier readers.
 struct ItkModule {
     OpenWithItk *open_nrrd, *open_meta;
 };
-/// DICOM through ITK's GDCM.
+/// DICOM by ITK's GDCM.
 struct GdcmModule {
     OpenWithItk* open;
 };
-/// The HDF5 library, and ITK's reader for files of its own layout.
+/// The HDF5 library, and ITK's reader for files in its own layout.
 struct Hdf5Module {
     OpenWithItk* open_itk;
     const struct Hdf5Calls* calls;
 };
 
-/// Loaded by the first call; several threads may call at once. @throws Error Io (it cannot be loaded).
+/// Loaded by the first call; safe to call from several threads. @throws Error Io (it cannot be loaded).
 const ItkModule& itk_module();
 const GdcmModule& gdcm_module();
 const Hdf5Module& hdf5_module();

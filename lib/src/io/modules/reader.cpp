@@ -15,9 +15,9 @@ const char* library_of(ReaderTask task) {
     return task == ReaderTask::ItkHeader || task == ReaderTask::ItkPixels ? "ITK" : "GDCM";
 }
 
-std::vector<Trial> try_task(ReaderTask task, const std::vector<Piece>& files, const SharedMemory& results,
-                            double seconds, const RunContext& run) {
-    return try_pieces(reader_program(), static_cast<std::uint32_t>(task), files, results, seconds, run);
+std::vector<PieceOutcome> try_task(ReaderTask task, const std::vector<Piece>& files, const SharedMemory& results,
+                                   double seconds, const RunContext& run) {
+    return run_pieces(reader_program(), static_cast<std::uint32_t>(task), files, results, seconds, run);
 }
 
 std::vector<std::uint64_t> begins_of(const std::vector<Piece>& files) {
@@ -73,13 +73,14 @@ std::optional<ItkHeader> FlatHeader::header() const {
 
 std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const std::vector<Piece>& files,
                                                          const RunContext& run) {
-    const std::vector<Trial> trials = try_task(task, files, SharedMemory(0), kMaxSecondsForHeader, run);
+    const std::vector<PieceOutcome> trials = try_task(task, files, SharedMemory(0), kMaxSecondsForHeader, run);
     std::vector<std::variant<ItkHeader, Error>> headers;
     for (std::size_t n = 0; n < files.size(); ++n) {
         FlatHeader flat;
         if (!trials[n].answer.empty()) std::memcpy(&flat, trials[n].answer.data(), sizeof flat);
         if (const auto error = reading_error(trials[n], files[n].path, library_of(task))) {
-            if (error->code() == Errc::Io) throw Error(*error);  // a module is missing: no fault of the file
+            if (error->code() == Errc::Io)
+                throw Error(*error);  // a module is missing, which is not the fault of the file
             headers.emplace_back(*error);
         } else if (const auto header = flat.header())
             headers.emplace_back(*header);
@@ -97,7 +98,7 @@ DecodedPixels::DecodedPixels(ReaderTask task, std::vector<Piece> files, const Ru
         files[n].begin = begin_[n];
         maximum = std::max(maximum, files[n].bytes);
     }
-    const std::vector<Trial> trials = try_task(task, files, memory_, max_seconds_for_pixels(maximum), run);
+    const std::vector<PieceOutcome> trials = try_task(task, files, memory_, max_seconds_for_pixels(maximum), run);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (const auto error = reading_error(trials[n], files[n].path, library_of(task))) throw Error(*error);
 }
@@ -106,7 +107,7 @@ void try_hdf5(const std::string& path, const std::string& inside) {
     Piece file;
     file.path = path;
     file.detail = inside;
-    const std::vector<Trial> trials =
+    const std::vector<PieceOutcome> trials =
         try_task(ReaderTask::Hdf5, {file}, SharedMemory(0), kMaxSecondsForHeader, RunContext());
     if (const auto error = reading_error(trials.front(), path, "HDF5")) throw Error(*error);
 }

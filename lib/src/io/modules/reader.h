@@ -9,34 +9,34 @@
 #include "io/child.h"
 #include "io/modules/modules.h"
 
-// Files that ITK, GDCM and the HDF5 library read in covol-reader, a program that lies beside the modules.
+// Reading of files with ITK, GDCM and the HDF5 library in covol-reader, a program in the folder of the modules.
 namespace covol::detail {
 
-/// Where it lies. @throws Error Io where that cannot be said.
+/// Path of covol-reader. @throws Error Io if it cannot be determined.
 std::string reader_program();
 
-/// What parts are for, in a few words.
+/// Short descriptions of what the parts are for.
 inline constexpr const char *kOfItk = "NRRD and MetaImage", *kOfGdcm = "compressed DICOM", *kOfHdf5 = "HDF5";
 
-/// Whether it is there and may be started.
+/// Whether covol-reader exists and may be executed.
 ReaderPart check_reader_program();
 
-/// What it is asked to do with a file. A Piece's detail begins the message where ITK or GDCM cannot read it, and names
-/// the dataset in an HDF5 file.
+/// The task of covol-reader for a file. A Piece's detail is the beginning of the message if ITK or GDCM cannot read the
+/// file, or the name of the dataset in an HDF5 file.
 enum class ReaderTask : std::uint32_t {
     ItkHeader,
     ItkPixels,
     GdcmHeader,
     GdcmPixels,
-    Hdf5,  ///< header and one voxel
+    Hdf5,  ///< the header and one voxel
 };
 
-/// An ItkHeader that memory can hold which is shared.
+/// An ItkHeader of fixed size, for shared memory.
 class FlatHeader {
 public:
-    /// @returns whether it has room for so many dimensions
+    /// @returns whether the number of dimensions fits
     [[nodiscard]] bool take(const ItkHeader& header);
-    /// Nothing where the program did not write one.
+    /// Nothing if the program has not written one.
     [[nodiscard]] std::optional<ItkHeader> header() const;
 
 private:
@@ -49,25 +49,28 @@ private:
     double slope_ = 1, intercept_ = 0;
 };
 
-/// What ITK or GDCM says of each file, or why it cannot read it. @throws Error Io, Cancelled; std::bad_alloc.
+/// The header of each file from ITK or GDCM, or the reason why it cannot be read. @throws Error Io, Cancelled;
+/// std::bad_alloc.
 std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const std::vector<Piece>& files,
                                                          const RunContext& run);
 
-/// The pixels of some files.
+/// The decoded pixels of several files.
 class DecodedPixels {
 public:
-    /// Decodes them, several at once. @param files  each with the bytes of its pixels, in the type that its header has
+    /// Decodes them, several at once.
+    /// @param files  each with the number of bytes of its pixels, in the type that its header states
     /// @throws Error InvalidInput, Unsupported, Io, Cancelled; std::bad_alloc.
     DecodedPixels(ReaderTask task, std::vector<Piece> files, const RunContext& run);
 
     [[nodiscard]] char* of(std::size_t n) const { return memory_.data() + begin_[n]; }
 
 private:
-    std::vector<std::uint64_t> begin_;  ///< and the end
+    std::vector<std::uint64_t> begin_;  ///< followed by the end of the last
     SharedMemory memory_;
 };
 
-/// Tries an HDF5 file. @throws Error InvalidInput (the library crashes), and what reading it threw; Io.
+/// Tries to read an HDF5 file in covol-reader. @throws Error InvalidInput (the library crashes), the error of reading
+/// it, Io.
 void try_hdf5(const std::string& path, const std::string& inside);
 
 }  // namespace covol::detail

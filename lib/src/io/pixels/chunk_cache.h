@@ -9,23 +9,24 @@
 
 namespace covol::detail {
 
-/// The chunks of one or several sources that were used last, up to a bound. Safe to use by several threads: a chunk
-/// that two of them ask for is decoded once.
+/// The most recently used chunks of one or several sources, up to a total size. Thread-safe: a chunk that two threads
+/// request is decoded once.
 class ChunkCache {
 public:
-    /// Its voxels, as ChunkSource::read() gives them; they stay as long as somebody holds them.
+    /// The voxels of a chunk, as read by ChunkSource::read(); they exist as long as anything refers to them.
     using Chunk = std::shared_ptr<const char[]>;
 
-    /// @param max_bytes  of all chunks together; a larger chunk is kept until the next one comes
+    /// @param max_bytes  of all chunks together; a larger chunk is kept until the next one is decoded
     explicit ChunkCache(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
 
-    /// @param source  outlives the cache
+    /// @param source  has to outlive the cache
     /// @throws as ChunkSource::read(), and Error InvalidInput at a value that is NaN or infinite.
     [[nodiscard]] Chunk get(const ChunkSource& source, const Index3& chunk);
 
-    [[nodiscard]] std::uint64_t bytes() const;  ///< that are kept
+    [[nodiscard]] std::uint64_t bytes() const;  ///< size of all chunks in the cache
     [[nodiscard]] std::uint64_t max_bytes() const noexcept { return max_bytes_; }
-    [[nodiscard]] std::uint64_t decoded() const;  ///< chunks so far; again those that were given up
+    [[nodiscard]] std::uint64_t decoded()
+        const;  ///< chunks so far, including those that were evicted and decoded again
 
 private:
     struct Key {
@@ -53,9 +54,9 @@ private:
 
     const std::uint64_t max_bytes_;
     mutable std::mutex mutex_;
-    std::list<Key> order_;  ///< what was used last stands first
+    std::list<Key> order_;  ///< most recently used first
     std::unordered_map<Key, Entry, Hash> entries_;
-    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< one for all chunks that a file does not have
+    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< one chunk for all those that a file does not have
     std::uint64_t bytes_ = 0, decoded_ = 0;
 };
 

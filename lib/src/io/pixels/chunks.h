@@ -7,8 +7,8 @@
 
 #include "io/pixels/raw_image.h"
 
-// Images that lie in chunks: boxes of one size, each packed on its own. Chunks of a Zarr store or an HDF5 dataset,
-// tiles or strips of a TIFF.
+// Images that are stored in chunks: boxes of one size, each packed separately. Chunks of a Zarr store or an HDF5
+// dataset, tiles or strips of a TIFF.
 namespace covol::detail {
 
 /// One channel and frame of such an image.
@@ -18,21 +18,21 @@ public:
     ChunkSource& operator=(const ChunkSource&) = delete;
     virtual ~ChunkSource() = default;
 
-    /// Decodes chunk c, counted along i, j, k from 0, into chunk_size() voxels, i fastest; beyond the image's end
-    /// anything may stand there. Several threads may call it at once.
-    /// @returns false where the file has no such chunk: its voxels are fill_value(), and `out` is as it was.
-    /// @throws Error InvalidInput (damaged), Io, Unsupported.
+    /// Decodes chunk c, counted along i, j, k from 0, into chunk_size() voxels, i fastest; the values beyond the end of
+    /// the image are undefined. Thread-safe. @returns false if the file has no such chunk: its voxels are fill_value(),
+    /// and `out` is unchanged. @throws Error InvalidInput (damaged), Io, Unsupported.
     [[nodiscard]] virtual bool read(const Index3& chunk, void* out) const = 0;
-    /// Of chunks that the file does not have.
+    /// Value of chunks that the file does not have.
     [[nodiscard]] virtual double fill_value() const noexcept { return 0; }
-    /// read(), or fill values where the file has no such chunk.
+    /// Like read(), but writes fill values if the file has no such chunk.
     void read_or_fill(const Index3& chunk, void* out) const;
-    /// A chunk of fill values.
+    /// Writes a chunk of fill values.
     void fill(void* out) const;
 
-    /// Chunks of one k cost little more together than one of them does: see ChunkedVoxels::load().
+    /// Whether decoding all chunks with the same k costs little more than decoding one of them: see
+    /// ChunkedVoxels::load().
     [[nodiscard]] virtual bool in_layers() const noexcept { return false; }
-    /// Decodes chunks that share their k, each to its own place.
+    /// Decodes chunks with the same k, each to its own destination.
     virtual void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const;
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
@@ -41,7 +41,7 @@ public:
     [[nodiscard]] const Index3& chunk_size() const noexcept { return chunk_size_; }  ///< voxels along i, j, k; >= 1
 
 protected:
-    /// @throws Error InvalidInput, Unsupported when chunks are larger than kMaxChunkBytes or have no voxels.
+    /// @throws Error InvalidInput, Unsupported if chunks are larger than kMaxChunkBytes or have no voxels.
     ChunkSource(std::string path, PixelType type, const Index3& size, const Index3& chunk_size);
 
 private:
@@ -50,18 +50,19 @@ private:
     Index3 size_, chunk_size_;
 };
 
-/// The part of `box` that chunk c of this size holds.
+/// The intersection of `box` with chunk c of this size.
 [[nodiscard]] VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size);
-/// The first and the last chunk that the box touches.
+/// The range of chunks that intersect the box.
 [[nodiscard]] VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size);
-/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite; `chunk` is the one that holds it.
+/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite; `chunk` is the chunk that contains
+/// it.
 void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk);
 
-/// What one chunk may take when it is unpacked. Zarr's own codecs stop at 2 GiB; the usual size is below 16 MiB.
+/// Maximum size of an unpacked chunk. Zarr's own codecs are limited to 2 GiB; the usual size is below 16 MiB.
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t(1) << 30;
 
-/// The chunks of a source, each decoded when its first voxel is asked for, and kept; those that the file does not have
-/// share one chunk of fill values. Safe to use by several threads.
+/// The chunks of a source, each decoded when its first voxel is requested, and kept. Those that the file does not have
+/// share one chunk of fill values. Thread-safe.
 class ChunkedVoxels {
 public:
     explicit ChunkedVoxels(std::shared_ptr<const ChunkSource> source);
@@ -70,21 +71,22 @@ public:
     ChunkedVoxels& operator=(const ChunkedVoxels&) = delete;
 
     [[nodiscard]] const ChunkSource& source() const noexcept { return *source_; }
-    [[nodiscard]] std::uint64_t chunk_count() const noexcept;                   ///< of the whole image
-    [[nodiscard]] std::uint64_t read_count() const noexcept { return reads_; }  ///< decoded so far, each once
+    [[nodiscard]] std::uint64_t chunk_count() const noexcept;                   ///< in the whole image
+    [[nodiscard]] std::uint64_t read_count() const noexcept { return reads_; }  ///< number of chunks decoded so far
 
-    /// The values of `box`, i fastest, in the source's type. @throws as ChunkSource::read, and InvalidInput at a value
-    /// that is NaN or infinite.
+    /// Copies the values of `box`, i fastest, in the source's type. @throws as ChunkSource::read, and InvalidInput at a
+    /// value that is NaN or infinite.
     void copy(const VoxelBox& box, void* out) const;
     [[nodiscard]] double at(const Index3& voxel) const;
-    /// Decodes what the boxes (of the image) need and is not there yet: in the file's order and in parallel, where at()
-    /// and copy() would take one chunk after the other as they come. Changes nothing else. Reports "image".
-    /// @throws as copy, and Error Cancelled, InvalidOptions when the chunks need more than run.memory_budget.
+    /// Decodes the chunks that the boxes (of the image) need and that are not decoded yet, in the file's order and in
+    /// parallel; at() and copy() would decode one chunk after the other as they are requested. Changes nothing else.
+    /// Reports "image". @throws as copy, and Error Cancelled, InvalidOptions if the chunks need more than
+    /// run.memory_budget.
     void load(const std::vector<VoxelBox>& boxes, const RunContext& run) const;
-    /// The numbers of the chunks that were decoded so far, ascending; not while others decode. Which they are depends
-    /// on what was asked for alone, not on threads.
+    /// The numbers of the chunks that were decoded so far, ascending; must not be called while other threads decode.
+    /// The result depends only on the requests, not on threads.
     [[nodiscard]] std::vector<std::uint64_t> read_chunks() const;
-    /// The image's voxels in a chunk.
+    /// The box of a chunk's voxels within the image.
     [[nodiscard]] VoxelBox box_of(std::uint64_t chunk) const noexcept;
 
 private:
@@ -96,20 +98,20 @@ private:
     [[nodiscard]] bool is_there(std::uint64_t number) const;
     void keep(std::uint64_t number, std::unique_ptr<char[]> voxels) const;
     [[nodiscard]] std::unique_ptr<char[]> chunk_memory() const;
-    /// Chunks that are decoded at once.
+    /// Decodes several chunks in one call.
     void load_together(const std::vector<std::uint64_t>& numbers) const;
 
     std::shared_ptr<const ChunkSource> source_;
-    Index3 counts_;  ///< chunks along i, j, k
+    Index3 counts_;  ///< number of chunks along i, j, k
     std::uint64_t serial_;
     std::unique_ptr<Table> table_;
     mutable std::atomic<std::uint64_t> reads_{0};
 };
 
-/// The voxels of `box`: a small box is decoded at once, of a large one each chunk when it is asked for.
+/// The voxels of `box`: a small box is decoded immediately, the chunks of a large one when they are requested.
 [[nodiscard]] Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run);
 
-/// A format that keeps all its images in chunks.
+/// An image file in a format that always stores images in chunks.
 class ChunkedFile : public ImageFile {
 public:
     [[nodiscard]] Pixels read(const PixelRequest& request, const RunContext& run) final {
@@ -121,7 +123,7 @@ public:
     }
 
 protected:
-    /// The request's channel and frame; its box does not matter.
+    /// The chunks of the request's channel and frame; its box is ignored.
     [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunks(const PixelRequest& request) const = 0;
 };
 

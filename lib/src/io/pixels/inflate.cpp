@@ -7,7 +7,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kAnyHeader = 15 + 32;  // gzip's or zlib's
+constexpr int kAnyHeader = 15 + 32;  // accepts headers of gzip and zlib
 constexpr int kNoHeader = -15;
 constexpr std::size_t kWindow = 32768;
 constexpr std::uint64_t kMinGap = std::uint64_t(8) << 20;
@@ -46,7 +46,7 @@ void Inflater::step() {
         if (stream_.avail_in == 0) good_ = false;
     }
     const int status = good_ ? inflate(&stream_, Z_NO_FLUSH) : Z_OK;
-    // a gzip file may be several streams behind each other
+    // a gzip file may be several streams in a row
     if (status == Z_STREAM_END)
         good_ = inflateReset(&stream_) == Z_OK;
     else if (status != Z_OK && status != Z_BUF_ERROR) {
@@ -76,7 +76,7 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
     places_.push_back(std::move(begin));
     std::uint64_t packed = 0, done = 0, reported = 0;
     bool first = true, ended = false;
-    // With all bytes there, one step more looks at the checksum; a file that lacks it is taken as it is.
+    // After the last byte, one more step verifies the checksum; a missing checksum is accepted.
     while (done < unpacked || (to_the_end && !ended)) {
         if (stream.avail_in == 0) {
             run.check();
@@ -102,7 +102,7 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
         } else if (status != Z_OK && status != Z_BUF_ERROR) {
             throw damaged();
         }
-        if (all_there && done > unpacked) return;  // more follows than is wanted: the end is elsewhere
+        if (all_there && done > unpacked) return;  // more data follows: the end of the stream is elsewhere
         const bool at_block = (stream.data_type & 128) != 0 && (stream.data_type & 64) == 0 && status == Z_OK;
         if (at_block && done >= places_.back().unpacked + gap) {
             Place place;

@@ -8,10 +8,10 @@
 
 #include "covol/run.h"
 
-// Streams that gzip or zlib packed, one or several behind each other.
+// Streams compressed by gzip or zlib, one or several in a row.
 namespace covol::detail {
 
-/// An unpacked view of a stream in a file, forwards.
+/// Decompresses a stream in a file sequentially.
 class Inflater {
 public:
     explicit Inflater(std::ifstream& file);
@@ -19,9 +19,9 @@ public:
     Inflater(const Inflater&) = delete;
     Inflater& operator=(const Inflater&) = delete;
 
-    /// Fills `out`; false when the stream ends before, or is damaged.
+    /// Fills `out`; returns false if the stream ends before, or is damaged.
     bool read(char* out, std::uint64_t count);
-    /// True unless the checksum behind the last byte that was read is there and wrong.
+    /// False only if there is a checksum after the last byte that was read and it is wrong.
     bool checksum_fits();
 
 private:
@@ -34,28 +34,29 @@ private:
     bool damaged_ = false;
 };
 
-/// Places where a packed stream can be entered in its middle, each with the 32 KiB before it that the packed bytes
-/// refer to: M. Adler's zran.c, among the examples of zlib. One for every 8 MiB of unpacked bytes, 4096 at most.
+/// Positions at which decompression of a stream can begin, each with the preceding 32 KiB that the compressed bytes
+/// refer to: M. Adler's zran.c, one of zlib's examples. One position for every 8 MiB of unpacked bytes, at most 4096.
 class InflateIndex {
 public:
     struct Place {
-        std::uint64_t unpacked = 0;  ///< bytes before it
+        std::uint64_t unpacked = 0;  ///< number of unpacked bytes before it
         std::uint64_t packed = 0;    ///< offset in the file of the first whole byte
-        int bits = 0;                ///< of the byte before that one, which belong to what follows
-        bool at_header = false;      ///< the stream's begin
+        int bits = 0;                ///< number of bits of the preceding byte that belong to the following data
+        bool at_header = false;      ///< the stream's beginning
         std::vector<unsigned char> window;
     };
 
-    /// Unpacks once the first `unpacked` bytes of the stream at `offset`, and looks at the checksum behind them where
+    /// Decompresses the first `unpacked` bytes of the stream at `offset` once, and verifies the checksum after them if
     /// `to_the_end`. Reports "image". @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
     InflateIndex(std::string path, std::uint64_t offset, std::uint64_t unpacked, bool to_the_end,
                  const RunContext& run);
 
     [[nodiscard]] const std::string& path() const { return path_; }
-    /// The last place at or before an unpacked byte.
+    /// The last position at or before an unpacked byte.
     [[nodiscard]] const Place& before(std::uint64_t unpacked) const;
     [[nodiscard]] std::size_t size() const { return places_.size(); }
-    /// Behind the checksum of a stream another one may begin: 8 bytes of gzip, 4 of zlib.
+    /// Size of a stream's trailer with the checksum, after which another stream may begin: 8 bytes for gzip, 4 for
+    /// zlib.
     [[nodiscard]] std::uint64_t trailer_bytes() const { return trailer_; }
 
 private:
@@ -64,7 +65,7 @@ private:
     std::vector<Place> places_;
 };
 
-/// An unpacked view that begins anywhere.
+/// Decompresses from any position.
 class IndexedInflater {
 public:
     IndexedInflater(const InflateIndex& index, std::uint64_t begin);
@@ -72,7 +73,7 @@ public:
     IndexedInflater(const IndexedInflater&) = delete;
     IndexedInflater& operator=(const IndexedInflater&) = delete;
 
-    /// False when the stream ends before, or is damaged.
+    /// False if the stream ends before, or is damaged.
     bool read(char* out, std::uint64_t count);
     bool skip(std::uint64_t count);
 
@@ -85,7 +86,7 @@ private:
     std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
     std::vector<char> skipped_;
     z_stream stream_{};
-    bool raw_ = false;  ///< between a header and its checksum, neither of which zlib sees
+    bool raw_ = false;  ///< decodes without zlib's handling of header and checksum, after starting within the stream
     bool good_ = true;
 };
 

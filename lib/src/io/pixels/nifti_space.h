@@ -5,25 +5,25 @@
 #include <optional>
 #include <string>
 
-// Fields of NIfTI-1's header. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
+// Fields of the NIfTI-1 header. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
 namespace covol::detail {
 
-/// Names of its units, by their codes; 0: not stated.
+/// Names of NIfTI's units, by their codes; 0: not stated.
 constexpr std::array<const char*, 4> kNiftiUnits{"", "m", "mm", "um"};
 
 namespace nifti {
 constexpr std::size_t kHeader = 348, kPixdim = 76, kCodes = 252, kQuatern = 256, kSrow = 280;  // bytes
 }
 
-/// How a file places its voxels in the world.
+/// The mapping of a file's voxels to the world.
 struct NiftiSpace {
-    std::array<std::int16_t, 2> codes{0, 0};  ///< qform_code, sform_code: what the world is; 0: not stated
-    float qfac = 1;                           ///< -1: a mirror image
+    std::array<std::int16_t, 2> codes{0, 0};  ///< qform_code, sform_code: the kind of world coordinates; 0: not stated
+    float qfac = 1;                           ///< -1 if the image is mirrored
     std::array<float, 6> qform{};             ///< quatern_b, c, d and qoffset_x, y, z
     std::array<float, 12> sform{};            ///< the rows srow_x, y, z
 };
 
-/// Of a file named .nii or .nii.gz; nothing of others, and of one that cannot be read.
+/// The mapping of a file named .nii or .nii.gz; nothing for others, and for files that cannot be read.
 [[nodiscard]] std::optional<NiftiSpace> read_nifti_space(const std::string& path);
 
 }  // namespace covol::detail

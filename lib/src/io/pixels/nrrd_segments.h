@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-// 3D Slicer's segmentations, .seg.nrrd: label images whose segments have names. Segments that overlap lie in layers,
-// which are the file's channels.
+// 3D Slicer's segmentations, .seg.nrrd: label images whose segments have names. Segments that overlap are in separate
+// layers, which are the file's channels.
 namespace covol::detail {
 
 struct NrrdSegment {
@@ -15,8 +15,8 @@ struct NrrdSegment {
 /// SegmentN_ID, _Name, _LabelValue and _Layer of the header. Empty for other files, and for those that cannot be read.
 [[nodiscard]] std::vector<NrrdSegment> read_nrrd_segments(const std::string& path);
 
-/// "FILE.seg.nrrd:name" is {"FILE.seg.nrrd", "name"}; no name where none is given, or where a file has the whole text
-/// as its name.
+/// Splits "FILE.seg.nrrd:name" into {"FILE.seg.nrrd", "name"}. The name is empty if none is given, or if there is a
+/// file whose name is the whole text.
 [[nodiscard]] std::pair<std::string, std::string> split_segment_name(const std::string& text);
 
 }  // namespace covol::detail

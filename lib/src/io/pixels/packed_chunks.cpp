@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-// Few slices: a brick that is asked for alone costs the layer up to its last row.
+// Bricks with few slices, because reading a single brick means decompressing its slices up to its last row.
 constexpr Index3 kBrick{64, 64, 16};
 
 class PackedChunks : public ChunkSource {

@@ -7,21 +7,21 @@
 
 namespace covol::detail {
 
-/// One channel and frame of a packed stream.
+/// One channel and frame of a compressed stream.
 struct PackedFrame {
-    PixelType type = PixelType::UInt8;  ///< of the image; the place's is that of the stored values
+    PixelType type = PixelType::UInt8;  ///< of the image; the type of the place is that of the stored values
     Index3 size{0, 0, 0};
-    std::uint64_t components = 1;  ///< values that a pixel has in the file, of which `channel` is read
+    std::uint64_t components = 1;  ///< number of values per pixel in the file, of which `channel` is read
     std::uint64_t channel = 0;
-    std::uint64_t begin = 0;  ///< unpacked bytes before the frame
-    bool is_last = true;      ///< nothing follows it but the checksum
+    std::uint64_t begin = 0;  ///< number of unpacked bytes before the frame
+    bool is_last = true;      ///< only the checksum follows
 };
 
-/// Voxels of its chunks.
+/// The size of the chunks in voxels.
 Index3 packed_chunk_size(const Index3& size);
 
-/// Bricks of a packed frame, decoded in layers of a few slices from the nearest place where the stream can be entered.
-/// Unpacks all of it once, which finds damage and takes 32 KiB for every 8 MiB.
+/// Bricks of a compressed frame, decoded in layers of a few slices from the nearest position at which decompression can
+/// begin. The constructor decompresses all of it once, which detects damage, and keeps 32 KiB for every 8 MiB.
 /// @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
 std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,
                                                  const PackedFrame& frame, const RunContext& run);

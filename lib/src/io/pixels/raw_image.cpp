@@ -21,9 +21,10 @@
 namespace covol::detail {
 namespace {
 
-// Deflate packs at most 1032 : 1 and LZW about 2700 : 1; the newer TIFF codecs go higher on constant slices.
+// The maximum ratio of Deflate is 1032 : 1, that of LZW about 2700 : 1; newer TIFF codecs exceed these on constant
+// slices.
 constexpr std::uint64_t kMaxCompression = 20000;
-// Smaller files are read: a mapping of theirs saves nothing, and reading finds errors of the disk here.
+// Smaller files are read: mapping them saves nothing, and reading detects disk errors here.
 constexpr std::uint64_t kMapFrom = std::uint64_t(256) << 20;
 
 struct Unit {
@@ -46,14 +47,14 @@ constexpr Spelling kSpellings[] = {
     {"in", "inch"},        {"inches", "inch"},    {"\xC3\x85", "angstrom"}, {"pixel", ""},
     {"pixels", ""},        {"voxel", ""},         {"reference frame", ""}};
 
-/// The bytes of a PixelPlace, forwards only.
+/// Reads the bytes of a PixelPlace sequentially.
 class PixelStream {
 public:
     explicit PixelStream(const PixelPlace& place) : packed_(place.packed), file_(place.path, std::ios::binary) {
         file_.seekg(static_cast<std::streamoff>(place.file_offset));
         if (packed_) inflater_ = std::make_unique<Inflater>(file_);
     }
-    /// Passes `count` bytes over.
+    /// Skips `count` bytes.
     bool skip(std::uint64_t count) {
         if (!packed_) return bool(file_.seekg(static_cast<std::streamoff>(count), std::ios::cur));
         std::vector<char> dropped(std::min<std::uint64_t>(count, 1U << 16));
@@ -67,7 +68,7 @@ public:
     bool read(std::uint64_t count, char* out) {
         return packed_ ? inflater_->read(out, count) : bool(file_.read(out, static_cast<std::streamsize>(count)));
     }
-    /// True unless the checksum behind the last byte that was read is there and wrong.
+    /// False only if there is a checksum after the last byte that was read and it is wrong.
     bool checksum_fits() { return !packed_ || inflater_->checksum_fits(); }
 
 private:
@@ -121,7 +122,7 @@ private:
         const std::uint64_t file_bytes = std::filesystem::file_size(place_.path, status);
         if (status) throw read_error(Errc::Io, path_, "its data file " + place_.path + " cannot be opened");
         const Index3& size = info_.geometry.size;
-        // in floating point: sizes of a damaged header may overflow
+        // in floating point, because sizes in a damaged header may overflow
         const double wanted =
             double(size[0]) * size[1] * size[2] * double(components_) * info_.frames * double(place_.stored_bytes());
         const double there = place_.packed ? double(file_bytes) * kMaxCompression
@@ -138,7 +139,7 @@ private:
         return place_.skip + request.frame * frame_bytes_;
     }
 
-    /// Only a box that spans much of the file is worth it; one with few slices is read.
+    /// Mapping is worthwhile only for a box that spans much of the file; one with few slices is read.
     [[nodiscard]] bool is_mapped(const PixelRequest& request) const {
         const std::uint64_t slices = std::uint64_t(request.box.size()[2]);
         const bool aligned = (place_.file_offset + frame_begin(request)) % place_.stored_bytes() == 0;
@@ -146,7 +147,7 @@ private:
                is_worth_mapping(slices * slice_bytes_);
     }
 
-    /// A large packed stream is not unpacked as a whole.
+    /// A large compressed stream is not decompressed as a whole.
     [[nodiscard]] bool is_in_chunks(const PixelRequest& request) const {
         return place_.packed && is_worth_mapping(ImageFile::bytes_to_hold(request));
     }
@@ -251,12 +252,12 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
                  : ::mmap(nullptr, bytes + before, PROT_READ, MAP_PRIVATE, file, static_cast<off_t>(offset - before));
     if (file >= 0) ::close(file);
     if (begin == MAP_FAILED) throw read_error(Errc::Io, path, "cannot be mapped into memory");
-    ::madvise(begin, bytes + before, MADV_RANDOM);  // what lies around a touched row is not wanted
+    ::madvise(begin, bytes + before, MADV_RANDOM);  // no read-ahead: the data around a row is usually not needed
     const auto unmap = [begin, length = bytes + before](const void*) { ::munmap(begin, length); };
     return {static_cast<const char*>(begin) + before, unmap};
 }
 
-void expect_pages(const void* begin, std::uint64_t bytes) {
+void prefetch_pages(const void* begin, std::uint64_t bytes) {
     const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
     const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(begin) / page * page;
     // NOLINTNEXTLINE(performance-no-int-to-ptr): the beginning of a page

@@ -14,17 +14,17 @@ namespace covol::detail {
 class ChunkedVoxels;
 class ChunkSource;
 
-/// Voxels of an open file: `data` points to the first voxel of the box that was asked for; or `chunks` has all voxels
-/// of the image.
+/// Voxels of an open file: either `data` points to the first voxel of the requested box, or `chunks` has all voxels of
+/// the image.
 struct Pixels {
     std::shared_ptr<const void> data;
     std::array<std::int64_t, 3> stride{1, 0, 0};  ///< in pixels
     bool mapped = false;
     std::shared_ptr<const ChunkedVoxels> chunks{};
-    std::optional<ChunkCount> chunk_count{};  ///< of a format that has chunks
+    std::optional<ChunkCount> chunk_count{};  ///< if the format has chunks
 };
 
-/// What to read of a file; everything exists.
+/// The part of a file to read; it must exist.
 struct PixelRequest {
     VoxelBox box;
     std::uint64_t channel = 0;
@@ -42,15 +42,15 @@ public:
     [[nodiscard]] const ImageInfo& info() const noexcept { return info_; }
     /// Reads (or maps) the voxels. @throws Error InvalidInput (damaged, truncated), Unsupported (too large), Io.
     [[nodiscard]] virtual Pixels read(const PixelRequest& request, const RunContext& run) = 0;
-    /// Memory that read() takes: all of the box, unless a format knows better.
+    /// Memory that read() allocates: all of the box, unless a format overrides it.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
 
-    /// The chunks of a channel and frame, each of which can be decoded alone; null where a file has none.
+    /// The chunks of a channel and frame, each of which can be decoded separately; null if a file has none.
     [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const;
-    /// The coarser levels of a pyramid, the finest first: names that are read as images.
+    /// The coarser levels of a pyramid, finest first: names that can be read as images.
     [[nodiscard]] virtual std::vector<std::string> coarser_levels() const { return {}; }
 
-    /// Files that are read beside the one that was given, or of the folder that was given.
+    /// Files that are read in addition to the given one, or the files of the given folder.
     [[nodiscard]] const std::vector<std::string>& files() const noexcept { return files_; }
     void refer_to(std::vector<std::string> files) { files_ = std::move(files); }
 
@@ -89,70 +89,70 @@ std::uint64_t voxel_count(const Index3& size);
 /// All voxels of an image of this size.
 VoxelBox whole_box(const Index3& size);
 
-/// Strides of voxels that lie behind each other, i fastest.
+/// Strides of voxels that are stored contiguously, i fastest.
 std::array<std::int64_t, 3> dense_strides(const Index3& size);
 
-/// An Error whose text begins with "PATH: ".
+/// An Error whose message begins with "PATH: ".
 Error read_error(Errc code, const std::string& path, const std::string& what, const std::string& option = {});
 
-/// What to throw at a voxel that is NaN or infinite.
+/// The error for a voxel that is NaN or infinite.
 Error not_finite(const std::string& path, const Index3& voxel);
 
 /// @throws Error InvalidInput unless the image has at least two voxels along each axis.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
-/// Memory for so many pixels, after a check that a file of `file_bytes` can hold that many at all (0: unknown, the data
-/// lies in another file) and that the machine can.
-/// @throws Error InvalidInput, Unsupported.
+/// Allocates memory for so many pixels, after checking that a file of `file_bytes` can hold that many (0: unknown, the
+/// data is in another file) and that the machine can. @throws Error InvalidInput, Unsupported.
 std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pixels, PixelType type,
                                       std::uint64_t file_bytes);
 
-/// Where a file keeps its pixels, frame behind frame, i fastest. Read here and not by ITK, whose readers fill up what a
-/// truncated file lacks without a word, and read all of it; ITK's for NIfTI moreover takes a.nii's pixels for a.nii.gz
-/// where both exist.
+/// Position of the pixels in a file, frame after frame, i fastest. They are read here instead of by ITK, whose readers
+/// silently fill in missing data of a truncated file, and read all of it; moreover, ITK's NIfTI reader takes the pixels
+/// of a.nii for a.nii.gz if both exist.
 struct PixelPlace {
     std::string path;
     std::uint64_t file_offset = 0;  ///< of the pixels, or of the packed stream
-    std::uint64_t skip = 0;         ///< unpacked bytes before the pixels
+    std::uint64_t skip = 0;         ///< number of unpacked bytes before the pixels
     bool packed = false;            ///< gzip or zlib
-    bool swap = false;              ///< the other byte order
-    bool half = false;              ///< 16-bit floats, told as Float
+    bool swap = false;              ///< stored in the other byte order
+    bool half = false;              ///< 16-bit floats, converted to Float
     PixelType type = PixelType::UInt8;
     double slope = 1;  ///< pixel = slope * stored + intercept
     double intercept = 0;
-    std::uint64_t frame_gap = 0;  ///< unpacked bytes between frames
+    std::uint64_t frame_gap = 0;  ///< number of unpacked bytes between frames
 
     [[nodiscard]] std::uint64_t stored_bytes() const { return half ? 2 : pixel_bytes(type); }
     [[nodiscard]] bool as_stored() const { return !swap && !half && slope == 1 && intercept == 0; }
 };
 
-/// Reads `count` bytes at the pixels' begin; false when there are fewer, or the packed stream is damaged.
+/// Reads `count` bytes at the beginning of the pixels; false if there are fewer, or if the compressed stream is
+/// damaged.
 bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out);
 
-/// Every `step`th of the stored values (in this machine's byte order), as pixels: slope * stored + intercept.
+/// Converts every `step`th of the stored values (in this machine's byte order) to pixels: slope * stored + intercept.
 void convert_pixels(const PixelPlace& place, const void* stored, std::uint64_t step, std::uint64_t count,
                     PixelType type, void* out);
 
-/// An image whose pixels lie as `place` says; info.channels interleaved, info.frames behind each other.
-/// @throws Error InvalidInput when the file is too short.
+/// An image whose pixels are at `place`: info.channels interleaved, info.frames one after another. @throws Error
+/// InvalidInput if the file is too short.
 std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place);
 
-/// Maps `bytes` of a file at `offset`, which are there. @throws Error Io.
+/// Maps `bytes` of a file at `offset`, which must exist. @throws Error Io.
 std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes);
 
-/// Whether so many bytes are worth a mapping, or decoding only what is asked for.
+/// Whether so many bytes justify a mapping, or decoding on demand.
 bool is_worth_mapping(std::uint64_t bytes);
 
-/// Says that mapped pages will be read from begin to end.
-void expect_pages(const void* begin, std::uint64_t bytes);
+/// Advises the system that mapped pages will be read from beginning to end.
+void prefetch_pages(const void* begin, std::uint64_t bytes);
 
-/// Gives mapped pages back to the system; they come again when touched.
+/// Returns mapped pages to the system; they are read again when they are accessed.
 void release_pages(const void* begin, std::uint64_t bytes);
 
 /// Reverses the bytes of each of `count` values of `width` bytes.
 void swap_bytes(void* data, std::uint64_t count, std::uint64_t width);
 
-/// "um" for every spelling of the micrometre, "mm", ...; the text itself when it is no unit that we know.
+/// "um" for every spelling of the micrometre, "mm", ...; the text itself if it is not a known unit.
 std::string normal_unit(const std::string& text);
 
 /// Length of a unit in metres; 0 when unknown.

@@ -9,15 +9,15 @@
 
 namespace covol::detail {
 
-/// A file's bytes, never read beyond their end.
+/// The bytes of a file, with bounds checks.
 class Bytes {
 public:
-    /// @param name  for messages; both must outlive this
+    /// @param name  for messages; both must outlive this object
     Bytes(std::string_view data, const std::string& name, std::endian order)
         : data_(data), name_(name), swap_(order != std::endian::native) {}
 
     [[nodiscard]] std::uint64_t size() const { return data_.size(); }
-    /// @throws Error InvalidInput beyond the end.
+    /// @throws Error InvalidInput if it extends beyond the end.
     template <typename T>
     [[nodiscard]] T at(std::uint64_t offset) const {
         return load<T>(part(offset, sizeof(T)).data(), swap_);

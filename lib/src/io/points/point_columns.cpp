@@ -23,11 +23,11 @@ struct Line {
     std::string name;
     std::string shape;
     std::vector<Vec3> points;
-    std::vector<double> places;  ///< vertex-index of each, where the file has one
-    std::string structure;       ///< where a column names it
+    std::vector<double> places;  ///< vertex-index of each point, if the file has one
+    std::string structure;       ///< if a column names it
 };
 
-/// The marks in the order of their places.
+/// Sorts the marks of a line by their vertex-index.
 void sort_by_place(Line& line) {
     if (line.places.size() != line.points.size()) return;
     std::vector<std::size_t> order(line.points.size());
@@ -40,7 +40,7 @@ void sort_by_place(Line& line) {
     line.points = std::move(sorted);
 }
 
-/// The ellipse inside a box that is given by its four corners.
+/// The ellipse inscribed in a box that is given by its four corners.
 std::vector<Vec3> ellipse_in(const std::vector<Vec3>& corners) {
     Vec3 centre, u, v;
     for (int a = 0; a < 3; ++a) {
@@ -66,7 +66,7 @@ void append(PointTable& table, const std::string& path, Line& line, const Column
     if (columns.structure) name_structure(table, path, line.structure);
 }
 
-/// Gathers the rows of each line, which need not follow each other.
+/// Collects the rows of each line, which need not be consecutive.
 class LineCollector {
 public:
     explicit LineCollector(const Columns& columns) : columns_(columns) {}
@@ -108,7 +108,7 @@ Vec3 read_row(const std::string& path, std::size_t number, const std::vector<str
     return point;
 }
 
-/// As it stands there; 0 where it is no direction.
+/// A normal, not normalized; 0 if the fields do not define a direction.
 Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::size_t, 3>& at) {
     Vec3 normal{0, 0, 0};
     for (std::size_t a = 0; a < 3; ++a) {
@@ -118,7 +118,7 @@ Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::s
     return std::isfinite(normal[0] + normal[1] + normal[2]) ? normal : Vec3{0, 0, 0};
 }
 
-/// None where the word means none.
+/// None if the word is not the name of a kind.
 std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::size_t column) {
     if (column >= fields.size()) return std::nullopt;
     const std::string word = lower(trim(fields[column]));
@@ -127,16 +127,16 @@ std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::s
     return std::nullopt;
 }
 
-/// Columns without names may hold colours, too.
+/// Distinguishes normals from colours in columns without names.
 bool are_unit_vectors(const std::vector<Vec3>& all) {
-    constexpr double kTolerance = 0.02;  // two decimals
+    constexpr double kTolerance = 0.02;  // allows for two decimals
     return std::all_of(all.begin(), all.end(), [](const Vec3& n) {
         const double length = std::hypot(n[0], n[1], n[2]);
         return length == 0 || std::abs(length - 1) < kTolerance;
     });
 }
 
-/// Lengths of the header's units, or of each row's, in the first one that is named.
+/// Converts lengths from the header's units, or from the unit of each row, to the first unit that is named.
 class RowUnits {
 public:
     explicit RowUnits(const Columns& columns) : columns_(columns) {
@@ -163,17 +163,17 @@ private:
     std::string common_;
 };
 
-/// Finds where a table begins, and how its columns are parted: behind a title, at a header that names x, y and z, or at
-/// the first row of numbers.
+/// Finds the beginning of a table and its delimiter. The table begins after an optional title, at a header that names
+/// x, y and z, or at the first row of numbers.
 class TableBegin {
 public:
     TableBegin(std::string path, bool counted, std::string structures_by)
         : path_(std::move(path)), structures_by_(std::move(structures_by)), counted_(counted) {}
 
-    /// @returns whether the line is the header or the first row of numbers; the fields are then its own.
+    /// @returns whether the line is the header or the first row of numbers; `fields` then holds its fields.
     bool take(std::size_t number, string_view line, std::vector<string_view>& fields) {
         const string_view trimmed = trim(line);
-        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel's
+        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel's delimiter line
         for (const bool named : {true, false})
             for (const char candidate : named ? kDelimitersOfNames : kDelimitersOfNumbers) {
                 if (candidate != ' ' && trimmed.find(candidate) == string_view::npos) continue;
@@ -186,7 +186,7 @@ public:
         note(number, trimmed, fields);
         return false;
     }
-    /// @throws Error InvalidInput: what the first line has that is no part of a table
+    /// @throws Error InvalidInput with the reason why the first line is not part of a table
     [[noreturn]] void refuse() const { fail(path_, line_, why_.empty() ? "expected points, got none" : why_); }
     [[nodiscard]] bool has_title() const { return title_ > 0; }
 
@@ -228,7 +228,7 @@ private:
                            ? "the first three of " + std::to_string(fields.size()) + " columns without names"
                            : "three columns without names";
         if (fields.size() == 6) columns.normal = {3, 4, 5};
-        columns.normal_is_guess = columns.normal.has_value();
+        columns.normal_is_assumed = columns.normal.has_value();
         if (title_ > 0 && !is_word_only_) fail(path_, line_, why_);
         report_title();
     }
@@ -236,7 +236,7 @@ private:
         if (title_ > 0)
             columns.rule += ", below " + std::to_string(title_) + (title_ > 1 ? " lines" : " line") + " of title";
     }
-    /// Of a line that is neither.
+    /// Records a line that is neither header nor row.
     void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
         constexpr std::size_t kMaxTitle = 100;
         std::vector<string_view> fields = fields_;
@@ -247,7 +247,7 @@ private:
             }
         const bool has_number =
             std::any_of(fields.begin(), fields.end(), [](string_view f) { return table_number(f).has_value(); });
-        // .pts begins with the number of points
+        // .pts files begin with the number of points
         if (counted_ && fields.size() == 1 && has_number && title_ == 0) return;
         if (why_.empty()) {
             line_ = number;
@@ -265,13 +265,14 @@ private:
     }
 
     std::string path_, structures_by_, why_;
-    bool counted_;  ///< the number of points may come first
+    bool counted_;  ///< the number of points may precede the table
     bool is_table_without_names_ = false, is_word_only_ = true;
     std::size_t line_ = 1, title_ = 0;
 };
 
-/// A row below the header that goes on with it, as TrackMate has three: other names, or units. Takes its units.
-bool goes_on_with_header(const std::vector<string_view>& fields, Columns& columns) {
+/// Whether a row after the header continues it with other names or units, as in TrackMate's three additional rows.
+/// Takes its units.
+bool continues_header(const std::vector<string_view>& fields, Columns& columns) {
     std::array<std::string, 3> units;
     for (std::size_t a = 0; a < 3; ++a) {
         const string_view field = fields[columns.at[a]];
@@ -315,7 +316,7 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
                  "expected " + std::to_string(begin.needed) + (begin.needed == 3 ? " numbers" : " columns") + ", got " +
                      std::to_string(fields.size()) + " in " + quote(line));
         if (!units) {
-            if (begin.is_header && goes_on_with_header(fields, columns)) continue;
+            if (begin.is_header && continues_header(fields, columns)) continue;
             units.emplace(columns);
             collector.emplace(columns);
         }
@@ -323,7 +324,7 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
         units->apply(fields, point);
         if (columns.kind) {
             const std::optional<MarkKind> kind = read_kind(fields, *columns.kind);
-            if (!kind) {  // another program's column of this name
+            if (!kind) {  // a column of the same name with another meaning
                 columns.kind.reset();
                 table.kinds.clear();
             } else {
@@ -343,7 +344,7 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
     }
     if (begin.delimiter == 0 && begin.has_title()) begin.refuse();
     if (collector) collector->finish(path, table);
-    if (columns.normal_is_guess && !are_unit_vectors(table.normals)) table.normals.clear();
+    if (columns.normal_is_assumed && !are_unit_vectors(table.normals)) table.normals.clear();
     for (Vec3& n : table.normals) n = normal_of(n);
     table.space = columns.space;
     table.order = columns.order;

@@ -3,13 +3,13 @@
 
 #include "io/points/point_files.h"
 
-/// One reader for each family of point files. Each takes the whole file; `path` is for messages.
-/// @throws Error InvalidInput, Unsupported.
+/// One reader for each family of point files. Each parses the whole file; `path` is for messages. @throws Error
+/// InvalidInput, Unsupported.
 namespace covol::detail {
 
-/// XYZ, CSV, TSV: one point a line, columns by name where there is a header. Lists of marks as Fiji, napari and
-/// people write them are told by their columns.
-/// @param blanks_only  columns are cut at runs of blanks and tabs, unless there are commas or semicolons
+/// XYZ, CSV, TSV: one point per line, columns by name if there is a header. Lists of marks written by Fiji, napari or
+/// by hand are recognized by their columns.
+/// @param blanks_only  columns are separated by runs of blanks and tabs, unless there are commas or semicolons
 /// @param structures_by  the column that names each row's structure; empty: none
 PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only,
                          const std::string& structures_by = {});
@@ -18,35 +18,37 @@ PointTable parse_obj(const std::string& path, const std::string& text);
 PointTable parse_off(const std::string& path, const std::string& text);
 PointTable parse_ply(const std::string& path, const std::string& bytes);
 
-/// A selection of Fiji (ImageJ), and a ZIP of several as its ROI Manager saves them.
-/// @param name  of the selection, where the file has none
+/// A selection of Fiji (ImageJ), or a ZIP of several as saved by its ROI Manager.
+/// @param name  of the selection, if the file has none
 /// @param structures_by  "group" of a selection, "counter" of a multi-point's points, or empty
 PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name,
                      const std::string& structures_by = {});
 PointTable parse_roi_zip(const std::string& path, const std::string& bytes, const std::string& structures_by = {});
 
-/// 3D Slicer's .mrk.json and .fcsv: the coordinate system is inside.
-/// @param structures_by  "label" of each point, "node" (the markup's own name; not of .fcsv), or empty
+/// 3D Slicer's .mrk.json and .fcsv, which state the coordinate system.
+/// @param structures_by  "label" of each point, "node" (the markup's own name; not for .fcsv), or empty
 PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by = {});
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by = {});
-/// c3d -landmarks-to-spheres: x y z label, in RAS; a label that is a word may come first.
+/// Output of c3d -landmarks-to-spheres: x y z label, in RAS; a label that is a word may come first.
 PointTable parse_landmarks(const std::string& path, const std::string& text);
-/// .csl, sections of bodies in planes of any direction: a header "CSLC", the numbers of planes and labels, and of each
-/// plane its number, the counts of its vertices and contours, A B C D of A x + B y + C z + D = 0, the vertices, and of
-/// each contour its count of vertices ("12", or "12h0" of a hole in contour 0), its label, and their numbers from 0.
+/// .csl, sections of bodies in planes of any direction. A header "CSLC" and the numbers of planes and labels are
+/// followed by each plane: its number, the counts of its vertices and contours, A B C D of A x + B y + C z + D = 0, the
+/// vertices, and for each contour its count of vertices ("12", or "12h0" for a hole in contour 0), its label, and the
+/// indices of its vertices from 0.
 /// @param structures_by  "label": each label is a structure; empty: there may be only one
 PointTable parse_sections(const std::string& path, const std::string& text, const std::string& structures_by = {});
 
-/// DICOM RT structure sets: contours of ROIs in mm, LPS. Holes that keyholes join to their outline are lines of their
-/// own.
+/// DICOM RT structure sets: contours of ROIs in mm, LPS. Holes that are joined to their outline by keyholes become
+/// lines of their own.
 /// @param structures_by  "roi": each ROI is a structure; empty: there may be only one
 PointTable parse_rt_structures(const std::string& path, const std::string& bytes,
                                const std::string& structures_by = {});
 
-/// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners are at integers.
+/// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners have integer coordinates.
 PointTable parse_annotations(const std::string& path, const std::string& text);
 
-/// Leica's text of scans: columns, rows, the scanner's place and axes, and a matrix before the points of each.
+/// Leica's text format of scans: columns, rows, the scanner's position and axes, and a matrix precede the points of
+/// each scan.
 [[nodiscard]] bool is_ptx(const std::string& text);
 PointTable parse_ptx(const std::string& path, const std::string& text);
 

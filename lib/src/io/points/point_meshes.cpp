@@ -1,4 +1,4 @@
-// The vertices of meshes as clouds, with their normals: PLY, OBJ and OFF, by the readers of meshes.
+// The vertices of meshes as clouds, with their normals: PLY, OBJ and OFF, read with the readers of meshes.
 #include <string>
 
 #include "io/mesh/mesh_formats.h"
@@ -25,7 +25,7 @@ public:
     void mixed_normals() override { mixed_normals_ = true; }
 
     [[nodiscard]] bool expects_vertices() const { return expects_vertices_; }
-    /// Keeps normals where each point has its own.
+    /// Keeps normals only if each point has its own.
     void finish() {
         if (mixed_normals_ || table_.normals.size() != table_.points.size()) table_.normals.clear();
     }

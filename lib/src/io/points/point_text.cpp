@@ -34,11 +34,11 @@ void append_utf8(std::string& text, std::uint32_t code) {
     }
 }
 
-/// Which of two bytes of a character is zero in nearly all of a text of Latin letters and digits; -1: neither.
+/// Which byte of each pair is zero in nearly all of a text of Latin letters and digits; -1 if neither.
 int zero_byte(string_view text) {
-    constexpr std::size_t kLooked = 400;
+    constexpr std::size_t kMaxChecked = 400;
     std::size_t zeros[2] = {0, 0}, pairs = 0;
-    for (std::size_t at = 0; at + 1 < std::min(text.size(), kLooked); at += 2, ++pairs)
+    for (std::size_t at = 0; at + 1 < std::min(text.size(), kMaxChecked); at += 2, ++pairs)
         for (std::size_t n = 0; n < 2; ++n) zeros[n] += text[at + n] == '\0' ? 1 : 0;
     if (pairs < 4) return -1;
     for (int n = 0; n < 2; ++n)
@@ -97,7 +97,7 @@ std::optional<double> table_number(string_view field) {
     if (text.starts_with(kMinus)) text.replace(0, kMinus.size(), "-");
     const std::size_t comma = text.rfind(','), point = text.rfind('.');
     if (comma != std::string::npos) {
-        // "1,": the comma parts columns
+        // in "1," the comma separates columns
         const bool between = comma > 0 && comma + 1 < text.size() && is_digit(text[comma + 1]);
         if (!between) return std::nullopt;
         const bool is_decimal = text.find(',') == comma && (point == std::string::npos || point < comma);

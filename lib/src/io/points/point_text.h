@@ -6,30 +6,30 @@
 
 #include "base/text.h"
 
-/// What the readers of text files of points share.
+/// Code that is common to the readers of text files of points.
 namespace covol::detail {
 
 /// @throws Error InvalidInput, "path:line: what".
 [[noreturn]] void fail(const std::string& path, std::size_t line, const std::string& what);
 [[noreturn]] void fail(const std::string& path, const std::string& what);
 
-/// A coordinate: a finite number. @throws Error with path:line.
+/// A coordinate, which must be a finite number. @throws Error with path:line.
 [[nodiscard]] double to_coordinate(const std::string& path, std::size_t line, std::string_view field);
 
-/// UTF-16 of either byte order, with its mark or without, as UTF-8; other texts as they are.
+/// Converts UTF-16 in either byte order, with or without a byte order mark, to UTF-8; other texts are unchanged.
 [[nodiscard]] std::string to_utf8(std::string_view text);
 
-/// A number with a decimal point or a decimal comma. Of both marks the last one is the decimal one, and the others part
-/// thousands.
+/// A number with a decimal point or a decimal comma. If both occur, the last one is the decimal mark, and the others
+/// separate thousands.
 [[nodiscard]] std::optional<double> table_number(std::string_view field);
 
-/// What parts the fields of tables, in the order in which they are tried: names have blanks, numbers commas.
+/// Delimiters of tables, in the order in which they are tried: names may contain blanks, numbers may contain commas.
 inline constexpr std::string_view kDelimitersOfNames = ";\t, ", kDelimitersOfNumbers = ";\t ,";
 
 /// Whether the first three of the fields are numbers.
 [[nodiscard]] bool begins_with_numbers(const std::vector<std::string_view>& fields);
 
-/// The unit of length that a column's name or a field means: "um" of "(micron)"; empty where it means none.
+/// The unit of length that a column's name or a field means: "um" for "(micron)"; empty if it is none.
 [[nodiscard]] std::string unit_of_length(std::string_view text);
 
 }  // namespace covol::detail

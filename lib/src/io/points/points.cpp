@@ -44,7 +44,7 @@ void append_row(std::string& text, const Vec3& p, char separator) {
     text += '\n';
 }
 
-/// Each line of the comment behind `prefix`.
+/// The lines of a comment, each after `prefix`.
 std::string comment_lines(const std::string& comment, const std::string& prefix) {
     std::string text;
     std::istringstream lines(comment);
@@ -62,14 +62,14 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
-/// A table for each of its structures, with their lines.
+/// Splits a table by structure, together with its lines.
 std::vector<detail::PointTable> parts_of(detail::PointTable table) {
     const std::vector<Vec3> points = std::exchange(table.points, {}), normals = std::exchange(table.normals, {});
     const std::vector<MarkKind> kinds = std::exchange(table.kinds, {});
     const std::vector<MarkLine> lines = std::exchange(table.lines, {});
     const std::vector<std::uint32_t> structure = std::exchange(table.structure, {});
     std::vector<detail::PointTable> parts(table.structures.size(), table);
-    std::vector<std::size_t> place;  // of each point, among those of its structure
+    std::vector<std::size_t> place;  // index of each point among those of its structure
     for (std::size_t n = 0; n < points.size(); ++n) {
         detail::PointTable& part = parts[structure[n]];
         place.push_back(part.points.size());
@@ -111,7 +111,7 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
         if (cloud.sensor) table.rule += " seen from a sensor";
     }
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
-    // Who gives a scale knows better than the file.
+    // A scale that the user gives has priority over the file's unit.
     const bool has_lengths = cloud.space != PointSpace::Index && !table.unit.empty();
     if (has_lengths && options.scale == 1) {
         cloud.unit = table.unit;

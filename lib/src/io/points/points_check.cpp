@@ -13,18 +13,18 @@
 namespace covol {
 namespace {
 
-/// A way to read the same file.
+/// One way to interpret the file.
 struct Reading {
     ReadPointsOptions options;
-    int changes = 0;     ///< how many things are read otherwise than now
-    std::string advice;  ///< the options that ask for it, as messages name them
+    int changes = 0;     ///< number of differences from the current reading
+    std::string advice;  ///< the options that select it, as messages name them
 };
 
-/// Between units that people use; the likelier ones first.
+/// Factors between common units; the more likely ones first.
 constexpr std::array<double, 15> kScales{1.0,  1e3, 1e-3, 1e6, 1e-6, 10,   0.1,     100,
                                          0.01, 1e4, 1e-4, 1e5, 1e-5, 25.4, 1 / 25.4};
 
-/// 0: none, 1: between neighbours such as micrometre and millimetre, 2: two of these, 3: others.
+/// 0: no factor, 1: between neighbouring units such as micrometre and millimetre, 2: two such steps, 3: others.
 int rank_of_scale(double scale) {
     for (const auto& [factor, rank] : {std::pair(1.0, 0), {1e3, 1}, {1e-3, 1}, {1e6, 2}, {1e-6, 2}})
         if (std::abs(scale / factor - 1) < 1e-9) return rank;
@@ -41,7 +41,7 @@ const char* advice_of(PointSpace space) {
     }
 }
 
-/// What the mistake is called.
+/// Describes the mistake for messages.
 std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
     std::string text;
     const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -63,7 +63,7 @@ class Checker {
 public:
     Checker(const PointCloud& cloud, const ImageGeometry& geometry)
         : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
-        if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that no file gave
+        if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that does not come from a file
         if (now_.order == PointOrder::Unstated) now_.order = PointOrder::XYZ;
         world_ = to_world(cloud, geometry);
     }
@@ -77,8 +77,8 @@ public:
         return "points from " + text_of(bounding_box(world_)) + ", image from " + text_of(geometry_.world_box());
     }
 
-    /// The readings with the fewest changes that put every point inside. Another unit is the last thing to think of:
-    /// whatever is made small enough fits.
+    /// The readings with the fewest changes that put every point inside. Other units have the lowest priority, because
+    /// any points fit if they are scaled down enough.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
         const auto rank = [&](const Reading& r) {
@@ -89,11 +89,11 @@ public:
                          [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
         for (const Reading& reading : candidates) {
             if (!found.empty() && rank(reading) > rank(found.front())) break;
-            if (rank(reading).first > 0 && is_speck(reading, rank(reading).first)) continue;
+            if (rank(reading).first > 0 && is_too_small(reading, rank(reading).first)) continue;
             if (rank(reading).first == 0 && is_in_one_voxel(reading)) continue;
             if (fits(reading)) found.push_back(reading);
         }
-        // Voxels counted from 1 are told only where counting from 0 does not do.
+        // Counting voxels from 1 is suggested only if counting from 0 does not fit.
         const auto has = [&](PointSpace space, PointOrder order) {
             return std::any_of(found.begin(), found.end(),
                                [&](const Reading& r) { return r.options.space == space && r.options.order == order; });
@@ -106,16 +106,16 @@ public:
 
     [[nodiscard]] std::string name(const Reading& reading) const { return name_of(reading, now_); }
 
-    /// Clicked marks lie on slices and often on whole voxels. A reading that puts them all on voxel centres along more
-    /// axes than the present one does, is more plausible.
+    /// Clicked marks are on slices and often on voxel centres. A reading is more plausible if it puts all marks on
+    /// voxel centres along more axes than the current one does.
     [[nodiscard]] std::vector<Reading> more_plausible() const {
-        constexpr std::size_t kFewest = 8;  // fewer may lie on voxel centres by chance
-        if (world_.size() < kFewest || cloud_.stated || now_.scale != 1) return {};
+        constexpr std::size_t kMinPoints = 8;  // fewer may be on voxel centres by chance
+        if (world_.size() < kMinPoints || cloud_.stated || now_.scale != 1) return {};
         const int axes = axes_on_centres(now_);
         std::vector<Reading> best;
         int maximum = axes;
         for (const Reading& reading : others()) {
-            // Slices that count channels are whole numbers whatever the marks are.
+            // Slice numbers that count channels are integers for any marks.
             if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
                 reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
@@ -137,10 +137,10 @@ private:
         return true;
     }
 
-    /// A cloud point's position if it were read otherwise.
+    /// The position of a cloud's point under another reading.
     [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
         const PointSpace space = detail::space_after(reading.space);
-        // Who gives a scale does without the unit that the file names.
+        // A scale that the user gives replaces the file's unit.
         const double unit = reading.scale == now_.scale ? detail::unit_factor(cloud_, geometry_) : 1;
         const Vec3 read = detail::read_as(reading, detail::undo(now_, point));
         return detail::to_world(space, detail::scaled(space, read, unit), geometry_);
@@ -158,24 +158,26 @@ private:
         return bounding_box(index);
     }
 
-    /// Made so small that fitting says nothing. Of factors that nobody expects more is asked.
-    [[nodiscard]] bool is_speck(const Reading& reading, int rank) const {
-        constexpr std::size_t kFewest = 8;
+    /// Whether the points are scaled down so much that fitting means nothing. Unusual factors have to pass a stricter
+    /// test.
+    [[nodiscard]] bool is_too_small(const Reading& reading, int rank) const {
+        constexpr std::size_t kMinPoints = 8;
         const bool is_odd = rank > 2;
-        const double minimum = is_odd ? 0.2 : 0.02;  // of the image's edge
-        if (is_odd && cloud_.points.size() < kFewest) return true;
+        const double minimum = is_odd ? 0.2 : 0.02;  // fraction of the image's edge
+        if (is_odd && cloud_.points.size() < kMinPoints) return true;
         const WorldBox box = index_box(reading);
         for (int a = 0; a < 3; ++a)
             if (box.max[a] - box.min[a] >= minimum * geometry_.size[a]) return false;
         return true;
     }
 
-    /// Numbers below 1, as of a small image in millimetres, all fit into the first voxel.
+    /// Coordinates below 1, as in a small image in millimetres, all fit into the first voxel.
     [[nodiscard]] bool is_in_one_voxel(const Reading& reading) const {
         return cloud_.points.size() > 1 && longest_side(index_box(reading)) < 1;
     }
 
-    /// An axis on which all points have one place says nothing.
+    /// Number of axes along which all points are on voxel centres. Axes along which they all have the same position do
+    /// not count.
     [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
         constexpr double kTolerance = 0.01;  // voxels
         std::array<bool, 3> on{true, true, true}, differ{false, false, false};
@@ -200,7 +202,7 @@ private:
     /// All other readings, fewest changes first.
     [[nodiscard]] std::vector<Reading> others() const {
         std::vector<Reading> list;
-        if (now_.channels != 1) return list;  // a slice cannot be undone
+        if (now_.channels != 1) return list;  // a slice number with channels cannot be inverted
         const bool lengths = !in_voxels(now_);
         const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
         for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras,

@@ -30,7 +30,7 @@ bool means_voxels(const std::string& unit) {
 
 namespace {
 
-/// The columns of a header by name; the first of each name counts.
+/// The columns of a header by name; for repeated names, the first.
 class Header {
 public:
     explicit Header(const std::vector<string_view>& fields) : fields_(fields) {
@@ -48,7 +48,8 @@ public:
         const auto found = units_.find(name);
         return found != units_.end() && means_voxels(found->second);
     }
-    /// The unit of length that a column's name ends with. "x_m" may be a mean, and "x in" an input.
+    /// The unit of length at the end of a column's name. Without brackets "m" and "in" are ignored, because "x_m" may
+    /// be a mean, and "x in" an input.
     [[nodiscard]] std::string length_unit(const std::string& name) const {
         const auto found = units_.find(name);
         if (found == units_.end()) return {};
@@ -57,7 +58,7 @@ public:
         if (!in_brackets && (found->second == "m" || found->second == "in")) return {};
         return unit_of_length(found->second);
     }
-    /// "columns X, Y, Z": the columns as the file names them.
+    /// "columns X, Y, Z": the columns with the names in the file.
     [[nodiscard]] std::string names(const std::array<std::size_t, 3>& at) const {
         std::string text = "columns";
         for (std::size_t a = 0; a < 3; ++a) text += (a == 0 ? " " : ", ") + std::string(fields_[at[a]]);
@@ -118,10 +119,10 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
     columns.rule = header.names(columns.at);
     if (in_voxels) {
         columns.space = PointSpace::Index;
-        columns.order = PointOrder::XYZ;  // the names leave nothing open
+        columns.order = PointOrder::XYZ;  // the names are unambiguous
         if (slices) columns.rule += ", slices from 0";
     } else if (slices) {
-        // Fiji's Results: slices from 1; X and Y in the image's unit wherever the image has one
+        // Fiji's Results: slices count from 1; X and Y are in the image's unit if it has one
         columns.space = PointSpace::Slices;
         columns.order = PointOrder::XYZ;
         columns.slice_from_one = true;

@@ -8,23 +8,23 @@
 
 #include "covol/points.h"
 
-/// What the columns of a table are, by their names.
+/// The meaning of the columns of a table, derived from their names.
 namespace covol::detail {
 
-/// Which columns hold a point, and which tell the line that it belongs to.
+/// The columns that hold a point, and those that identify its line.
 struct Columns {
     std::array<std::size_t, 3> at{0, 1, 2};
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
     bool slice_from_one = false;  ///< the third column counts slices from 1
     std::optional<std::array<std::size_t, 3>> normal;
-    bool normal_is_guess = false;          ///< the columns have no names
-    std::vector<std::size_t> line;         ///< rows that agree in these columns are one line
+    bool normal_is_assumed = false;        ///< the columns have no names, so the meaning is an assumption
+    std::vector<std::size_t> line;         ///< rows with equal values in these columns form one line
     std::optional<std::size_t> shape;      ///< napari's shape-type
-    std::optional<std::size_t> vertex;     ///< the place of a mark in its line
-    bool closed = true;                    ///< lines whose shape is not told
-    std::array<std::string, 3> unit{};     ///< of each coordinate, where a header names a unit of length
-    std::optional<std::size_t> kind;       ///< what each mark says: surface, inside or outside
+    std::optional<std::size_t> vertex;     ///< position of a mark in its line
+    bool closed = true;                    ///< default for lines without a shape
+    std::array<std::string, 3> unit{};     ///< of each coordinate, if a header names a unit of length
+    std::optional<std::size_t> kind;       ///< kind of each mark: surface, inside or outside
     std::optional<std::size_t> row_unit;   ///< the column that names each row's unit
     std::optional<std::size_t> structure;  ///< the column that names each row's structure
     std::string rule;
@@ -36,7 +36,7 @@ struct Columns {
     }
 };
 
-/// A column's name and what is said of its unit: "X (microns)" is {"x", "microns"}, "x_px" is {"x", "px"}.
+/// A column's name and its unit: "X (microns)" is {"x", "microns"}, "x_px" is {"x", "px"}.
 struct ColumnName {
     std::string name;
     std::string unit;
@@ -45,7 +45,7 @@ struct ColumnName {
 [[nodiscard]] ColumnName parse_name(std::string_view text);
 [[nodiscard]] bool means_voxels(const std::string& unit);
 
-/// Nothing where the fields name no x, y and z (or slice), nor napari's axes.
+/// Nothing if the fields name neither x, y and z (or slice), nor napari's axes.
 [[nodiscard]] std::optional<Columns> find_columns(const std::vector<std::string_view>& fields);
 
 }  // namespace covol::detail

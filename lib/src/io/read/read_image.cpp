@@ -1,4 +1,4 @@
-// Images of all formats, by the names and the first bytes of their files.
+// Images of all formats, recognized by the names and the first bytes of their files.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -39,7 +39,7 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
 }
 
-/// "stack.tif:ZYX" is {"stack.tif", "ZYX"}: what the planes of a TIFF are, where its description is wrong.
+/// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}: the meaning of the planes of a TIFF whose description is wrong.
 std::pair<std::string, std::string> split_axes(const std::string& given) {
     const std::size_t colon = given.rfind(':');
     std::error_code status;
@@ -49,8 +49,8 @@ std::pair<std::string, std::string> split_axes(const std::string& given) {
     return {path, given.substr(colon + 1)};
 }
 
-/// The HDF5 library reads and writes outside its buffers where a file is damaged: what would be read of it is read by
-/// the reading program first. It keeps objects of damaged headers, too, which this process then has not seen.
+/// On damaged files the HDF5 library may access memory outside its buffers, so the file is read in a separate program
+/// first. The library also keeps objects of damaged headers, which this process then never loads.
 std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
     detail::try_hdf5(name.path, name.inside);
     return detail::open_either_hdf5(name);
@@ -77,7 +77,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
     const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".npy" || end == ".vdb";
-    // Names of slices often end in numbers.
+    // The extensions of slices are often numbers.
     const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
     if (!marked && !known)
         throw read_error(Errc::Unsupported, path,
@@ -94,7 +94,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     return detail::open_vdb_image(path, grid);
 }
 
-/// What is wrong with the spacing, and the option that mends it.
+/// Warns about a problem with the spacing, and names the option that corrects it.
 void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunContext& run) {
     std::string axes;
     for (int a = 0; a < 3; ++a)
@@ -104,7 +104,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
              ": 1 stands in for it, and lengths, volumes and shapes may be wrong; `spacing = sx,sy,sz` gives it");
 }
 
-/// The user's corrections, and the last checks.
+/// Applies the user's corrections, and makes the last checks.
 ImageInfo corrected_info(const std::string& path, const ImageFile& file, const ReadImageOptions& options,
                          const RunContext& run) {
     ImageInfo info = file.info();
@@ -120,7 +120,7 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
     return info;
 }
 
-/// The index along channels or frames that the caller chose, or the only one there is.
+/// The index along channels or frames that the caller chose, or 0 if there is only one.
 std::uint64_t choose(const std::string& path, const std::string& what, const std::optional<int>& wanted, int count,
                      const std::vector<std::string>& names, const std::string& advice = {}) {
     if (!wanted && count == 1) return 0;
@@ -155,7 +155,7 @@ ImageLevels open_image_levels(const Image& image, const ReadImageOptions& option
                               const RunContext& run) {
     ImageLevels whole(image);
     if (image.view()) return whole;  // it is in memory, or mapped
-    RunContext quiet = run;          // what there is to say was said when the image was read
+    RunContext quiet = run;          // warnings have already been reported when the image was read
     quiet.log = nullptr;
     const auto chunks_of = [&](const std::string& path, ImageGeometry& geometry) {
         const std::unique_ptr<ImageFile> file = open_image(path, options, quiet);
@@ -217,7 +217,7 @@ ImageInfo read_image_info(const std::string& path, const ReadImageOptions& optio
 }
 
 std::vector<std::string> list_image_files(const std::string& path, const RunContext& run) {
-    // BigDataViewer's description; the file itself is not opened for that.
+    // BigDataViewer's description; the HDF5 file itself is not opened for that.
     if (const auto hdf5 = detail::split_hdf5_name(path))
         return {fs::path(hdf5->path).replace_extension(".xml").string()};
     return open_image(path, {}, run)->files();

@@ -1,4 +1,4 @@
-// What covol-reader does with a file.
+// The tasks of covol-reader.
 #include "io/reader/serve.h"
 
 #include <cstring>
@@ -43,7 +43,7 @@ void try_voxel(const PieceAtWork& piece) {
         try {
             (void)file->read({{{0, 0, 0}, {0, 0, 0}}}, alone);
         } catch (const Error&) {
-            // Others may be asked for.
+            // The voxel cannot be read, but other channels or frames might be.
         }
     });
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What was read last. Solvers ask for it from threads of their own.
+/// Reads a study's guesses and keeps the last few. Solvers call it from several threads.
 class GuessReader {
 public:
     GuessReader(std::string folder, const ImageGeometry& image) : folder_(std::move(folder)), image_(image) {}

@@ -1,4 +1,4 @@
-// Images to files.
+// Writing of images.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -63,7 +63,7 @@ bool is_ome_tiff(const std::string& path) {
     return detail::extension(name) == ".ome";
 }
 
-/// How far single precision moves a voxel at most, in voxels.
+/// Upper bound for the displacement of a voxel by rounding to single precision, in voxels.
 double moved_by_rounding(const ImageGeometry& geometry) {
     double maximum = 0;
     for (int corner = 0; corner < 8; ++corner) {
@@ -80,8 +80,8 @@ double moved_by_rounding(const ImageGeometry& geometry) {
     return maximum;
 }
 
-/// NIfTI-1 has single precision: far from 0 that is not enough.
-/// @throws Error Unsupported where voxels would lie where others are
+/// NIfTI-1 stores single precision, which is insufficient far from 0. @throws Error Unsupported if voxels would be
+/// displaced by more than half a voxel
 void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
     constexpr double kMaxReported = 0.01, kMax = 0.5;  // voxels
     const double moved = moved_by_rounding(geometry);
@@ -91,7 +91,7 @@ void check_precision(const std::string& path, const ImageGeometry& geometry, con
     if (moved > kMaxReported) run.warn(what + "; .nrrd and .mha keep them");
 }
 
-/// What of the geometry such a file has no place for.
+/// Warns about properties of the geometry that the format cannot store.
 void warn_of_losses(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
     const std::string extension = detail::extension(path);
     const bool is_tiff = extension == ".tif" || extension == ".tiff";

@@ -4,22 +4,22 @@
 
 #include "covol/image_stream.h"
 
-// One function for each family of files; write_image() picks by the name's end.
+// One function for each family of files; write_image() chooses by the file name's extension.
 namespace covol::detail {
 
-/// .nrrd, .mha, .nii, .nii.gz and .npy: a header, and the voxels behind it, i fastest.
+/// .nrrd, .mha, .nii, .nii.gz and .npy: a header, followed by the voxels, i fastest.
 void write_raw(const std::string& path, const std::string& extension, const PixelSource& source,
                const WriteImageOptions& options, const RunContext& run);
 
-/// One page per z, deflated: classic with strips, or BigTIFF with tiles. Spacing, unit and origin as ImageJ has them.
-/// TIFF has no place for a direction.
-/// @param ome  OME-TIFF: its XML in the place of ImageJ's text, without an origin
-/// @param classic_limit  bytes of voxels, unpacked, from which on it is a BigTIFF
+/// One page per z, deflated: classic with strips, or BigTIFF with tiles. Spacing, unit and origin as in ImageJ's files.
+/// TIFF cannot store a direction.
+/// @param ome  OME-TIFF: with its XML instead of ImageJ's description, without an origin
+/// @param classic_limit  unpacked size in bytes from which on a BigTIFF is written
 inline constexpr std::uint64_t kClassicTiff = std::uint64_t(4000) << 20;
 void write_tiff(const std::string& path, const PixelSource& source, bool ome, const RunContext& run,
                 std::uint64_t classic_limit = kClassicTiff);
 
-/// OME-Zarr 0.4, at `folder`, which is there and empty.
+/// OME-Zarr 0.4, in `folder`, which exists and is empty.
 void write_ome_zarr(const std::string& folder, const std::string& name, const PixelSource& source,
                     const RunContext& run);
 

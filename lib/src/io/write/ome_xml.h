@@ -5,7 +5,7 @@
 
 namespace covol::detail {
 
-/// What an OME-TIFF of one channel, a page for each slice, has as its description: sizes, spacing and unit.
+/// The description of an OME-TIFF with one channel and a page for each slice: sizes, spacing and unit.
 /// https://docs.openmicroscopy.org/ome-model/6.2.0/ome-tiff/specification.html
 [[nodiscard]] std::string make_ome_xml(const ImageGeometry& geometry, PixelType type);
 

@@ -17,34 +17,35 @@ namespace covol::detail {
 /// How a block's bytes are packed.
 enum class BlockPacking {
     None,
-    Gzip,   ///< deflated up to a byte's border: blocks behind each other are one stream; with the CRC-32
+    Gzip,   ///< deflated and aligned to bytes, so that consecutive blocks form one stream; with the CRC-32
     Adler,  ///< the same with the Adler-32
-    Zlib    ///< each a whole stream of zlib's
+    Zlib    ///< each a complete zlib stream
 };
 
 struct PackedBlock {
     std::string bytes;
-    std::uint32_t check = 0;     ///< of what is packed
+    std::uint32_t check = 0;     ///< checksum of the unpacked bytes
     std::uint64_t unpacked = 0;  ///< bytes
-    bool is_zero = false;        ///< all of it
+    bool is_zero = false;        ///< whether all bytes are 0
 };
 
-/// A box of the image, and the lattice that its voxels are put into: where that is larger, the rest is 0.
+/// A box of the image, and the size of the lattice in which its voxels are stored; the remaining voxels of that lattice
+/// are 0.
 struct BlockPlace {
     VoxelBox box;
     Index3 stored;  ///< voxels along i, j, k
 };
 
-/// Fills and packs boxes of a source. What is uniform is packed once.
+/// Fills and packs boxes of a source. Uniform boxes of the same value and size are packed once.
 class BlockPacker {
 public:
     BlockPacker(const PixelSource& source, BlockPacking packing) : source_(source), packing_(packing) {}
 
-    /// Hands the blocks 0 to count - 1 to `take`, in this order.
+    /// Packs the blocks 0 to count - 1, and passes them to `take` in this order.
     void pack_all(std::uint64_t count, const std::function<BlockPlace(std::uint64_t)>& place,
                   const std::function<void(std::uint64_t, const PackedBlock&)>& take, const RunContext& run);
 
-    /// Some bytes, packed as the voxels are.
+    /// Packs other bytes in the same way as voxels.
     [[nodiscard]] PackedBlock packed(const std::string& bytes) const;
 
 private:
@@ -57,10 +58,10 @@ private:
     std::map<std::pair<double, std::uint64_t>, Shared> uniform_;  // by value and bytes
 };
 
-/// Puts voxels of a box that lie behind each other into a larger lattice; the rest becomes 0. Both i fastest.
-/// @param values  as many bytes as the lattice has; the box's come first, the others are 0
+/// Spreads the contiguous voxels of a box over a larger lattice; the remaining voxels become 0. Both i fastest.
+/// @param values  as many bytes as the lattice has; initially the box's voxels, followed by zeros
 /// @param width  bytes of a voxel
-void spread(const Index3& size, const Index3& stored, std::uint64_t width, char* values);
+void pad_rows(const Index3& size, const Index3& stored, std::uint64_t width, char* values);
 
 /// Sets `count` values of a type to one value.
 void fill_value(PixelType type, double value, std::uint64_t count, void* out);

@@ -19,7 +19,7 @@ namespace {
 
 using detail::shortest;
 
-/// A field of a CSV table.
+/// A quoted field of a CSV table.
 std::string quoted_field(const std::string& text) {
     std::string field = "\"";
     for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -51,7 +51,7 @@ std::string to_slicer(const std::vector<NamedMark>& marks, const ImageGeometry& 
     return file.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-/// Big-endian, as Java has it.
+/// Big-endian, as in Java.
 template <typename T>
 void put(std::string& bytes, std::size_t at, T value) {
     using Bits = std::conditional_t<sizeof(T) == 1, std::uint8_t,
@@ -60,7 +60,7 @@ void put(std::string& bytes, std::size_t at, T value) {
     for (std::size_t n = 0; n < sizeof(T); ++n) bytes[at + n] = char(bits >> (8 * (sizeof(T) - 1 - n)) & 255);
 }
 
-/// Layout: ij/io/RoiEncoder.java of ImageJ 1.53. Pixels as ImageJ counts them, centres at whole numbers for points.
+/// Layout: ij/io/RoiEncoder.java of ImageJ 1.53. Coordinates are ImageJ's pixels; for points, centres are at integers.
 std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks) {
     constexpr std::size_t kMax = 65535;  // a 16-bit count
     if (marks.size() > kMax)
@@ -73,7 +73,7 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
             low[a] = m == 0 ? marks[m].index[a] : std::min(low[a], marks[m].index[a]);
             high[a] = m == 0 ? marks[m].index[a] : std::max(high[a], marks[m].index[a]);
         }
-    constexpr double kFarthest = 32766;  // pixels: of a signed 16-bit number, and one beyond the last
+    constexpr double kFarthest = 32766;  // pixels: the range of a signed 16-bit number, minus one
     if (high[0] > kFarthest || high[1] > kFarthest)
         throw Error(Errc::Unsupported, path + ": a selection of Fiji reaches 32766 pixels, got (" + shortest(high[0]) +
                                            ", " + shortest(high[1]) + "); write .csv or .mrk.json");
@@ -91,7 +91,7 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
     put<std::int16_t>(bytes, 12, std::int16_t(std::ceil(high[1]) + 1));
     put<std::int16_t>(bytes, 14, std::int16_t(std::ceil(high[0]) + 1));
     put<std::uint16_t>(bytes, 16, std::uint16_t(n));
-    put<std::int16_t>(bytes, 50, 128);  // coordinates are real numbers, too
+    put<std::int16_t>(bytes, 50, 128);  // sub-pixel coordinates are stored, too
     put<std::uint32_t>(bytes, 60, std::uint32_t(second));
     put<std::uint32_t>(bytes, second + 48, std::uint32_t(counters));
     for (std::size_t m = 0; m < n; ++m) {
@@ -100,7 +100,7 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
         put<std::int16_t>(bytes, 64 + 2 * n + 2 * m, std::int16_t(std::lround(y) - top));
         put<float>(bytes, reals + 4 * m, float(x));
         put<float>(bytes, reals + 4 * n + 4 * m, float(y));
-        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // the slice; counter 0
+        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // the slice, and counter 0
     }
     return bytes;
 }

@@ -1,4 +1,4 @@
-// NRRD, MetaImage, NIfTI-1 and NumPy's .npy: a header, and all voxels behind it.
+// NRRD, MetaImage, NIfTI-1 and NumPy's .npy: a header, followed by all voxels.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,7 +29,7 @@ Vec3 axis_of(const ImageGeometry& g, std::size_t a) {
     return {g.direction[0][a], g.direction[1][a], g.direction[2][a]};
 }
 
-/// As NRRD and MetaImage call it.
+/// The name or code of a type in each format.
 struct TypeNames {
     const char* nrrd;
     const char* meta;
@@ -50,14 +50,14 @@ TypeNames names_of(PixelType type) {
     return {"double", "MET_DOUBLE", 64, "<f8"};
 }
 
-/// A key or a text of NRRD's key/value pairs: one line.
+/// Escapes a key or a value of NRRD's key/value pairs, which are single lines.
 std::string escaped(const std::string& text) {
     std::string out;
     for (const char c : text) out += c == '\n' ? "\\n" : c == '\\' ? "\\\\" : std::string(1, c);
     return out;
 }
 
-/// What stands between the quotes of a NRRD field.
+/// Escapes the text between the quotes of a NRRD field.
 std::string quoted(const std::string& text) {
     std::string out;
     for (const char c : text)
@@ -81,7 +81,7 @@ std::string nrrd_header(const PixelSource& source, bool pack) {
         "\nspace directions: " + directions + "\nkinds: domain domain domain\n";
     if (pixel_bytes(source.type()) > 1) text += "endian: little\n";
     text += std::string("encoding: ") + (pack ? "gzip" : "raw") + "\nspace origin: (" + joined(g.origin, ",") + ")\n";
-    // After "space", as the format wants it.
+    // After "space", as the format requires.
     const std::string unit = "\"" + quoted(g.unit) + "\"";
     if (!g.unit.empty()) text += "space units: " + unit + " " + unit + " " + unit + "\n";
     for (const auto& [key, value] : source.metadata()) text += escaped(key) + ":=" + escaped(value) + "\n";
@@ -93,7 +93,7 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     std::string matrix;
     for (std::size_t a = 0; a < 3; ++a) matrix += (a == 0 ? "" : " ") + joined(axis_of(g, a), " ");
     std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n";
-    // As wide as any, to be written again when it is known.
+    // Padded to the maximum width, because the size is known only later and then overwritten.
     std::string count = std::to_string(packed_bytes);
     constexpr std::size_t kWidest = 20;
     count.insert(0, kWidest - count.size(), ' ');
@@ -112,7 +112,7 @@ std::array<double, 3> quaternion(const Matrix3& r) {
         const double a = 0.5 * std::sqrt(trace);
         return {0.25 * (r[2][1] - r[1][2]) / a, 0.25 * (r[0][2] - r[2][0]) / a, 0.25 * (r[1][0] - r[0][1]) / a};
     }
-    // The largest of b, c and d divides the others.
+    // The largest of b, c and d is computed first, because the others are divided by it.
     std::size_t i = 0;
     for (std::size_t n = 1; n < 3; ++n)
         if (r[n][n] > r[i][i]) i = n;
@@ -137,9 +137,9 @@ bool is_sheared(const Matrix3& direction) {
     return maximum > 1e-3;
 }
 
-/// Whether one of the forms that an input stated means the lattice that this header has.
+/// Whether the form that readers use of an input's header describes the same lattice as this header.
 bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
-    constexpr double kRounding = 1e-3;  // of voxels, and of rotations
+    constexpr double kRounding = 1e-3;  // relative to the spacing, and for quaternions
     const auto own = [&](std::size_t at, std::size_t n) {
         float value = 0;
         std::memcpy(&value, header.data() + at + n * sizeof(value), sizeof(value));
@@ -158,9 +158,9 @@ bool still_holds(const NiftiSpace& space, const std::string& header, double spac
         return true;
     };
     const bool same_side = (space.qfac < 0) == (own(kPixdim, 0) < 0);
-    // Of half a turn both signs of the axis mean the same.
+    // For a rotation by 180 degrees, both signs of the axis mean the same rotation.
     const bool turn = turns_alike(1) || (square > 1 - kRounding && turns_alike(-1));
-    // Readers take the sform where it has a code.
+    // Readers use the sform if it has a code.
     if (space.codes[1] > 0) return lies_alike(space.sform, kSrow, 0);
     return space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3);
 }
@@ -200,11 +200,11 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
         put_float(kSrow + 16 * a + 12, origin);
         for (std::size_t b = 0; b < 3; ++b) put_float(kSrow + 16 * a + 4 * b, ras[a][b] * g.spacing[b]);
     }
-    put_float(108, 352);  // where the voxels begin
+    put_float(108, 352);  // position of the first voxel
     put_float(112, 1);    // slope
     const auto unit = std::find(kNiftiUnits.begin() + 1, kNiftiUnits.end(), g.unit);
     header[123] = char(unit == kNiftiUnits.end() ? 0 : unit - kNiftiUnits.begin());
-    // A qform has no place for sheared axes.
+    // A qform cannot represent sheared axes.
     put(kCodes, std::int16_t(is_sheared(g.direction) ? 0 : 1));
     put(kCodes + 2, std::int16_t(1));
     const std::optional<NiftiSpace> stated = read_nifti_space(like);
@@ -231,7 +231,7 @@ std::string npy_header(const PixelSource& source) {
     return std::string("\x93NUMPY\x01\x00", 8) + char(length & 0xFF) + char(length >> 8) + dictionary + "\n";
 }
 
-/// A file that grows at its end; zeros are left out where the file system keeps holes.
+/// A file that is written sequentially; zeros are skipped, which leaves holes if the file system supports them.
 class GrowingFile {
 public:
     explicit GrowingFile(const std::string& path) : path_(path), file_(path, std::ios::binary | std::ios::trunc) {
@@ -261,11 +261,11 @@ private:
     std::uint64_t size_ = 0;
 };
 
-/// The lattice in blocks of whole slices, or of rows of one slice.
+/// Divides the lattice into blocks of whole slices, or of rows of one slice.
 class Layers {
 public:
     Layers(const Index3& size, std::uint64_t pixel) : size_(size) {
-        // Small enough that many are empty or full throughout, large enough that packing one costs more than its begin.
+        // Small enough for many blocks to be uniform, large enough for the cost of starting a block to be negligible.
         constexpr std::uint64_t kBlock = 1U << 18;
         const std::uint64_t row = std::uint64_t(size[0]) * pixel, slice = row * std::uint64_t(size[1]);
         slices_ = std::int32_t(std::clamp<std::uint64_t>(kBlock / slice, 1, std::uint64_t(size[2])));
@@ -295,7 +295,7 @@ std::string bytes_of(std::uint32_t value, bool big_endian) {
     return bytes;
 }
 
-/// @param before  bytes that the packed stream begins with
+/// @param before  bytes at the beginning of the packed stream
 void add_voxels(GrowingFile& file, const PixelSource& source, BlockPacking packing, const RunContext& run,
                 const std::string& before = {}) {
     const Layers layers(source.geometry().size, pixel_bytes(source.type()));
@@ -319,13 +319,13 @@ void add_voxels(GrowingFile& file, const PixelSource& source, BlockPacking packi
     packer.pack_all(
         layers.count(), [&](std::uint64_t n) { return layers.place(n); },
         [&](std::uint64_t, const PackedBlock& block) { add(block); }, run);
-    // An empty last block of deflate's.
+    // An empty last block of the deflate format.
     if (gzip || adler) file.add(std::string("\x03\x00", 2));
     if (gzip) file.add(bytes_of(std::uint32_t(check), false) + bytes_of(std::uint32_t(unpacked), false));
     if (adler) file.add(bytes_of(std::uint32_t(check), true));
 }
 
-/// The header and the blank line behind it, filled by a comment to `length` bytes.
+/// The header and the blank line after it, padded to `length` bytes by a comment.
 std::string filled(std::string header, std::size_t length) {
     header += "#";
     header.resize(length - 2, ' ');
@@ -339,7 +339,7 @@ void write_nrrd(GrowingFile& file, const PixelSource& source, bool pack, const R
         file.add(widest + "\n");
         return add_voxels(file, source, packing, run);
     }
-    // Extents are known when the voxels are.
+    // Extents of segments are known only after all voxels, so the header is overwritten in the end.
     constexpr std::size_t kShortestComment = 2, kBlank = 1;
     const std::size_t length = widest.size() + kShortestComment + kBlank;
     file.add(filled(widest, length));

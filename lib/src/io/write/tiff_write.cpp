@@ -12,16 +12,17 @@
 namespace covol::detail {
 namespace {
 
-/// What TIFF keeps of a spacing: libtiff has single precision.
+/// The resolution that TIFF stores for a spacing: libtiff uses single precision.
 double resolution(double spacing) { return double(float(1.0 / spacing)); }
 
-/// @param range  what ImageJ shows from black to white; otherwise masks of ones are black among 255
+/// @param range  values that ImageJ displays as black and white; without it, masks of 1 would appear black on a scale
+/// to 255
 std::string imagej_description(const ImageGeometry& geometry, const std::optional<std::array<double, 2>>& range) {
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
     if (geometry.spacing_known) description += "spacing=" + shortest(geometry.spacing[2]) + "\n";
-    // ImageJ tells the origin in voxels, as the voxel that lies at 0: in those that it will read.
+    // ImageJ's origin is the position in voxels of the point 0, here in voxels of the spacing that it will read.
     for (std::size_t a = 0; a < 3; ++a) {
         const double per_length = a < 2 ? resolution(geometry.spacing[a]) : 1 / geometry.spacing[a];
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)
@@ -52,7 +53,7 @@ struct PageParts {
 };
 
 PageParts parts_of(const Index3& size, std::uint64_t pixel, bool big) {
-    // ImageJ opens no tiles, and no BigTIFF either.
+    // ImageJ opens neither tiles nor BigTIFF.
     constexpr std::int32_t kTile = 256;
     constexpr std::uint64_t kStrip = 1U << 18;
     if (big) return {size, {kTile, kTile, 1}, true};

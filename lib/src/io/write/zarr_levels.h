@@ -3,27 +3,27 @@
 
 #include "covol/image.h"
 
-// The levels of a pyramid, each of half the size of the one before.
+// The levels of a pyramid, each half the size of the previous one.
 namespace covol::detail {
 
 struct PyramidLevel {
     Index3 size;
-    Index3 factor{1, 1, 1};  ///< voxels of the level before that one of this level stands for: 1 or 2 along each axis
-    Index3 scale{1, 1, 1};   ///< the same, of the finest level
+    Index3 factor{1, 1, 1};  ///< voxels of the previous level for one voxel of this level: 1 or 2 along each axis
+    Index3 scale{1, 1, 1};   ///< the same relative to the finest level
 };
 
-/// From the image down to one chunk. An axis whose spacing is twice that of the finest of those that do not fit into a
-/// chunk yet, or more, waits until it is not.
+/// The levels from the image down to one chunk. An axis is not halved while its spacing is at least twice the finest
+/// spacing among the axes that do not fit into a chunk yet.
 /// @param chunk  voxels of a chunk, the same in all levels
 [[nodiscard]] std::vector<PyramidLevel> pyramid_levels(const ImageGeometry& geometry, const Index3& chunk);
 
-/// The box of the finest level that a box of this level stands for.
+/// The box of the finest level that corresponds to a box of this level.
 [[nodiscard]] VoxelBox finest_box(const PyramidLevel& level, const VoxelBox& box, const Index3& finest);
 
-/// Makes the voxels of `factor` fine ones each: the most frequent value (of equally frequent ones that of the first
-/// voxel), or the mean.
+/// Combines `factor` fine voxels into one: the most frequent value (for ties, the one that occurs first), or the mean.
 /// @param fine    the fine voxels, of `fine_size`, i fastest
-/// @param coarse  where the first one goes, in a lattice of `coarse_size`
+/// @param coarse  the result, a lattice of `coarse_size`
+/// @param first   position of the first voxel in it
 void coarsen(PixelType type, bool most_frequent, const Index3& factor, const void* fine, const Index3& fine_size,
              void* coarse, const Index3& first, const Index3& coarse_size);
 

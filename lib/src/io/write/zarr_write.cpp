@@ -1,4 +1,4 @@
-// OME-Zarr 0.4 (https://ngff.openmicroscopy.org/0.4/): an array of Zarr 2 for each level of a pyramid.
+// OME-Zarr 0.4 (https://ngff.openmicroscopy.org/0.4/): a Zarr 2 array for each level of a pyramid.
 #include <blosc.h>
 #include <tbb/parallel_for.h>
 
@@ -49,7 +49,7 @@ std::string dtype_of(PixelType type) {
     });
 }
 
-/// As OME-Zarr spells units, those of UDUNITS; empty where it has no name for it.
+/// OME-Zarr's name of a unit, from UDUNITS; empty if there is none.
 std::string unit_name(const std::string& unit) {
     static constexpr std::array<std::array<const char*, 2>, 8> kNames{{{"pm", "picometer"},
                                                                        {"angstrom", "angstrom"},
@@ -64,7 +64,7 @@ std::string unit_name(const std::string& unit) {
     return {};
 }
 
-/// z, y, x of i, j, k.
+/// The numbers of i, j, k in the order z, y, x.
 template <typename Numbers>
 Json reversed(const Numbers& n) {
     return Json::array({n[2], n[1], n[0]});
@@ -103,7 +103,7 @@ private:
     /// The voxels of a chunk that lie in the image.
     struct Voxels {
         std::optional<double> uniform;
-        std::string values;  ///< none where it is uniform
+        std::string values;  ///< empty if uniform
     };
 
     [[nodiscard]] std::string level_folder(std::size_t level) const { return folder_ + "/" + std::to_string(level); }
@@ -132,7 +132,7 @@ private:
             Vec3 scale{}, translation{};
             for (int a = 0; a < 3; ++a) {
                 scale[a] = g.spacing[a] * levels_[n].scale[a];
-                // The first coarse voxel's centre is the middle of the fine ones that it stands for.
+                // The centre of the first coarse voxel is the centre of the fine voxels that it covers.
                 translation[a] = g.origin[a] + (scale[a] - g.spacing[a]) / 2;
             }
             datasets.push_back({{"path", std::to_string(n)},
@@ -175,7 +175,7 @@ private:
                 {"dimension_separator", "/"}};
     }
 
-    /// Writes a chunk and all that is below it in the pyramid; those of zeros are left out.
+    /// Writes a chunk and all chunks of finer levels within it; chunks of zeros are omitted.
     Voxels make(std::size_t level, const Index3& place) {
         const VoxelBox box = box_of(level, place);
         const VoxelBox fine = finest_box(levels_[level], box, source_.geometry().size);
@@ -194,16 +194,16 @@ private:
         } else {
             gather(level, place, box, made.values);
         }
-        // A value that is not zero has a byte that is not.
+        // A value other than zero has at least one byte other than zero.
         if (made.values.find_first_not_of('\0') == std::string::npos) return {0.0, {}};
         std::string stored = made.values;
         stored.resize(voxel_count(chunk_) * width_);
-        spread(box.size(), chunk_, width_, stored.data());
+        pad_rows(box.size(), chunk_, width_, stored.data());
         write_bytes(chunk_path(level, place), packed(stored));
         return made;
     }
 
-    /// The places of the finer level's chunks that a chunk is made of.
+    /// The positions of the finer level's chunks that a chunk covers.
     [[nodiscard]] std::vector<Index3> below(std::size_t level, const Index3& place) const {
         const Index3 factor = levels_[level].factor, count = chunks(level - 1);
         std::vector<Index3> places;
@@ -227,7 +227,7 @@ private:
                 part.values.resize(voxel_count(fine.size()) * width_);
                 fill_value(source_.type(), *part.uniform, voxel_count(fine.size()), part.values.data());
             }
-            // Chunks are of one size: where an axis is not halved, one chunk is below one.
+            // All chunks have the same size, so along an axis that is not halved, a chunk covers one finer chunk.
             Index3 first{};
             for (int a = 0; a < 3; ++a) first[a] = fine.min[a] / factor[a] - box.min[a];
             coarsen(source_.type(), source_.is_labels(), factor, part.values.data(), fine.size(), values.data(), first,

@@ -8,7 +8,7 @@
 
 namespace covol::figure {
 
-Basis look(double azimuth, double elevation) {
+Basis view_basis(double azimuth, double elevation) {
     const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
     Basis basis;
     basis.to_eye = {std::sin(a) * std::cos(e), -std::cos(a) * std::cos(e), std::sin(e)};

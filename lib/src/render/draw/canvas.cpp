@@ -8,7 +8,7 @@
 namespace covol::figure {
 namespace {
 
-/// The pixels of `clip` and of the picture that a shape may touch.
+/// Visits the pixels of `clip` and of the picture that a shape may touch.
 template <typename Visit>
 void visit_pixels(double x0, double y0, double x1, double y1, const Rect& clip, const Rect& whole, const Visit& visit) {
     const auto low = [](double v, int a, int b) { return int(std::floor(std::max(v - 1, double(std::max(a, b))))); };

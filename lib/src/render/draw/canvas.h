@@ -1,5 +1,5 @@
 #pragma once
-// A picture that shapes are drawn into, with smooth edges.
+// A picture into which shapes are drawn with smooth edges.
 #include <array>
 #include <cstddef>
 #include <vector>
@@ -17,7 +17,7 @@ struct Rect {
 };
 
 /// Positions of shapes are in pixels from the upper left corner of the picture: the centre of its first pixel is at
-/// (0.5, 0.5). What falls outside the picture or outside `clip` is left out.
+/// (0.5, 0.5). Parts outside the picture or outside `clip` are not drawn.
 class Canvas {
 public:
     Canvas(int width, int height, const Color& background);
@@ -25,7 +25,7 @@ public:
     [[nodiscard]] int height() const { return height_; }
     [[nodiscard]] Rect whole() const { return {0, 0, width_, height_}; }
     [[nodiscard]] Color& at(int x, int y) { return pixels_[std::size_t(y) * width_ + x]; }
-    /// Covers a share of a pixel.
+    /// Blends the colour over a fraction of a pixel.
     void blend(int x, int y, const Color& color, double fraction);
 
     void fill(const Rect& rect, const Color& color, double fraction = 1);

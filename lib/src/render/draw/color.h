@@ -1,5 +1,5 @@
 #pragma once
-// Colours of figures. All of them are told apart by colour-blind readers too.
+// Colours of figures, which colour-blind readers can distinguish too.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,7 +25,7 @@ inline Color to_color(const std::array<std::uint8_t, 3>& c) {
 inline constexpr Color kSkyBlue{0.337F, 0.706F, 0.914F}, kVermillion{0.835F, 0.369F, 0.0F}, kGreen{0.0F, 0.62F, 0.451F},
     kBlue{0.0F, 0.447F, 0.698F};
 
-/// What lies around and over the pictures.
+/// Colours around and on top of the pictures.
 struct Theme {
     Color background, ink, faint;
 };

@@ -9,8 +9,8 @@
 namespace covol::figure {
 namespace {
 
-constexpr double kLine = 1.45;   // from a line of the legend to the next, sizes of the font
-constexpr double kPatch = 0.75;  // of the legend
+constexpr double kLine = 1.45;   // distance between lines of the legend, in font sizes
+constexpr double kPatch = 0.75;  // patch of the legend, in font sizes
 
 std::string shown_unit(const std::string& unit) {
     if (unit == "um" || unit == "micron" || unit == "microns" || unit == "micrometer" || unit == "micrometre")
@@ -53,9 +53,9 @@ std::string length_text(double length, const std::string& unit) {
     return short_number(length) + " " + shown_unit(unit);
 }
 
-void draw_scale_bar(Canvas& canvas, double x, double y, double room, double pixel, const std::string& unit,
+void draw_scale_bar(Canvas& canvas, double x, double y, double available, double pixel, const std::string& unit,
                     const BarStyle& style) {
-    const double length = round_length(0.32 * room * pixel), width = length / pixel;
+    const double length = round_length(0.32 * available * pixel), width = length / pixel;
     const double thick = std::max(2.0, std::round(0.22 * style.text));
     const double right = std::round(x), left = right - width, top = std::round(y) - thick;
     for (const bool rim : {true, false}) {
@@ -78,7 +78,7 @@ void draw_scale_bar(Canvas& canvas, double x, double y, double room, double pixe
 void draw_axes(Canvas& canvas, double x, double y, double length, const Basis& basis,
                const std::array<std::string, 3>& names, double text, const Color& ink) {
     const Color colors[3] = {kVermillion, kGreen, kBlue};
-    // Those that point away from the eye first.
+    // Axes that point away from the eye are drawn first.
     std::array<int, 3> order{0, 1, 2};
     std::sort(order.begin(), order.end(), [&](int a, int b) { return basis.to_eye[a] < basis.to_eye[b]; });
     const double width = std::max(1.5, 0.12 * text);
@@ -86,7 +86,7 @@ void draw_axes(Canvas& canvas, double x, double y, double length, const Basis& b
         const double dx = basis.right[a], dy = -basis.up[a], seen = std::hypot(dx, dy);
         const double tip_x = x + length * dx, tip_y = y + length * dy;
         const Color color = mix(colors[a], ink, 0.1);
-        if (seen < 0.12) {  // it points at the eye, or away
+        if (seen < 0.12) {  // points at the eye, or away from it
             canvas.disc(x, y, 1.6 * width, color, 1, canvas.whole());
             continue;
         }

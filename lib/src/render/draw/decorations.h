@@ -1,5 +1,5 @@
 #pragma once
-// What tells a picture's scale, directions and colours.
+// Indications of a picture's scale, directions and colours.
 #include <string>
 #include <vector>
 
@@ -8,10 +8,10 @@
 
 namespace covol::figure {
 
-/// 1, 2 or 5 times a power of ten, the largest that is not above `length`.
+/// The largest 1, 2 or 5 times a power of ten that is not above `length`.
 [[nodiscard]] double round_length(double length);
 
-/// "50 µm"; of lengths whose unit is not known "50 units".
+/// "50 µm"; "50 units" if the unit is unknown.
 [[nodiscard]] std::string length_text(double length, const std::string& unit);
 
 /// A number with no more digits than it needs.
@@ -22,11 +22,11 @@ struct BarStyle {
     double text = 16;  ///< size of the font, pixels
     double rim = 0;    ///< width of a darker rim, pixels: for bars on images
 };
-/// A bar of a round length, a fifth or so of `room`, with its text above; its right end and its lower edge are at x, y.
-void draw_scale_bar(Canvas& canvas, double x, double y, double room, double pixel, const std::string& unit,
+/// A bar of a round length, about a fifth of `room`, with its text above; its right end and its lower edge are at x, y.
+void draw_scale_bar(Canvas& canvas, double x, double y, double available, double pixel, const std::string& unit,
                     const BarStyle& style);
 
-/// Three arrows from the place x, y along the world's axes.
+/// Three arrows from the position x, y along the world's axes.
 /// @param names  of the axes' positive ends
 void draw_axes(Canvas& canvas, double x, double y, double length, const Basis& basis,
                const std::array<std::string, 3>& names, double text, const Color& ink);
@@ -36,7 +36,7 @@ struct LegendEntry {
     Color color;
     bool is_mark = false;  ///< a dot, else a patch
 };
-/// Pixels that it takes.
+/// Its width and height in pixels.
 [[nodiscard]] std::array<double, 2> legend_size(const std::vector<LegendEntry>& entries, double text);
 /// @param x, y  its upper left corner
 void draw_legend(Canvas& canvas, double x, double y, const std::vector<LegendEntry>& entries, double text,

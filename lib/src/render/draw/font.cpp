@@ -78,7 +78,7 @@ const Glyph& glyph_of(std::uint32_t code) {
     return found != font.end() ? found->second : font.at(kUnknown);
 }
 
-/// Bytes that are no UTF-8 become the sign for an unknown letter.
+/// Bytes that are not UTF-8 become the replacement character.
 std::vector<std::uint32_t> code_points(const std::string& utf8) {
     std::vector<std::uint32_t> codes;
     for (std::size_t n = 0; n < utf8.size();) {
@@ -99,7 +99,7 @@ std::vector<std::uint32_t> code_points(const std::string& utf8) {
     return codes;
 }
 
-/// What letters cover of the pixels of a box.
+/// The fractions of the pixels of a box that letters cover.
 class Coverage {
 public:
     Coverage(int x, int y, int width, int height)
@@ -109,8 +109,8 @@ public:
     [[nodiscard]] int x() const { return x_; }
     [[nodiscard]] int y() const { return y_; }
 
-    /// One side of an outline. Each cell takes the signed area between the side and the cell's right end; sums from the
-    /// left are then what the outline covers.
+    /// Adds one side of an outline. Each cell accumulates the signed area between the side and the cell's right end;
+    /// sums from the left are then the fractions that the outline covers.
     void add(Place from, Place to) {
         const double sign = from[1] < to[1] ? 1 : -1;
         if (from[1] > to[1]) std::swap(from, to);

@@ -1,12 +1,12 @@
 #pragma once
-// Text in figures: outlines of a font, filled by the exact share of each pixel that they cover.
+// Text in figures: outlines of a font, filled by the exact fraction of each pixel that they cover.
 #include <string>
 
 #include "render/draw/canvas.h"
 
 namespace covol::figure {
 
-/// The outlines, in font_data.cpp, which says how they are written.
+/// The outlines, in font_data.cpp, which describes their format.
 extern const char* const kGlyphs;
 
 enum class Align { Left, Center, Right };
@@ -15,18 +15,19 @@ enum class Align { Left, Center, Right };
 struct TextStyle {
     double size = 16;  ///< of the font, pixels
     Color color{0, 0, 0};
-    Align align = Align::Left;  ///< where in the text x is
+    Align align = Align::Left;  ///< position of x in the text
     double halo = 0;            ///< width of a rim around the letters, pixels: for text on images
     Color halo_color{0, 0, 0};
 };
 
-/// Pixels from the first letter's origin to behind the last one. Letters that the font lacks count as a sign for them.
+/// Pixels from the first letter's origin to the end of the last one. Letters that the font lacks count as the
+/// replacement character.
 [[nodiscard]] double text_width(const std::string& utf8, double size);
 
-/// @param y  of the line that the letters stand on
+/// @param y  of the baseline
 void draw_text(Canvas& canvas, double x, double y, const std::string& utf8, const TextStyle& style);
 
-/// Of capital letters, in sizes of the font.
+/// Height of capital letters, in font sizes.
 inline constexpr double kCapHeight = 0.73;
 
 }  // namespace covol::figure

@@ -19,7 +19,7 @@ double fitted(const Rect& view, double aspect, int rim) {
 
 }  // namespace
 
-Tiling::Placed Tiling::place(const Rect& room, int gap) const {
+Tiling::Placed Tiling::place(const Rect& available, int gap) const {
     std::vector<double> widths;
     Placed placed;
     double all = 0;
@@ -32,9 +32,9 @@ Tiling::Placed Tiling::place(const Rect& room, int gap) const {
         }
         widths.push_back(width);
         all += width;
-        placed.pixel = std::max(placed.pixel, height / std::max(1, room.height - gap * int(column.size() - 1)));
+        placed.pixel = std::max(placed.pixel, height / std::max(1, available.height - gap * int(column.size() - 1)));
     }
-    placed.pixel = std::max(placed.pixel, all / std::max(1, room.width - gap * int(columns.size() - 1)));
+    placed.pixel = std::max(placed.pixel, all / std::max(1, available.width - gap * int(columns.size() - 1)));
     const auto pixels = [&](double length) { return std::max(1, int(std::floor(length / placed.pixel + 1e-9))); };
     int x = 0, maximum = 0;
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -46,7 +46,8 @@ Tiling::Placed Tiling::place(const Rect& room, int gap) const {
         maximum = std::max(maximum, y - gap);
         x += pixels(widths[c]) + gap;
     }
-    placed.bounds = {room.x + (room.width - (x - gap)) / 2, room.y + (room.height - maximum) / 2, x - gap, maximum};
+    placed.bounds = {available.x + (available.width - (x - gap)) / 2, available.y + (available.height - maximum) / 2,
+                     x - gap, maximum};
     for (Rect& rect : placed.at) {
         rect.x += placed.bounds.x;
         rect.y += placed.bounds.y;
@@ -74,15 +75,15 @@ std::vector<Tiling> ways_for_equals(double width, double height, int count) {
     return ways;
 }
 
-Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>& ways, int gap) {
+Split split(const Rect& available, double aspect, int rim, const std::vector<Tiling>& ways, int gap) {
     Split best;
     bool is_beside = true;
     double maximum = -1;
     for (int way = 0; way < int(ways.size()); ++way)
         for (const bool beside : {true, false})
             for (double fraction = 0.35; fraction < 0.76; fraction += 0.01) {
-                Rect view = room, rest = room;
-                (beside ? view.width : view.height) = int(fraction * (beside ? room.width : room.height));
+                Rect view = available, rest = available;
+                (beside ? view.width : view.height) = int(fraction * (beside ? available.width : available.height));
                 const int used = (beside ? view.width : view.height) + gap;
                 (beside ? rest.x : rest.y) += used;
                 (beside ? rest.width : rest.height) -= used;
@@ -96,21 +97,22 @@ Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>&
                 best = {view, parts, way};
                 is_beside = beside;
             }
-    // What the parts leave of their side goes to the view.
+    // The space that the parts leave on their side is given to the view.
     int& corner = is_beside ? best.parts.bounds.x : best.parts.bounds.y;
     const int moved =
-        (is_beside ? room.right() - best.parts.bounds.width : room.bottom() - best.parts.bounds.height) - corner;
+        (is_beside ? available.right() - best.parts.bounds.width : available.bottom() - best.parts.bounds.height) -
+        corner;
     corner += moved;
     for (Rect& part : best.parts.at) (is_beside ? part.x : part.y) += moved;
-    (is_beside ? best.view.width : best.view.height) = corner - gap - (is_beside ? room.x : room.y);
+    (is_beside ? best.view.width : best.view.height) = corner - gap - (is_beside ? available.x : available.y);
     return best;
 }
 
-Split fill(const Rect& room, const std::vector<Tiling>& ways, int gap) {
+Split fill(const Rect& available, const std::vector<Tiling>& ways, int gap) {
     Split best;
     double maximum = -1;
     for (int way = 0; way < int(ways.size()); ++way) {
-        const Tiling::Placed parts = ways[way].place(room, gap);
+        const Tiling::Placed parts = ways[way].place(available, gap);
         if (area(parts) <= maximum) continue;
         maximum = area(parts);
         best = {{}, parts, way};

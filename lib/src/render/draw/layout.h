@@ -1,5 +1,5 @@
 #pragma once
-// Where a figure's parts lie.
+// Layout of a figure's parts.
 #include <array>
 #include <vector>
 
@@ -7,40 +7,40 @@
 
 namespace covol::figure {
 
-/// A part whose sides are known, before its scale is.
+/// A part whose sides are known before its scale.
 struct Cell {
     double width = 1, height = 1;  ///< world units
 };
 
-/// Columns of parts at one scale, each from the top.
+/// Columns of parts at one scale, each filled from the top.
 struct Tiling {
     std::vector<std::vector<Cell>> columns;
-    /// Pixel positions, column by column, and the scale at which it fits into `room`, in its middle.
+    /// Pixel positions, column by column, and the scale at which the tiling fits into `room`, centred.
     struct Placed {
         std::vector<Rect> at;
         Rect bounds;
         double pixel = 1;  ///< world units
     };
-    [[nodiscard]] Placed place(const Rect& room, int gap) const;
+    [[nodiscard]] Placed place(const Rect& available, int gap) const;
 };
 
-/// Ways to lay three parts, in order: the first and the third in a column and the second beside; the first and, beside
-/// it, the others in a column; all in a column; all in a row.
+/// Ways to arrange three parts, in order: the first and the third in a column and the second beside; the first and,
+/// beside it, the others in a column; all in a column; all in a row.
 [[nodiscard]] std::vector<Tiling> ways_for_three(const std::array<Cell, 3>& parts);
-/// Ways to lay equal parts in columns.
+/// Ways to arrange equal parts in columns.
 [[nodiscard]] std::vector<Tiling> ways_for_equals(double width, double height, int count);
 
 /// A view, and parts beside or below it.
 struct Split {
     Rect view;
     Tiling::Placed parts;
-    int way = 0;  ///< of those given
+    int way = 0;  ///< index among those given
 };
-/// The split that leaves the least of `room` empty; the view gets somewhat more than the parts.
-/// @param aspect  what is in the view: its width over its height
-/// @param rim     pixels below what is in the view, for a scale bar
-[[nodiscard]] Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>& ways, int gap);
+/// The split that leaves the smallest part of `room` empty; the view gets somewhat more than the parts.
+/// @param aspect  width of the view's content divided by its height
+/// @param rim     pixels below the view's content, for a scale bar
+[[nodiscard]] Split split(const Rect& available, double aspect, int rim, const std::vector<Tiling>& ways, int gap);
 /// The parts alone, as large as they can be.
-[[nodiscard]] Split fill(const Rect& room, const std::vector<Tiling>& ways, int gap);
+[[nodiscard]] Split fill(const Rect& available, const std::vector<Tiling>& ways, int gap);
 
 }  // namespace covol::figure

@@ -26,13 +26,13 @@ constexpr std::size_t kMaxReportedLoops = 8;
 
 int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
 
-/// What a surface is made with, and the surface as far as it is made.
+/// The inputs of a surface, and the surface as far as it is complete.
 struct Maker {
     const Problem& problem;
     const Choices& choices;
     const Domain& domain;
-    const std::vector<Vec3>& points;  ///< that attract, without stray ones
-    const Creases* creases;           ///< of the field that the surface is made of, or null
+    const std::vector<Vec3>& points;  ///< those that attract, without stray points
+    const Creases* creases;           ///< of the field from which the surface is made, or null
     Surface made;
 
     [[nodiscard]] const SegmentOptions& options() const { return problem.options; }
@@ -74,7 +74,7 @@ struct Maker {
         take_mesh();
     }
 
-    /// Makes level set and mesh those of another closed mesh, with no more pieces and handles than they had.
+    /// Replaces level set and mesh by those of another closed mesh, unless these have more pieces and handles.
     void replace_by(const TriangleMesh& mesh) {
         const int before = complexity(measure(made.mesh));
         const FloatGridPtr rough = made.level_set;
@@ -85,10 +85,10 @@ struct Maker {
         take_surface_of(*start_from_grid(domain, *level_set, run()));
     }
 
-    /// A surface that points alone hold may have holes between them.
+    /// A surface that is defined by points alone may have holes between them.
     [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
 
-    /// What is left of the mesh if it ends where points are missing, or what spans that; none if the mesh stays closed.
+    /// The mesh trimmed where points are missing, or with these parts replaced; none if the mesh stays closed.
     std::optional<TreatedHoles> treated_holes(double distance, double slack) const {
         const auto trimmed = [&] { return trim_holes(made.mesh, made.distance_to_points, distance, slack, run()); };
         switch (options().holes.policy) {
@@ -102,18 +102,18 @@ struct Maker {
             TreatedHoles open = trimmed();
             double rims = 0;
             for (const BoundaryLoop& loop : open.report.loops) rims += loop.length;
-            // What closes a sheet is as large as the sheet itself, or larger; along curves there are strips of points,
+            // The part that closes a sheet is at least as large as the sheet itself. Points along curves support strips
             // and no sheet.
             const bool is_sheet = measure(open.mesh).area > 2 * distance * rims;
             if (is_sheet && open.report.fraction > 0.5) return open;
         } catch (const Error& error) {
-            // Points along curves hold no surface anywhere: what curvature makes of them is all that there is.
+            // Points along curves support no surface anywhere: the surface that curvature makes is kept.
             if (error.code() != Errc::InvalidInput) throw;
         }
         return {};
     }
 
-    /// How much of the surface no point holds, and what becomes of that.
+    /// Measures which part of the surface is without points, and treats it according to the options.
     void treat_holes() {
         const HolesOptions& requested = options().holes;
         HolesReport& holes = made.holes;
@@ -175,7 +175,7 @@ struct Maker {
     void make_and_measure_mesh() {
         take_mesh();
         if (may_have_holes()) treat_holes();
-        // Parts of each of these run on one thread.
+        // Parts of both run on a single thread.
         tbb::parallel_invoke([&] { made.measures = measure(made.mesh); },
                              [&] {
                                  if (!points.empty()) made.mark_distances = detail::distances_to(made.mesh, made.marks);
@@ -187,8 +187,8 @@ struct Maker {
 }  // namespace
 
 Surface make_surface(const Problem& problem, const Choices& choices, Solution& solution, const FloatGridPtr& known) {
-    const bool is_field =
-        solution.start.origin == StartOrigin::Cloud && rests(problem, solution.start, solution.edges.options.feature);
+    const bool is_field = solution.start.origin == StartOrigin::Cloud &&
+                          is_final_start(problem, solution.start, solution.edges.options.feature);
     const std::vector<Vec3>& points = choices.cloud ? choices.cloud->points : solution.start.marks.attracting;
     Maker maker{problem, choices, solution.start.domain, points, is_field ? solution.start.creases.get() : nullptr, {}};
     maker.made.active_voxels = solution.solve.active_voxels;

@@ -1,5 +1,5 @@
 #pragma once
-// The surface of a solution: its distance, its mesh, and what becomes of holes in it.
+// The surface of a solution: its distance, its mesh, and the treatment of its holes.
 #include <vector>
 
 #include "segment/solve/flow.h"
@@ -7,12 +7,12 @@
 namespace covol::pipeline {
 
 struct Surface {
-    FloatGridPtr u;                         ///< that it is made of; null without fields
+    FloatGridPtr u;                         ///< from which it is made; null without fields
     FloatGridPtr level_set;                 ///< the distance to it
     TriangleMesh mesh;                      ///< empty without a mesh
-    std::vector<float> distance_to_points;  ///< at the mesh's vertices; of points without an image
+    std::vector<float> distance_to_points;  ///< at the mesh's vertices; for points without an image
     std::vector<Vec3> marks;                ///< Choices::measured_marks without those that are likely wrong
-    std::vector<double> mark_distances;     ///< of these to it; empty where nothing attracts
+    std::vector<double> mark_distances;     ///< from these to the surface; empty if nothing attracts
     std::int64_t active_voxels = 0, leaf_count = 0;
     MeshMeasures measures;
     RelaxReport mesh_report;
@@ -21,8 +21,8 @@ struct Surface {
     StepReport report;
 };
 
-/// @param solution  its u, distance and edges are given up where the options want no fields
-/// @param known     the surface of u where that was made already, or null
+/// @param solution  its u, distance and edges are released if the options request no fields
+/// @param known     the surface of u if it is computed already, or null
 [[nodiscard]] Surface make_surface(const Problem& problem, const Choices& choices, Solution& solution,
                                    const FloatGridPtr& known = nullptr);
 

@@ -6,9 +6,9 @@
 
 namespace covol::pipeline {
 
-/// Fills `fit.bias` and `marks_off`, whose `beyond` is known, of the report on a surface.
+/// Fills `fit.bias` and `marks_off` of the report on a surface; `marks_off.beyond` must be set.
 /// @param distances  of each mark to the surface
-/// @return what a person has to look at, one line each
+/// @return warnings for the user, one line each
 [[nodiscard]] std::vector<std::string> compare_with_marks(SegmentReport& report, const FloatGrid& surface,
                                                           const Image* image, const std::vector<Vec3>& marks,
                                                           const std::vector<double>& distances);

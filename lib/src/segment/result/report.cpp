@@ -19,7 +19,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// One place of the surface for each leaf that it passes.
+/// One position on the surface in each leaf that it crosses.
 std::vector<Vec3> places_on(const FloatGrid& surface) {
     std::vector<Vec3> places;
     for (auto leaf = surface.tree().cbeginLeaf(); leaf; ++leaf) {
@@ -39,7 +39,7 @@ std::vector<Vec3> places_on(const FloatGrid& surface) {
     return places;
 }
 
-/// What of the marks, and of the image at them, speaks against a surface.
+/// Warnings about a surface that follow from the marks, and from the image at them.
 class Doubts {
 public:
     Doubts(const Problem& problem, const Choices& choices, const Solution& solution, const Surface& surface,
@@ -56,7 +56,7 @@ public:
         report_.marks_off.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
         for (const std::string& line :
              compare_with_marks(report_, *surface_.level_set, problem_.image, marks_, surface_.mark_distances))
-            if (!solution_.start.cloud.fills) warn(line);  // points that fill a solid lie within its surface
+            if (!solution_.start.cloud.fills) warn(line);  // points that fill a solid lie inside its surface
         if (solution_.start.origin == StartOrigin::Guess) find_surface_beyond();
         if (solution_.start.origin == StartOrigin::Cloud) find_folds();
         if (problem_.image == nullptr || !uses_image(solution_.start.flow)) return;
@@ -76,7 +76,7 @@ public:
 private:
     void warn(const std::string& line) { remarks_.warn(line, problem_.run); }
 
-    /// A surface through marks may bend least where it goes on for ever.
+    /// The surface of minimum bending energy through the marks may extend far beyond them.
     void find_surface_beyond() {
         const WorldBox box = bounding_box(marks_);
         const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
@@ -93,8 +93,8 @@ private:
                  "more there, or give a place outside the body (`outside`)");
     }
 
-    /// Noise fills space as far as it reaches; what is smoothed like it, though the nearest points lie on sheets, are
-    /// folds.
+    /// Noise fills space within its range. If the nearest points lie on sheets although the smoothing was that for
+    /// noise, the points are folds.
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
@@ -105,7 +105,7 @@ private:
                  "): folds or walls closer together than two or three points are lost; sample more densely there");
     }
 
-    /// Values are computed on in single precision.
+    /// Values are processed in single precision.
     void find_lost_precision() {
         const auto [low, high] = problem_.image->percentiles(0.01, 0.99);
         const double largest = std::max(std::abs(low), std::abs(high));
@@ -122,7 +122,7 @@ private:
 
     [[nodiscard]] Normals normals_at_marks() const {
         const std::size_t every = std::max<std::size_t>(1, marks_.size() / kDoubts.support_marks);
-        std::vector<Vec3> beside;  // of each, before and behind along each axis
+        std::vector<Vec3> beside;  // two samples for each mark and axis, before and behind
         for (std::size_t n = 0; n < marks_.size(); n += every)
             for (int a = 0; a < 3; ++a)
                 for (const double step : {-0.5, 0.5}) beside.emplace_back(marks_[n])[std::size_t(a)] += step * h_;
@@ -132,7 +132,7 @@ private:
             Vec3 normal{};
             for (std::size_t a = 0; a < 3; ++a) normal[a] = levels[first + 2 * a + 1] - levels[first + 2 * a];
             const double length = std::hypot(normal[0], normal[1], normal[2]);
-            if (!(length > 0.5 * h_)) continue;  // off the band
+            if (!(length > 0.5 * h_)) continue;  // outside of the band
             for (double& c : normal) c /= length;
             found.places.push_back(marks_[n]);
             found.normals.push_back(normal);
@@ -140,7 +140,7 @@ private:
         return found;
     }
 
-    /// Marks of another image, of another channel or space, look like marks: the image knows better.
+    /// Marks of another image, channel or coordinate system look valid; only the image shows that they do not fit.
     void find_strange_image() {
         const Normals at = normals_at_marks();
         const detail::ImageSupport support =
@@ -218,7 +218,7 @@ private:
 
     void find_holes() {
         const HolesReport& holes = surface_.holes;
-        // What ends where the points end is right; the choice of it is told where it is made.
+        // A surface that ends where the points end is correct, and its choice is reported elsewhere.
         if (surface_.fraction_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
         warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface lie farther than " +
              number(holes.distance) + " from every point: " +

@@ -18,7 +18,7 @@ bool is_large(const Domain& d) {
     return minimum >= kCoarse.min_coarsened;
 }
 
-/// Automatic where the way to the surface may be long: tagging and a result of another run end beside it.
+/// Automatic if the way to the surface may be long. Tagging and a previous result start close to it.
 int levels_of(const SegmentOptions& options, const StartFacts& start) {
     if (options.coarse_levels) return *options.coarse_levels;
     const bool is_rough = is_any<SphereStart, BoxStart>(options.start);
@@ -30,14 +30,15 @@ EvolveOptions coarsened(EvolveOptions flow, double h) {
     flow.tolerance = std::max(flow.tolerance, kCoarse.coarse_tolerance);
     if (flow.tau)
         *flow.tau *= kCoarse.refinement;
-    else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // else it grows by itself
+    else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // otherwise it grows automatically
         flow.tau = kCoarse.coarse_tau * h;
     if (const double range = flow.attraction_range.value_or(0); range > 0)
         flow.attraction_range = std::max(range, kCoarse.min_coarse_attraction * h);
     return flow;
 }
 
-// Two edges closer than a few coarse voxels are one there: the fine level comes from the same side as the start would.
+// On the coarse level two edges closer than a few voxels merge, so that the fine level has to approach from the side of
+// the start.
 void step_back(FloatGrid& u, const FloatGrid& start, double h) {
     const auto back = static_cast<float>(kCoarse.step_back * h);
     const auto start_at = start.getConstAccessor();
@@ -50,7 +51,7 @@ EdgeOptions coarsened(EdgeOptions edge, double h) {
     return edge;
 }
 
-/// `start` in voxels of h; u is null where nothing of it is left there.
+/// `start` in voxels of h; u is null if nothing of it remains at that size.
 StartSurface coarsened(const Problem& problem, const StartSurface& start, double h) {
     StartSurface coarse;
     StartFacts& facts = coarse.facts;
@@ -72,7 +73,7 @@ StartSurface coarsened(const Problem& problem, const StartSurface& start, double
     return coarse;
 }
 
-/// On the levels from the coarsest to the one above `start`.
+/// Solves the levels from the coarsest to the one above `start`.
 CoarsePass pass(const Problem& problem, const StartSurface& start, const EdgeOptions& fine_edge, int levels) {
     CoarsePass result;
     const Timed timed(result.report.seconds.coarse);
@@ -112,7 +113,7 @@ StartSurface from_coarse_level(StartSurface start, const FloatGridPtr& u) {
 CoarsePass pass_coarse_levels(const Problem& problem, const StartSurface& start, const EdgeOptions& edge) {
     const int levels = levels_of(problem.options, start.facts);
     CoarsePass result;
-    if (levels > 0 && !start.obstacle && !rests(problem, start.facts, edge.feature) &&
+    if (levels > 0 && !start.obstacle && !is_final_start(problem, start.facts, edge.feature) &&
         start.facts.origin != StartOrigin::Contours)
         result = pass(problem, start, edge, levels);
     result.levels = levels;

@@ -13,17 +13,17 @@
 namespace covol::pipeline {
 namespace {
 
-/// A band that follows moves this far, in voxels, before g is extended.
+/// Distance in voxels that a band which follows the surface may move before g is extended.
 int edge_reach(StartOrigin origin) {
     switch (origin) {
         case StartOrigin::Guess:
-        case StartOrigin::Contours: return 5;     // lies close to the end
-        case StartOrigin::CoarseLevel: return 4;  // closer still
+        case StartOrigin::Contours: return 5;     // lies close to the result
+        case StartOrigin::CoarseLevel: return 4;  // lies closer still
         default: return 12;
     }
 }
 
-/// The active voxels of u and all within `voxels` of them, inside the domain; values mean nothing.
+/// The active voxels of u and all within `voxels` of them, inside the domain; values are undefined.
 FloatGridPtr dilated_topology(const FloatGrid& u, int voxels, const Domain& domain) {
     FloatGridPtr topology = u.deepCopy();
     openvdb::tools::dilateActiveValues(topology->tree(), voxels, openvdb::tools::NN_FACE, openvdb::tools::EXPAND_TILES);
@@ -31,7 +31,7 @@ FloatGridPtr dilated_topology(const FloatGrid& u, int voxels, const Domain& doma
     return topology;
 }
 
-/// Every active voxel of u is active in `field`.
+/// Whether every active voxel of u is active in `field`.
 bool covers(const FloatGrid& field, const FloatGrid& u) {
     for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf) {
         const auto* known = field.tree().probeConstLeaf(leaf->origin());
@@ -52,7 +52,7 @@ double diagonal(const WorldBox& a, const WorldBox& b) {
     return std::sqrt(squares);
 }
 
-/// Of the body, by central differences over h, not normalised.
+/// Gradient of the body's level by central differences over h, not normalised.
 Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     Vec3 slope;
     for (int a = 0; a < 3; ++a) {
@@ -64,7 +64,8 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     return slope;
 }
 
-/// How far beside the marks a side is that is still inside: across a thin body the other wall would be taken for it.
+/// Distance beside the marks at which the inner position still lies inside: in a thin body a larger one would lie
+/// beyond the opposite wall.
 double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                     double reach, double minimum) {
     for (; reach > minimum; reach *= 0.75) {
@@ -86,7 +87,7 @@ FloatGridPtr find_distance(const std::vector<Vec3>& points, const Domain& domain
     const Timed timed(report.seconds.distance);
     detail::require_tube_memory(points, domain, {reach, (radius - reach) / domain.voxel_size, true}, "segment", run);
     RunContext checked = run;
-    checked.memory_budget = 0;  // compute_distance() need not estimate it again
+    checked.memory_budget = 0;  // so that compute_distance() does not estimate the memory again
     return compute_distance(points, domain, {radius}, checked).grid;
 }
 
@@ -154,8 +155,10 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
     edges.options = options;
     if (!uses_image(start.flow)) return edges;
     const Timed timed(edges.report.seconds.edge);
-    const FloatGridPtr room = start.flow.follow ? dilated_topology(u, edge_reach(start.origin), start.domain) : nullptr;
-    const EdgeResult found = detect_edges(*problem.image, room ? *room : u, options, problem.run);
+    const FloatGridPtr topology_of_band =
+        start.flow.follow ? dilated_topology(u, edge_reach(start.origin), start.domain) : nullptr;
+    const EdgeResult found =
+        detect_edges(*problem.image, topology_of_band ? *topology_of_band : u, options, problem.run);
     edges.grid = found.grid;
     edges.found = found.report;
     const EdgeReport& e = found.report;
@@ -168,7 +171,7 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
     if (!options.intensities)
         remarks.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles",
                        problem.run);
-    // Fixed from here on: a band that moves must not change the meaning of g.
+    // Fixed from here on, because g must keep its meaning while the band moves.
     edges.options.edge_k = e.edge_k;
     edges.options.edge_contrast.reset();
     edges.options.intensities = {e.low, e.high};
@@ -177,8 +180,8 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
 
 FloatGridPtr extended_edges(const Problem& problem, const StartFacts& start, const FloatGrid& u, const Edges& edges) {
     if (covers(*edges.grid, u)) return nullptr;
-    const FloatGridPtr room = dilated_topology(u, edge_reach(start.origin), start.domain);
-    return detect_edges(*problem.image, *room, edges.options, problem.run).grid;
+    const FloatGridPtr topology_of_band = dilated_topology(u, edge_reach(start.origin), start.domain);
+    return detect_edges(*problem.image, *topology_of_band, edges.options, problem.run).grid;
 }
 
 }  // namespace covol::pipeline

@@ -14,7 +14,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// What the steps before cost goes to the total; the rest of it stays the later steps'.
+/// Adds the cost of the previous steps to the total; all other values are those of the later steps.
 void add(const EvolveReport& before, EvolveReport& total) {
     const double sweeps = before.sweeps_per_step * before.steps + total.sweeps_per_step * total.steps;
     total.steps += before.steps;
@@ -26,7 +26,8 @@ void add(const EvolveReport& before, EvolveReport& total) {
     total.seconds_sweeps += before.seconds_sweeps;
 }
 
-// Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
+// With an image, edges of other structures may lie between the tagged surface and the points: at first only the points
+// attract.
 EvolveReport approach(const StartFacts& start, FloatGrid& u, EvolveFields fields, const RunContext& run) {
     if (start.origin != StartOrigin::Tagged || !uses_points(start.flow) || !uses_image(start.flow)) return {};
     EvolveOptions alone = start.flow;
@@ -50,7 +51,7 @@ EvolveReport approach_and_evolve(const StartFacts& start, FloatGrid& u, const Ev
     return solved;
 }
 
-/// Of places to the zero level set; in its band, so clamped.
+/// Mean distance of positions to the zero level set, clamped to its band.
 double mean_distance(const std::vector<Vec3>& places, const FloatGrid& u) {
     double sum = 0;
     for (const double level : detail::levels_at(u, places)) sum += std::abs(level);
@@ -76,7 +77,7 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
     return "nothing held it; lower `delta`, or start closer to the edges (`init`)";
 }
 
-/// A surface through the marks, moved to where the image shows, between them, what it shows at them.
+/// Moves a surface through the marks so that the image's intensity profile between the marks matches the one at them.
 FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const FloatGridPtr& u, Solution& solution) {
     if (!uses_image(start.flow) || start.origin == StartOrigin::Corrected || start.origin == StartOrigin::Settled)
         return u;
@@ -84,14 +85,16 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     GuidanceOptions options;
     options.mark_precision = problem.options.mark_precision;
     options.weight = start.flow.rho;
-    // The image may not say how wrong the body between contours is: where it shows another border, it says very.
+    // The image must not determine how wrong the body between contours is: at another border it would imply a large
+    // error.
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     options.error_slope = start.inference.error_slope;
     if (start.inference.used) options.range = kFlow.inferred_range * start.domain.voxel_size;
     solution.was_requested = true;
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
-    // Between contours the start may be far off: where the image errs less, its result is a better one to ask from.
+    // Between contours the start may be far off: if guidance reduces the error, its result is a better start for the
+    // next pass.
     const int passes = start.origin == StartOrigin::Contours ? kFlow.contour_passes : 1;
     for (int pass = 1; pass < passes && guided.report.used; ++pass) {
         if (!(guided.report.image_error < guided.report.guess_error)) break;
@@ -106,8 +109,8 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     return guided.u;
 }
 
-void evolve_to_rest(const Problem& problem, StartSurface start, const EdgeOptions& edge, Solution& solution,
-                    Reached* reached) {
+void evolve_until_steady(const Problem& problem, StartSurface start, const EdgeOptions& edge, Solution& solution,
+                         Reached* reached) {
     const RunContext& run = problem.run;
     const StartFacts& facts = solution.start;
     FloatGrid& u = *solution.u;
@@ -139,7 +142,7 @@ void evolve_to_rest(const Problem& problem, StartSurface start, const EdgeOption
 
 }  // namespace
 
-EvolveReport report_of_rest(const FloatGrid& u) {
+EvolveReport steady_report(const FloatGrid& u) {
     EvolveReport report;
     report.stop_reason = StopReason::Steady;
     report.active_voxels = std::int64_t(u.activeVoxelCount());
@@ -154,13 +157,13 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
     solution.distance = start.distance;
     solution.edges.options = edge;
     if (reached != nullptr) *reached = {reached->start, solution.u, solution.distance, reached->edge};
-    if (!rests(problem, solution.start, edge.feature)) {
-        evolve_to_rest(problem, std::move(start), edge, solution, reached);
+    if (!is_final_start(problem, solution.start, edge.feature)) {
+        evolve_until_steady(problem, std::move(start), edge, solution, reached);
         return solution;
     }
     const Timed timed(solution.report.seconds.solve);
     solution.u = query_image(problem, solution.start, solution.u, solution);
-    solution.solve = report_of_rest(*solution.u);
+    solution.solve = steady_report(*solution.u);
     return solution;
 }
 

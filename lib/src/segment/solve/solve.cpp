@@ -33,7 +33,7 @@ Solution flow_by_levels(const Problem& problem, StartSurface start, const EdgeOp
     return solution;
 }
 
-/// What was found before `later` took its place stays in the report.
+/// Keeps the report of the solution that `later` replaces.
 Solution after(const Solution& earlier, Solution later) {
     StepReport report = earlier.report;
     report.add(later.report);
@@ -45,13 +45,13 @@ Solution after(const Solution& earlier, Solution later) {
     return later;
 }
 
-/// A start that was good by itself, in place of a flow that lost it.
+/// Returns to a start that was good by itself, in place of a flow that lost it.
 /// @param u  of that start
 Solution start_instead(const Problem& problem, const Solution& lost, const FloatGridPtr& u, Reached* reached) {
     if (lost.start.origin == StartOrigin::Grown) {
         Solution kept = lost;
         kept.u = u;
-        kept.solve = report_of_rest(*u);
+        kept.solve = steady_report(*u);
         kept.solve.stop_reason = StopReason::NotRun;
         kept.report.remarks.warn("the flow closed what had grown to the image's edges: this is that start itself",
                                  problem.run);
@@ -70,8 +70,9 @@ Solution start_instead(const Problem& problem, const Solution& lost, const Float
     return after(lost, std::move(rested));
 }
 
-/// The start through the marks that bends least; none where they have none, or it passes them no better.
-std::optional<StartSurface> better_guess(const Problem& problem, const Choices& choices, const Solution& solution) {
+/// The start of minimum bending energy through the marks; none if it does not exist, or does not pass them better.
+std::optional<StartSurface> find_better_guess(const Problem& problem, const Choices& choices,
+                                              const Solution& solution) {
     try {
         StartSurface guess = start_from_guess(problem, choices, solution.start.marks);
         if (!solution.has_vanished() && misses_marks(problem, guess.facts, *guess.u)) return {};
@@ -87,11 +88,11 @@ Solution guess_instead(const Problem& problem, const Choices& choices, Solution 
     const StartFacts& facts = solution.start;
     const bool vanished = solution.has_vanished();
     if (!problem.is_guided() || !uses_points(facts.flow) || facts.marks.trusted.size() < 4 ||
-        rests(problem, facts, solution.edges.options.feature))
+        is_final_start(problem, facts, solution.edges.options.feature))
         return solution;
     if (!vanished && (facts.origin == StartOrigin::Contours || !misses_marks(problem, facts, *solution.u)))
         return solution;
-    std::optional<StartSurface> guess = better_guess(problem, choices, solution);
+    std::optional<StartSurface> guess = find_better_guess(problem, choices, solution);
     if (!guess) return solution;
     guess->facts.tag = facts.tag;
     guess->facts.tag_distance = facts.tag_distance;

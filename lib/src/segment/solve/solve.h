@@ -1,11 +1,11 @@
 #pragma once
-// From a start to the surface that is kept: what is lost on the way is replaced by what the start or the marks tell.
+// From a start to the final surface. A flow that loses the surface is replaced by the start or by a guess.
 #include "segment/solve/flow.h"
 
 namespace covol::pipeline {
 
-/// The flow from `start`, after the coarse levels that are asked for. A surface that vanished, or that left the marks,
-/// is not returned while the start or the marks tell of one.
+/// The flow from `start`, after the requested coarse levels. A surface that vanished, or that left the marks, is not
+/// returned if the start or the marks give a better one.
 /// @param edge     with the feature that the marks lie on
 /// @param reached  kept up to date, or null
 /// @throws Error InvalidInput (the surface vanished); as the single steps.

@@ -1,4 +1,4 @@
-// The start from a cloud: the surface itself.
+// The start from a cloud, which is the surface itself.
 #include <openvdb/openvdb.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace covol::pipeline {
 namespace {
 
-// Where a scan has no points its surface rests on nothing, and would slide along the walls that have some.
+// In the holes of a scan nothing holds the surface, which would slide along the adjoining walls.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
     FloatGridPtr obstacle = start.deepCopy();
     for (auto leaf = obstacle->tree().beginLeaf(); leaf; ++leaf)
@@ -85,7 +85,7 @@ StartSurface start_from_cloud(const Problem& problem, const Choices& choices, Ma
     StartFacts& facts = start.facts;
     Remarks& remarks = facts.report.remarks;
     facts.domain = choose_cloud_domain(problem, choices.h, facts.marks.attracting);
-    const bool at_rest = rests(problem, facts, EdgeFeature::Slope);
+    const bool at_rest = is_final_start(problem, facts, EdgeFeature::Slope);
     {
         const Timed timed(facts.report.seconds.tag);
         CloudSurface field = cloud::settled_field(facts.domain, *choices.cloud, run);

@@ -12,7 +12,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// A body that goes on beyond the image is followed a little there: at the image's end itself the flow would turn its
+/// Continues a body that extends beyond the image a little: if it ended at the image's end, the flow would turn its
 /// wall to a right angle.
 Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     const WorldBox box = domain.world_box();
@@ -24,18 +24,18 @@ Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     return domain;
 }
 
-/// Those of the trusted marks that are no contours'.
+/// The trusted marks that do not belong to contours.
 std::vector<Vec3> loose_points(const MarkSets& marks, const Contours& contours) {
     const auto loose = std::ptrdiff_t(marks.trusted.size() - contours.along.size());
     return {marks.trusted.begin(), marks.trusted.begin() + loose};
 }
 
-/// Why the points are tagged after all, or null.
+/// The reason for tagging the points instead, or null.
 const char* why_tag(const Problem& problem, const std::vector<Vec3>& loose, double h) {
     const ContourSolid& body = *problem.body();
     for (const Vec3& seed : problem.options.exterior_seeds)
         if (body.level(seed) < 0) return "an exterior seed lies inside the contours";
-    // Between slices, and beyond the last, the body may be that wrong.
+    // Maximum error of the body between slices, and beyond the last one.
     const double far = std::max(kAutomatic.tag_attraction_voxels * h,
                                 problem.is_guided() ? problem.options.contours->slice_distance : 0.0);
     for (const Vec3& point : loose)

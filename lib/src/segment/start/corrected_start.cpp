@@ -1,4 +1,4 @@
-// Another tool's result, corrected by marks and seeds.
+// The result of another tool, corrected by marks and seeds.
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ CorrectionOptions correction_options(const Problem& problem, double h) {
     return options;
 }
 
-/// Replaces u by itself, corrected.
+/// Corrects u in place.
 GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     const RunContext& run = problem.run;
     const Timed timed(start.facts.report.seconds.tag);

@@ -1,11 +1,11 @@
-// A start inside an object grows to the object's edges where the image alone decides.
+// Grows a start inside an object to the object's edges if the image alone decides.
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
 #include "start/grow.h"
 
 namespace covol::pipeline {
 
-// Where nothing is near, curvature would close the start before it meets an edge.
+// Without edges nearby, curvature would close the start before it reaches any.
 void grow_to_edges(const Problem& problem, const Choices& choices, StartSurface& start) {
     StartFacts& facts = start.facts;
     if (!problem.is_guided() || !uses_image(facts.flow) || uses_points(facts.flow)) return;

@@ -1,4 +1,4 @@
-// The start from few marks: the surface through them that bends least.
+// The start from few marks: the surface of minimum bending energy through them.
 #include <utility>
 
 #include "contours/section_field.h"
@@ -15,7 +15,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
+/// Precision of the marks along the image's axes; without an image it follows from the voxel size.
 std::array<Vec3, 3> deviation(const Problem& problem, double h) {
     std::array<Vec3, 3> axes{};
     for (int a = 0; a < 3; ++a) {
@@ -40,13 +40,13 @@ GuessOptions guess_options(const Problem& problem, double h, const std::vector<V
     options.inside = requested.inside;
     options.outside = requested.outside;
     options.outside.insert(options.outside.end(), requested.exterior_seeds.begin(), requested.exterior_seeds.end());
-    // Those of a file may point inwards, or anywhere.
+    // Normals of a file may point inwards, or anywhere.
     if (requested.hints.is_outward && requested.hints.normals.size() == marks.size())
         options.normals = requested.hints.normals;
     return options;
 }
 
-/// Of a ball as large as the box, at most.
+/// Upper bound of the area: about that of a ball as large as the box.
 double largest_area(const WorldBox& box) {
     double area = 0;
     for (int a = 0; a < 3; ++a) {
@@ -56,7 +56,7 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
-/// Of the places whose side is known those on the other one.
+/// Number of positions with a known side that lie on the wrong one.
 std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
     std::size_t wrong = 0;
     for (const double level : detail::levels_at(u, problem.options.inside)) wrong += level >= 0;
@@ -64,7 +64,8 @@ std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
     return wrong;
 }
 
-/// Where the surface that bends least runs off between thin parts, what lies between the sections does not.
+/// If the surface of minimum bending energy diverges between thin parts, the interpolation between the sections does
+/// not.
 void take_sections(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     StartFacts& facts = start.facts;
     const std::size_t before = count_wrong(problem, *start.u);
@@ -95,7 +96,7 @@ void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface&
     if (problem.options.sections) take_sections(problem, marks, start);
 }
 
-/// What marks and image show together, if the marks alone are not as good.
+/// Replaces the guess by the body inferred from marks and image together, unless the marks alone are as good.
 void infer_start(const Problem& problem, StartSurface& start) {
     StartFacts& facts = start.facts;
     KnownSides sides{problem.options.inside, problem.options.outside};
@@ -121,8 +122,8 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
     facts.domain = problem.domain(h, points, kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * h);
-    // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image
-    // asked about a cap. The clip at the end makes the cut.
+    // A body that the image cuts is continued beyond it: at the image's end its wall would be closed, and the image
+    // would be evaluated at a cap. The clip at the end makes the cut.
     if (problem.image != nullptr && !problem.options.roi)
         facts.domain = widened(facts.domain, kStarts.guess_beyond_voxels);
     detail::require_band_memory(largest_area(box), h, "segment", run);
@@ -131,7 +132,7 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
         guess(problem, points, start);
         if (problem.image != nullptr && uses_image(facts.flow)) infer_start(problem, start);
     }
-    if (!rests(problem, facts, EdgeFeature::Slope))
+    if (!is_final_start(problem, facts, EdgeFeature::Slope))
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
     facts.report.remarks.choose("guess", facts.guess.summary, "", run);
     return start;

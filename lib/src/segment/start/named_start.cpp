@@ -1,4 +1,4 @@
-// The start that the caller names.
+// The start that the caller specifies.
 #include <openvdb/openvdb.h>
 
 #include <numbers>
@@ -15,7 +15,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// Of the start, where it is known before it is made; else 0.
+/// The area of the start if it is known in advance; else 0.
 double known_area(const Start& start) {
     if (const auto* sphere = std::get_if<SphereStart>(&start))
         return 4 * std::numbers::pi * sphere->radius * sphere->radius;
@@ -50,7 +50,7 @@ struct GridOf {
     }
 };
 
-/// Whether a grid's voxels are those of a domain's lattice, whatever part of it.
+/// Whether a grid lies on a domain's lattice, regardless of its extent.
 bool is_on_lattice(const FloatGrid& grid, const Domain& domain) {
     const Domain own = domain_of(grid);
     return own.voxel_size == domain.voxel_size && own.origin == domain.origin;
@@ -74,7 +74,7 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
     {
         const Timed timed(facts.report.seconds.tag);
         if (is_settled && level_set->level_set && is_on_lattice(*level_set->level_set, facts.domain)) {
-            facts.domain = domain_of(*level_set->level_set);  // it stays what it is, to the bit
+            facts.domain = domain_of(*level_set->level_set);  // the level set stays unchanged, bit for bit
             start.u = level_set->level_set->deepCopy();
         } else {
             start.u = start_grid(named, facts.domain, run);

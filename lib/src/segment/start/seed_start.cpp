@@ -1,4 +1,4 @@
-// The start from seeds alone; the image decides from there.
+// The start from seeds alone; from there the image decides.
 #include <utility>
 
 #include "covol/start.h"

@@ -21,12 +21,12 @@ namespace {
 
 void append(const std::vector<Vec3>& more, std::vector<Vec3>& all) { all.insert(all.end(), more.begin(), more.end()); }
 
-/// What tags the points of one problem.
+/// Tags the points of one problem.
 struct Tagger {
     const Problem& problem;
     double h;
-    std::vector<Vec3> exterior;  ///< seeds that the caller says lie beyond D
-    std::vector<Vec3> outside;   ///< seeds that may lie as close to the border as they like
+    std::vector<Vec3> exterior;  ///< seeds that the caller declares to lie beyond D
+    std::vector<Vec3> outside;   ///< seeds that may lie arbitrarily close to the border
 
     [[nodiscard]] std::vector<Vec3> all_seeds() const {
         std::vector<Vec3> seeds = exterior;
@@ -34,7 +34,8 @@ struct Tagger {
         return seeds;
     }
 
-    /// Holes narrower than D are no exterior; a seed of the exterior that the user gave is tag_interior()'s to judge.
+    /// Seeds in holes narrower than D are not exterior; seeds of the exterior that the user gave are checked by
+    /// tag_interior().
     [[nodiscard]] std::vector<Vec3> seeds_beyond(double D, const FloatGrid& distance, const Domain& domain) const {
         std::vector<Vec3> seeds = exterior;
         const auto d_at = distance.getConstAccessor();
@@ -57,7 +58,7 @@ struct Tagger {
 
 // ---- bodies that the image cuts off -------------------------------------------------------------------------------
 
-/// On the same lattice, as large as all the points need, and some layers more.
+/// A domain on the same lattice that contains all points, extended by some layers.
 Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
     const WorldBox box = bounding_box(points);
     const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
@@ -68,7 +69,7 @@ Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
     return widened(domain, layers);
 }
 
-/// A tagged body that goes on beyond the image.
+/// A tagged body that extends beyond the image.
 struct CutBody {
     std::vector<Vec3> beyond;  ///< the points that close it there
     FloatGridPtr level_set;    ///< on a domain wider than the image
@@ -78,7 +79,7 @@ struct CutBody {
 };
 
 /// @param beyond  points outside the image that close the cloud there
-/// @return none where it encloses nothing all the same
+/// @return none if it encloses nothing even so
 std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain,
                                 std::vector<Vec3> beyond, const char* how) {
     std::vector<Vec3> closed = points;
@@ -100,7 +101,7 @@ std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& p
     return body;
 }
 
-/// Whether the points, with the image's end as a hole wherever it cuts them, enclose a body all the same.
+/// Whether the points enclose a body even if the image's end is treated as a hole wherever it cuts them.
 bool encloses_alone(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain) {
     if (const std::optional<double>& D = tagger.problem.options.tag_distance)
         return !tagger.tag(points, domain, *D).report.leaks;
@@ -125,9 +126,9 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
                     "with their mirror image beyond the image's end they enclose a body");
 }
 
-/// Marks within the section on an end slice, and those that carry them on, say that the body goes on there; a surface
-/// they are not.
-/// @param beyond  the points that carry them on
+/// Marks within the section on an end slice, and the points that continue them, show that the body extends beyond it;
+/// they do not lie on the surface.
+/// @param beyond  the points that continue them
 MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
                   const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
     const double deep = kStarts.cap_depth_voxels * start.h();
@@ -149,7 +150,8 @@ MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSu
     return marks;
 }
 
-// The flood would come in through the cut, or stop between a face and a surface that leaves the image slowly.
+// Otherwise the flood would enter through the cut, or stop between a face and a surface that leaves the image at a
+// small angle.
 std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choices& choices, const MarkSets& marks) {
     const Problem& problem = tagger.problem;
     if (problem.image == nullptr || problem.options.roi) return {};
@@ -162,7 +164,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         const Domain domain = problem.domain(tagger.h, marks.attracting, 0);
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
-        // At the image's end itself the flow would turn the wall to a right angle.
+        // If it ended at the image's end, the flow would turn the wall to a right angle.
         facts.domain = widened(domain, kStarts.tagged_beyond_voxels);
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
@@ -183,8 +185,8 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
     return start;
 }
 
-/// Points in one plane, on a line or at fewer than four places hold no surface: tagging and a flow would find that out
-/// in half a minute.
+/// Rejects points in one plane, on a line or at fewer than four positions, which define no surface: tagging and a flow
+/// would take half a minute to find that out.
 void refuse_flat(const Problem& problem, const Choices& choices, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
     if (problem.image != nullptr || o.contours || o.tag_distance || problem.has_seeds() ||
@@ -213,7 +215,7 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     facts.tag_distance = problem.options.tag_distance;
     if (!facts.tag_distance) {
         const Timed timed(facts.report.seconds.tag);
-        // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
+        // Wide enough for any D below a quarter of the cloud's size; the final domain is made once D is known.
         facts.tag = tagger.choose(
             points,
             problem.domain_with_margin(h, points, 0.25 * longest_side(bounding_box(points)) + kJob.margin_voxels * h));
@@ -231,8 +233,8 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     start.u = tagged.grid;
     if (tagged.report.leaks) remarks.warn(tagged.report.leak(), run);
     if (D <= kStarts.close_from_voxels * h) return start;
-    // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius
-    // D touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
+    // The tagged surface lies D outside the points, which is as far as the widest gap is large. Its closing by a ball
+    // of radius D touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
     if (const FloatGridPtr closed = close_by_ball(*start.u, D, run)) {
         start.u = closed;
         facts.flow.follow = true;

@@ -14,7 +14,7 @@ double mean(const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
-/// Turned where that holds.
+/// The normals, reversed if `where` holds.
 template <typename Where>
 std::vector<Vec3> turned(const test::SurfaceSample& s, Where where) {
     std::vector<Vec3> normals = s.normals;
@@ -41,18 +41,20 @@ struct Case {
 
 TEST_CASE("Consistency: normals of a solid's border are the most consistent ones, whatever is turned as a whole") {
     for (const double noise : {0.0, 0.4}) {
-        const auto min_off = [&](const test::Solid3& shape, auto where) {
+        const auto check_truth_is_better = [&](const test::Solid3& shape, auto where) {
             Case c(shape, noise);
             std::vector<Vec3> normals = c.sample.normals, others = turned(c.sample, where);
             const double right = mean(c.consistency.off(normals)), wrong = mean(c.consistency.off(others));
             INFO("right " << right << ", wrong " << wrong << ", noise " << noise);
             CHECK(right < 0.8 * wrong);
         };
-        min_off(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });            // a part
-        min_off(test::shell(1, 0.6), [](const Vec3& p) { return test::norm(p) < 0.8; });    // a cavity's wall
-        min_off(test::block({0.8, 0.5, 0.06}), [](const Vec3& p) { return p[2] > 0; });     // both to one side
-        min_off(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });  // legs
-        min_off(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });            // all
+        check_truth_is_better(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });  // a part
+        check_truth_is_better(test::shell(1, 0.6),
+                              [](const Vec3& p) { return test::norm(p) < 0.8; });  // the wall of a cavity
+        check_truth_is_better(test::block({0.8, 0.5, 0.06}),
+                              [](const Vec3& p) { return p[2] > 0; });  // both faces to one side
+        check_truth_is_better(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });  // legs
+        check_truth_is_better(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });            // all
     }
 }
 
@@ -67,12 +69,12 @@ TEST_CASE("Consistency: what another orientation has right is taken from it, pat
     std::size_t right = 0, part = 0;
     for (std::size_t n = 0; n < own.size(); ++n) {
         const Vec3& p = c.sample.points[n];
-        if (p[1] < -0.7) continue;  // wrong in both, and the rim of it
+        if (p[1] < -0.7) continue;  // wrong in both, including the rim
         ++part;
         right += test::dot(own[n], c.sample.normals[n]) > 0;
     }
     CHECK(double(right) > 0.97 * double(part));
-    // Nothing is left that the same one could add, and the right one is not made worse.
+    // A second call finds nothing more to take, and correct normals are not made worse.
     std::vector<Vec3> best = c.sample.normals;
     std::vector<double> best_off = c.consistency.off(best);
     c.consistency.take_better(other, best, best_off);

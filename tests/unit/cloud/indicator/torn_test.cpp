@@ -35,7 +35,7 @@ TEST_CASE("a patch turned over, and normals in all directions around it, are men
             normals[n] = points[n][2] > 0.97 ? test::scaled(-1, points[n]) : any[n];
         }
         REQUIRE(wrong > 100);
-        CHECK(mend_torn(points, kSpacing, normals) > wrong / 2);
+        CHECK(repair_torn(points, kSpacing, normals) > wrong / 2);
         CHECK(inward(points, normals) == 0);
     }
 }
@@ -43,7 +43,7 @@ TEST_CASE("a patch turned over, and normals in all directions around it, are men
 TEST_CASE("good normals stay as they are, on edges and on both sides of a plate, too") {
     const std::vector<Vec3> ball = test::sphere_cloud(kCount, 1, 3);
     std::vector<Vec3> normals = ball;
-    CHECK(mend_torn(ball, kSpacing, normals) == 0);
+    CHECK(repair_torn(ball, kSpacing, normals) == 0);
     CHECK(normals == ball);
 
     std::mt19937 random(4);
@@ -55,7 +55,7 @@ TEST_CASE("good normals stay as they are, on edges and on both sides of a plate,
         out.push_back({0, 0, above ? 1.0 : -1.0});
     }
     const std::vector<Vec3> before = out;
-    CHECK(mend_torn(plate, std::sqrt(2.0 / kCount), out) == 0);
+    CHECK(repair_torn(plate, std::sqrt(2.0 / kCount), out) == 0);
     CHECK(out == before);
 }
 

@@ -27,7 +27,7 @@ std::vector<Vec3> near(const test::Solid3& shape, std::size_t count, double nois
     return s.points;
 }
 
-/// On a gyroid of three periods along each axis, whose sheets lie about 3 apart.
+/// On a gyroid of three periods along each axis, whose sheets are about 3 apart.
 std::vector<Vec3> on_gyroid(std::size_t count, unsigned seed) {
     std::vector<Vec3> points = test::box_cloud(count, {{0, 0, 0}, {6 * M_PI, 6 * M_PI, 6 * M_PI}}, seed);
     for (Vec3& p : points)
@@ -62,7 +62,7 @@ TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, wha
             CHECK_FALSE(fills(near(test::block({0.8, 0.5, 0.05}), 6000, 0.3 * noise, seed)));
             CHECK_FALSE(fills(near(test::table(0.06), 6000, 0.5 * noise, seed)));
         }
-        CHECK_FALSE(fills(within(test::ball(1), 300, seed)));  // too few to tell
+        CHECK_FALSE(fills(within(test::ball(1), 300, seed)));  // too few to decide
     }
     for (const std::size_t count : {4000, 50000}) CHECK_FALSE(fills(on_gyroid(count, 1)));
     std::vector<Vec3> lattice;
@@ -81,7 +81,7 @@ TEST_CASE("orient_filled: half the density is where the solid ends") {
         CHECK(cloud.fills);
         CHECK(cloud.encloses);
         const Indicator& indicator = *cloud.orientation.indicator;
-        // The volume in which it is above 1/2, by random places.
+        // The volume in which the indicator is above 1/2, by random sampling.
         double found = 0, truth = 0;
         for (const Vec3& p : test::box_cloud(40000, bounding_box(points, 0.2), 4)) {
             found += indicator.inside(p) > 0.5;
@@ -89,7 +89,7 @@ TEST_CASE("orient_filled: half the density is where the solid ends") {
         }
         INFO(name << ": " << found / truth << " of the volume");
         CHECK(found / truth == Approx(1).margin(0.04));
-        // Outward in the outermost layer, about a cell thick.
+        // Normals point outward in the outermost layer, about a cell thick.
         double outward = 0, all = 0;
         for (std::size_t n = 0; n < cloud.points.size(); ++n) {
             if (shape.distance(cloud.points[n]) < -0.3 * indicator.cell()) continue;

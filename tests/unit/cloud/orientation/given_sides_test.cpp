@@ -1,4 +1,4 @@
-// Orientation by what files tell of their points.
+// Orientation by normals or sensor positions that files contain.
 #include "cloud/orientation/given_sides.h"
 
 #include <algorithm>
@@ -92,7 +92,7 @@ TEST_CASE("normals without a meaning change nothing") {
         CHECK(cloud.orientation.normals == own.orientation.normals);
         CHECK(cloud.hints.agree == Approx(0.5).margin(0.06));
     }
-    // Too few to go by.
+    // Too few normals to use.
     std::vector<Vec3> few(s.points.size(), Vec3{0, 0, 0});
     for (std::size_t n = 0; n < few.size(); n += 4) few[n] = s.normals[n];
     const CloudOrientation cloud = with_normals(s.points, few);
@@ -114,7 +114,7 @@ TEST_CASE("a part that is turned as a whole is found by what the points say them
         const CloudOrientation cloud = with_normals(s.points, normals);
         CHECK_FALSE(cloud.hints.used);
         CHECK(fraction_wrong(cloud.orientation.normals, s.normals) < 0.01);
-        CHECK(cloud.hints.foreseen > 0.9);  // each half alone finds nothing
+        CHECK(cloud.hints.predicted > 0.9);  // neither half alone can detect the error
     }
 }
 
@@ -142,7 +142,7 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
     CHECK(cloud.hints.from_sensor);
     CHECK(cloud.hints.sensors == seen.points.size());
     CHECK(fraction_wrong(cloud.orientation.normals, seen.normals) < 0.002);
-    // Half of the whole ball is hidden from anywhere.
+    // From any position, half of the whole ball is hidden.
     const CloudOrientation whole = orient_cloud(s.points, PointHints{{}, towards(sensor, s.points)});
     CHECK_FALSE(whole.hints.used);
     CHECK(fraction_wrong(whole.orientation.normals, s.normals) < 0.001);
@@ -150,7 +150,7 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
 
 TEST_CASE("walls that touch and bodies that cross: points within the solid are left out") {
     const test::Solid3 box = test::block({0.5, 0.5, 0.5});
-    for (const double shift : {1.0, 0.6}) {  // beside each other, and run into each other
+    for (const double shift : {1.0, 0.6}) {  // side by side, and overlapping
         const Vec3 by{shift, shift == 1.0 ? 0 : 0.3, 0};
         std::vector<Vec3> points, normals, within;
         for (const unsigned seed : {1U, 2U}) {
@@ -160,7 +160,7 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
                 points.push_back(p);
                 normals.push_back(s.normals[n]);
                 const double in_other = box.distance(seed == 1 ? test::sum(p, test::scaled(-1, by)) : p);
-                // Beside the rim of the wall that they share the surface is near.
+                // Near the rim of the common wall the surface is close.
                 const bool is_near_rim = std::max(std::abs(p[1]), std::abs(p[2])) > 0.4;
                 if (shift == 1.0 ? in_other < 1e-3 && !is_near_rim : in_other < -0.1) within.push_back(p);
             }
@@ -173,11 +173,11 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
         const auto left = std::count_if(within.begin(), within.end(), [&](const Vec3& p) { return kept.count(p) > 0; });
         INFO("shift " << shift << ": " << left << " of " << within.size() << " within are left, " << cloud.enclosed
                       << " left out");
-        // Of walls that touch some stay where one's points are denser than the other's.
+        // On walls that touch, some points remain if one wall is sampled more densely than the other.
         CHECK(double(left) < 0.3 * double(within.size()));
         CHECK(double(cloud.enclosed) < 1.6 * double(within.size()));
     }
-    // Narrow gaps are no solid.
+    // Narrow gaps are not solid.
     std::vector<Vec3> points, normals;
     for (const double side : {0.0, 1.1}) {
         const test::SurfaceSample s = box.sample(6000, 3);  // 0.032 apart

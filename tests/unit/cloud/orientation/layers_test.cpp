@@ -14,7 +14,7 @@ using namespace covol::cloud;
 
 namespace {
 
-/// Points of two layers; those of the lower one see the inside of the scan alone, through its opening.
+/// Points of two layers; from the lower layer only the inside of the scan is visible, through its opening.
 struct Layers {
     std::vector<Vec3> points, free;
     std::vector<char> is_lower;
@@ -47,7 +47,7 @@ const double kSpacing = std::sqrt(4 * M_PI / kCount), kDepth = 1 - 4 * kSpacing;
 
 TEST_CASE("a layer below another is turned outwards, and makes no cavity") {
     for (const unsigned seed : {1, 2, 3}) {
-        // A sphere, open at the top, of which a part was seen twice, once too deep.
+        // A sphere, open at the top, of which a part was scanned twice, the second time too deep.
         Layers scan;
         for (const Vec3& p : test::sphere_cloud(kCount, 1, seed)) {
             if (p[2] > 0.75) continue;

@@ -1,4 +1,4 @@
-// Clouds that enclose nothing: scans of some sides.
+// Clouds that enclose nothing: scans from some sides only.
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
@@ -26,8 +26,8 @@ std::vector<Vec3> bowl(int count, unsigned seed) {
     return points;
 }
 
-// A torus whose tube (radius 0.35 around a circle of radius 1) was seen from outside only on half of its way, from
-// inside on the other half: it encloses nothing.
+// A torus whose tube (radius 0.35 around a circle of radius 1) was scanned from outside on one half and from inside on
+// the other half: it encloses nothing.
 std::vector<Vec3> half_seen_torus(int count, double noise, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> angle(-kPi, kPi);
@@ -56,10 +56,10 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
         CHECK(m.closed);
         CHECK(m.components == 1);
         CHECK(m.genus == 0);
-        // Half a ball, the lid sagging or bulging.
+        // Half a ball whose lid may sag or bulge.
         CHECK(m.volume < 2.0 / 3 * kPi * 1.4);
         CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
-        // A flat lid would be a third of the area; its rim is near the points.
+        // A flat lid would be a third of the area; near its rim it is close to the points.
         const double fraction = measure_fraction_without_points(mesh, cloud.points, 0.15);
         CHECK(fraction > 0.15);
         CHECK(fraction < 0.45);
@@ -96,7 +96,7 @@ TEST_CASE("segment: a noisy torus of which each part was seen from one side has 
     CHECK(result.report.surface.components == 1);
     CHECK(result.report.surface.genus == 1);
     CHECK(result.report.fit.mean < 0.5 * 0.05);
-    // Where points are, the surface is the torus.
+    // At the points the surface is the torus.
     double sum = 0, count = 0;
     for (const auto& v : result.mesh.vertices) {
         const Vec3 p{v[0], v[1], v[2]};

@@ -23,7 +23,7 @@ RunContext on_threads(int n) {
     return run;
 }
 
-/// Share of the normals that point to the wrong side.
+/// Fraction of the normals that point to the wrong side.
 double fraction_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
     std::size_t wrong = 0;
     for (std::size_t n = 0; n < truth.size(); ++n) wrong += !(test::dot(found[n], truth[n]) > 0);
@@ -178,7 +178,7 @@ TEST_CASE("orient: points given several times") {
     const Orientation o = orient(doubled, scale);
     CHECK(fraction_wrong(o.normals, normals) < 0.007);
     for (std::size_t n = 0; n < s.points.size(); ++n) REQUIRE(o.normals[n] == o.normals[n + s.points.size()]);
-    // A cloud's duplicates are left out.
+    // Duplicate points of a cloud are removed.
     const CloudOrientation once = orient_cloud(s.points), twice = orient_cloud(doubled);
     CHECK(twice.points == once.points);
     CHECK(twice.orientation.normals == once.orientation.normals);
@@ -201,7 +201,7 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
             for (const Vec3& p : s.points) lost += !kept.count(p);
             for (const Vec3& p : spread) {
                 if (std::abs(shape.solid.distance(p)) < 4 * s.spacing())
-                    continue;  // beside the surface they may pass for it
+                    continue;  // points this close to the surface may be kept
                 ++far;
                 far_kept += kept.count(p);
             }

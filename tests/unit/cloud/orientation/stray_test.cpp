@@ -36,7 +36,7 @@ TEST_CASE("points spread through space are stray, a surface's are not") {
 
 TEST_CASE("sparse parts of a surface are not stray") {
     for (const unsigned seed : {1, 2, 3}) {
-        // A sixteenth of the density on one half: four times as far apart.
+        // A sixteenth of the density on one half: points are four times as far apart.
         const test::SurfaceSample s = test::ball(1).sample(6000, seed);
         std::mt19937 random(seed);
         std::vector<Vec3> points;
@@ -59,7 +59,7 @@ TEST_CASE("a point above a sheet is stray when it is far, not when it is close")
         for (int j = 0; j < 40; ++j) points.push_back({0.1 * i, 0.1 * j, 0});
     points.push_back({2.03, 2.01, 0.1});
     points.push_back({1.03, 1.01, 0.9});
-    points.push_back({2, 2, 500});  // beyond where neighbours are looked for
+    points.push_back({2, 2, 500});  // beyond the search radius for neighbours
     const std::vector<char> stray = find_stray(points, {0.1, 0, 0}, {});
     CHECK(count(stray, 0, 1600) == 0);
     CHECK_FALSE(stray[1600]);

@@ -15,14 +15,14 @@ using namespace covol::cloud;
 
 namespace {
 
-/// Points of a sphere, area times normal of each.
-struct Charged {
+/// Points of a sphere with their area vectors (area times normal).
+struct OrientedSphere {
     std::vector<Vec3> points, vectors;
 };
 
-/// Evenly along a spiral.
-Charged sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
-    Charged s;
+/// Evenly spread along a spiral.
+OrientedSphere sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
+    OrientedSphere s;
     for (int m = 0; m < count; ++m) {
         const double z = 1 - (2 * m + 1.0) / count, r = std::sqrt(1 - z * z), angle = m * M_PI * (3 - std::sqrt(5.0));
         const Vec3 n{r * std::cos(angle), r * std::sin(angle), z};
@@ -34,7 +34,8 @@ Charged sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
 
 using Stack = std::shared_ptr<const GridStack>;
 
-/// All points on the finest grid, about `cells` of it along the longest side, the part beyond the points included.
+/// All points on the finest grid, with about `cells` cells along the longest side, including the margin beyond the
+/// points.
 Stack grids(const std::vector<Vec3>& points, int cells, double fraction = 0.2) {
     return std::make_shared<const GridStack>(points, std::vector<std::uint8_t>{},
                                              longest_side(bounding_box(points)) * (1 + 2 * fraction) / cells, fraction);
@@ -63,9 +64,9 @@ void for_nodes(Field& field, Visit visit) {
         }
 }
 
-/// Random points of a box, those of x < 0 two levels coarser than the others.
-struct Uneven {
-    Uneven() {
+/// Random points in a box; those with x < 0 are two levels coarser than the others.
+struct UnevenCloud {
+    UnevenCloud() {
         for (const Vec3& p : points) levels.push_back(p[0] < 0 ? 2 : 0);
         stack = std::make_shared<const GridStack>(points, levels, 0.01, 0.2);
     }
@@ -77,7 +78,7 @@ struct Uneven {
 }  // namespace
 
 TEST_CASE("each level has all nodes around its points, and around the level that is finer") {
-    const Uneven u;
+    const UnevenCloud u;
     const std::vector<GridLevel>& levels = u.stack->levels();
     for (std::size_t n = 0; n < u.points.size(); ++n)
         for (std::size_t l = u.levels[n]; l < levels.size(); ++l)
@@ -87,7 +88,7 @@ TEST_CASE("each level has all nodes around its points, and around the level that
                     at[a] = int(std::floor((u.points[n][int(a)] - u.stack->origin()[int(a)]) / levels[l].cell) +
                                 ((corner >> a & 1) != 0 ? 2 : -1)) >>
                             3;
-                // Beyond the coarsest block is the border.
+                // The border lies beyond the coarsest block.
                 const int end = 1 << (levels.size() - 1 - l);
                 if (std::all_of(at.begin(), at.end(), [&](int x) { return x >= 0 && x < end; }))
                     REQUIRE(levels[l].find(at) != kNoBlock);
@@ -100,12 +101,12 @@ TEST_CASE("each level has all nodes around its points, and around the level that
             REQUIRE(levels[l].coarser[n] != kNoBlock);
             REQUIRE(levels[l + 1].blocks[levels[l].coarser[n]] == BlockAt{at[0] >> 1, at[1] >> 1, at[2] >> 1});
         }
-    // The coarse half has no fine blocks but those at the border of both.
+    // The coarse half has fine blocks only near the boundary between the halves.
     for (const BlockAt& at : levels[0].blocks) REQUIRE(u.stack->origin()[0] + 0.08 * (at[0] + 1) > -0.15);
 }
 
 TEST_CASE("splines are exact on linear functions across levels, and their gradient is that of their values") {
-    const Uneven u;
+    const UnevenCloud u;
     StackField linear(u.stack), waves(u.stack);
     for_nodes(linear, [](float& value, const Vec3& x, double) { value = float(0.3 + 2 * x[0] - x[1] + 0.5 * x[2]); });
     for_nodes(waves, [](float& value, const Vec3& x, double) {
@@ -130,7 +131,7 @@ TEST_CASE("splines are exact on linear functions across levels, and their gradie
         }
     }
     CHECK(coarse > 200);
-    // Beyond the grids as at their end.
+    // Beyond the grids the value is that at their end.
     CHECK(std::isfinite(linear.at({100, -100, 3}).value));
     CHECK(linear.at({100, 0, 0}).value == linear.at({1000, 0, 0}).value);
 }
@@ -152,10 +153,11 @@ TEST_CASE("what is spread keeps the points' number and their centre") {
 
 namespace {
 
-/// Largest error where div grad u = div grad of a bell is solved from its gradient at points that fill a box.
+/// Largest error if div grad u = div grad of a bell-shaped function is solved from its gradient at points that fill a
+/// box.
 double error_of_bell(double cell, bool uneven) {
     constexpr double kWidth = 0.25;
-    const int side = int(std::lround(2.4 / (0.5 * cell)));  // two points a cell along each axis
+    const int side = int(std::lround(2.4 / (0.5 * cell)));  // two points per cell along each axis
     std::vector<Vec3> points, vectors;
     std::vector<std::uint8_t> levels;
     const double step = 2.4 / side;
@@ -188,7 +190,7 @@ TEST_CASE("solutions converge with the square of the cell, also across a change 
 }
 
 TEST_CASE("grids near the points alone give the indicator of grids that fill the box") {
-    const Charged s = sphere(4000, 1);
+    const OrientedSphere s = sphere(4000, 1);
     std::vector<Vec3> all = s.points, vectors = s.vectors;
     for (const Vec3& p : test::box_cloud(40000, {{-1.35, -1.35, -1.35}, {1.35, 1.35, 1.35}}, 9)) {
         all.push_back(p);
@@ -206,10 +208,10 @@ TEST_CASE("grids near the points alone give the indicator of grids that fill the
 }
 
 TEST_CASE("a few points far away make few blocks, and leave the indicator as it was") {
-    const Charged s = sphere(40000, 1);
+    const OrientedSphere s = sphere(40000, 1);
     const double cell = 0.016;
     const auto alone = std::make_shared<const GridStack>(s.points, std::vector<std::uint8_t>{}, cell, 0.2);
-    Charged with = s;
+    OrientedSphere with = s;
     for (const Vec3& way : test::sphere_cloud(10, 1e5, 3)) {
         with.points.push_back(way);
         with.vectors.push_back({0, 0, 0});
@@ -225,7 +227,7 @@ TEST_CASE("a few points far away make few blocks, and leave the indicator as it 
 }
 
 TEST_CASE("the indicator is the same to the bit on any number of threads") {
-    const Uneven u;
+    const UnevenCloud u;
     std::vector<Vec3> vectors;
     for (const Vec3& p : u.points) vectors.push_back(test::scaled(0.001, p));
     std::vector<StackField> results;
@@ -246,7 +248,7 @@ TEST_CASE("the indicator is the same to the bit on any number of threads") {
 TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rises inward") {
     for (const int cells : {32, 64}) {
         const Vec3 center{3.03, -2.01, 0.02};
-        const Charged s = sphere(6000, 1, center);
+        const OrientedSphere s = sphere(6000, 1, center);
         const Stack stack = grids(s.points, cells);
         WindingField field(stack);
         field.solve(s.points, s.vectors, 12);
@@ -271,8 +273,8 @@ TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rise
 }
 
 TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
-    const Charged whole = sphere(8000, 1);
-    Charged bowl;
+    const OrientedSphere whole = sphere(8000, 1);
+    OrientedSphere bowl;
     for (std::size_t n = 0; n < whole.points.size(); ++n) {
         if (whole.points[n][2] > 0) continue;
         bowl.points.push_back(whole.points[n]);
@@ -281,7 +283,7 @@ TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
     WindingField field(std::make_shared<const GridStack>(bowl.points, std::vector<std::uint8_t>{}, 2.8 / 64, 0.2));
     field.solve(bowl.points, bowl.vectors, 12);
     const double cell = field.indicator().stack().cell();
-    // Away from both sides the harmonic part changes, too: of a disc's by about the distance over the radius.
+    // Away from both sides the harmonic part changes, too: for a disc by about the distance over the radius.
     for (const double r : {2.0, 3.0}) {
         const double step =
             field.indicator().at({0, 0, -1 + r * cell}).value - field.indicator().at({0, 0, -1 - r * cell}).value;
@@ -292,7 +294,7 @@ TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
 }
 
 TEST_CASE("each V-cycle leaves a fraction of the error") {
-    const Charged s = sphere(4000, 1);
+    const OrientedSphere s = sphere(4000, 1);
     const Stack l = grids(s.points, 48);
     WindingField exact(l);
     exact.solve(s.points, s.vectors, 30);
@@ -306,14 +308,14 @@ TEST_CASE("each V-cycle leaves a fraction of the error") {
         CHECK(now < 0.35 * before);
         before = now;
     }
-    // Going on is what more cycles at once are.
+    // Continuing gives the same result as all cycles at once.
     WindingField at_once(l);
     at_once.solve(s.points, s.vectors, 4);
     CHECK(at_once.indicator().values == field.indicator().values);
 }
 
 TEST_CASE("a coarser solution is a good first guess for a finer one") {
-    const Charged s = sphere(4000, 1);
+    const OrientedSphere s = sphere(4000, 1);
     const Stack fine = grids(s.points, 48);
     WindingField coarse(grids(s.points, 32)), exact(fine), fresh(fine), guessed(fine);
     coarse.solve(s.points, s.vectors, 12);
@@ -330,9 +332,9 @@ TEST_CASE("a coarser solution is a good first guess for a finer one") {
 }
 
 TEST_CASE("the indicator is linear in the areas; multiply scales it; turned normals change its sign") {
-    const Charged s = sphere(1000, 1);
+    const OrientedSphere s = sphere(1000, 1);
     const Stack l = grids(s.points, 32);
-    Charged turned = s;
+    OrientedSphere turned = s;
     for (Vec3& v : turned.vectors) v = test::scaled(-2, v);
     WindingField field(l), other(l);
     field.solve(s.points, s.vectors, 5);

@@ -18,7 +18,7 @@ using namespace covol::cloud;
 
 namespace {
 
-/// Signed distance, > 0 outside; its border in the unit ball is drawn.
+/// Signed distance, > 0 outside; points are drawn from its zero set within the unit ball.
 using Solid = std::function<double(const Vec3&)>;
 
 Vec3 gradient(const Solid& f, const Vec3& p, double step) {
@@ -32,7 +32,7 @@ Vec3 gradient(const Solid& f, const Vec3& p, double step) {
     return unit(g);
 }
 
-/// Normals are blurred over a fifth of the radius, as an indicator's are.
+/// Normals are blurred over a fifth of the radius, like those of an indicator.
 std::vector<CreasePoint> border(const Solid& f, double noise, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> place(-1, 1);
@@ -99,7 +99,7 @@ TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where 
             CHECK(worst(*crease, kind.f) < 0.02);
         }
         INFO(kind.name << ": " << found << " of 20");
-        CHECK(found >= (kind.sheets == 2 ? 19 : 14));  // a few draws leave too few points on a sheet of three
+        CHECK(found >= (kind.sheets == 2 ? 19 : 14));  // some draws have too few points on one of three sheets
     }
 }
 
@@ -148,7 +148,7 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
             for (int k = -14; k <= 14; ++k)
                 at.setValue({i, j, k}, float(std::clamp(box({double(i), double(j), double(k)}), -3.0, 3.0)));
     TriangleMesh mesh = extract_mesh(*extract_surface(*grid));
-    const auto off_corners = [&] {  // of the corners, to the nearest vertex
+    const auto off_corners = [&] {  // of the corners to the nearest vertex
         double maximum = 0;
         for (int n = 0; n < 8; ++n) {
             Vec3 corner{0, 0, 0};

@@ -80,7 +80,7 @@ TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are 
     const FloatGridPtr left = large->deepCopy(), held = large->deepCopy();
     CHECK(cloud::hold_topology(*small, *left, {}, differ - 1) == 0);
     CHECK(left->tree().hasSameTopology(large->tree()));
-    CHECK(measure(extract_mesh(*left)).components == 2);  // with its cavity
+    CHECK(measure(extract_mesh(*left)).components == 2);  // the cavity is a component
     CHECK(cloud::hold_topology(*small, *held, {}, differ) > 0);
     CHECK(measure(extract_mesh(*held)).components == 1);
 }
@@ -108,7 +108,7 @@ TEST_CASE("hold_topology: where a surface is cut off, what lies beyond is left a
     const FloatGridPtr rough = level_set([](int, int, int k) { return k < 8; });
     FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && away(i, j, k) > 4; });
     const std::size_t all = target->activeVoxelCount();
-    // As a flood leaves it: inside goes on without end in one of the two.
+    // As after a flood fill: in one of the two, the inside extends without end.
     target->tree().root().addTile(openvdb::Coord(0, 0, -4096), -3.0F, false);
     static_cast<void>(cloud::hold_topology(*rough, *target, {}));
     CHECK(target->activeVoxelCount() == all);

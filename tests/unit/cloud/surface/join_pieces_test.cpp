@@ -31,7 +31,7 @@ FloatGridPtr torn(double gap, double tip_radius = kThin) {
         3 * kVoxel);
 }
 
-/// On both, and on the part that is missing between them as far as it has any.
+/// Points on both, and, if `between`, along the missing part between them.
 std::vector<Vec3> points(double gap, bool between) {
     std::vector<Vec3> all = test::sphere_cloud(400, kRadius, 1, kBody);
     for (const Vec3& p : test::sphere_cloud(40, kThin, 2, tip(gap))) all.push_back(p);
@@ -47,13 +47,13 @@ TEST_CASE("a small piece is joined where points lie all along the gap, and nowhe
     for (const double gap : {1.5, 3.0}) {
         INFO(gap << " apart");
         const FloatGridPtr with = torn(gap * kApart), without = torn(gap * kApart), before = torn(gap * kApart);
-        REQUIRE(measure(extract_mesh(*with)).components == 3);  // the cavity is one
+        REQUIRE(measure(extract_mesh(*with)).components == 3);  // the cavity is a component
         CHECK(cloud::join_pieces(*with, points(gap * kApart, true), kApart, {}) == 1);
         const MeshMeasures joined = measure(extract_mesh(*with));
         CHECK(joined.components == 2);
         CHECK(joined.genus == 0);
         CHECK(joined.closed);
-        // A rod about as thick as the points around it: no thicker than half of what they are apart.
+        // A rod about as thick as the points around it, and no thicker than half of their spacing.
         const double grown = joined.volume - measure(extract_mesh(*before)).volume;
         CHECK(grown > 0.3 * M_PI * 0.25 * kApart * kApart * gap * kApart);
         CHECK(grown < 3 * M_PI * 0.25 * kApart * kApart * gap * kApart);

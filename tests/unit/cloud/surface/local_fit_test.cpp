@@ -19,7 +19,7 @@ OrientedCloud oriented(const test::SurfaceSample& s) {
     return {s.points, s.normals, std::vector<float>(s.points.size(), 1.0F), {}};
 }
 
-/// Every so many of a cloud's points.
+/// Every step-th point of a cloud.
 OrientedCloud every(const OrientedCloud& cloud, std::size_t step) {
     OrientedCloud some;
     for (std::size_t n = 0; n < cloud.size(); n += step) {
@@ -35,20 +35,20 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-/// How quadrics at a sample of a shape's points, moved by noise, fit the shape.
-struct Found {
+/// How well quadrics at sample points of a shape, moved by noise, fit the shape.
+struct FitErrors {
     double fraction = 0;                          // of the nodes that have a quadric
     double off = 0;                               // root mean square of the feet's distance to the shape
     double noise = 0, radius = 0, curvature = 0;  // medians
     double off_beside = 0;  // root mean square error of distance() half a radius beside and above the foot
 };
 
-Found fit_shape(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
+FitErrors fit_shape(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
     test::SurfaceSample s = shape.sample(count, seed);
     const double spacing = s.spacing();
     test::add_noise(s, spacings * spacing, seed + 100);
     const OrientedCloud cloud = oriented(s);
-    Found found;
+    FitErrors found;
     std::vector<double> noise, radius, curvature;
     double squares = 0, beside = 0;
     for (const Quadric& q : fit_quadrics(every(cloud, 10), cloud, spacing, {})) {
@@ -81,7 +81,7 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
             const double curvature = is_ball ? 1 : 1 / 0.35;
             double radius = 0;
             for (const double spacings : {0.0, 0.1, 0.3, 0.6}) {
-                const Found f = fit_shape(shape, 8000, spacings, seed);
+                const FitErrors f = fit_shape(shape, 8000, spacings, seed);
                 INFO((is_ball ? "ball" : "torus")
                      << ", seed " << seed << ", noise of " << spacings << " spacings: off " << f.off / spacing
                      << " spacings, beside " << f.off_beside / spacing << ", radius " << f.radius / spacing
@@ -91,7 +91,7 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
                 CHECK(f.off < maximum * spacing);
                 CHECK(f.off_beside < (spacings > 0 ? 0.6 * spacings : 0.003) * spacing);
                 CHECK(f.curvature / curvature == Approx(1).margin(spacings > 0 ? 0.4 : 0.02));
-                // As wide as the noise asks for.
+                // As wide as the noise requires.
                 if (spacings > 0) CHECK(f.radius > 2.5 * spacing);
                 if (spacings == 0)
                     radius = f.radius;
@@ -176,7 +176,7 @@ TEST_CASE("two sheets back to back do not mix") {
                      << widest / spacing << ", mean cosine " << cosines / double(fitted));
         CHECK(cosines / double(fitted) > 0.96);
         CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
-        CHECK(widest > 2 * apart);  // they were in reach
+        CHECK(widest > 2 * apart);  // they were within reach
     }
 }
 
@@ -186,7 +186,7 @@ TEST_CASE("no quadric through the sheets of two folds that the indicator tells a
         const double spacing = std::sqrt(4.0 / each);
         OrientedCloud cloud;
         for (const Vec3& p : test::box_cloud(2 * int(each), {{-1, -1, 0}, {1, 1, 0}}, 9)) {
-            // Their normals are on one side: what is between them is a narrow gap.
+            // All normals point to one side, so that the space between the sheets is a narrow gap.
             cloud.points.push_back({p[0], p[1], (cloud.size() % 2 ? 0.5 : -0.5) * spacing});
             cloud.normals.push_back({0, 0, 1});
             cloud.counts.push_back(1);
@@ -265,7 +265,8 @@ TEST_CASE("thinned: counts add up, the centre stays, both sides of a sheet stay 
 TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it is turned") {
     const test::SurfaceSample s = test::ball(1).sample(5000, 12);
     const OrientedCloud thin = thinned(oriented(s), 0.1);
-    // A mean lies no deeper than its cell's chord; normals close to a diagonal do not split a cell.
+    // The mean of a cell's points lies no deeper than the chord of the cell; normals close to a diagonal do not split a
+    // cell.
     CHECK(thin.size() == PointCells(s.points, 0.1).cell_count());
     for (std::size_t n = 0; n < thin.size(); ++n) {
         REQUIRE(test::norm(thin.points[n]) > 1 - 0.1 * 0.1);
@@ -274,8 +275,8 @@ TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it
 }
 
 TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
-    // Where a ball's points are moved by sigma along each axis, their mean height over a tangent plane is sigma^2 / R
-    // too low.
+    // If the points of a ball are moved by sigma along each axis, their mean height over a tangent plane is too low by
+    // sigma^2 / R.
     double bias = 0;
     int count = 0;
     const double sigma = 0.06;
@@ -302,14 +303,15 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     test::add_noise(s, spacing, 2);
     std::size_t bare = 1000;
     const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, 0, bare, {});
-    CHECK(bare < 20);  // of 10,000 places
+    CHECK(bare < 20);  // of 10,000 positions
     CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
     for (const Quadric& q : quadrics) {
         const double times = q.apart / edge;
         CHECK((times == 1 || times == 2 || times == 4 || times == 8));
         CHECK(q.radius > (times > 1 ? 7 * q.apart : 0));
     }
-    // None is farther from a quadric than that one's nodes are apart, but for the cells that nodes are means of.
+    // No position is farther from a quadric than the spacing of that quadric's nodes, except in cells whose nodes are
+    // means.
     double farthest = 0, farthest_beyond = 0;
     for (std::size_t n = 0; n < places.size(); n += 10) {
         double nearest = 1, beyond = 1;
@@ -326,7 +328,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     INFO("farthest " << farthest / edge << ", beyond " << farthest_beyond / edge << " cells");
     CHECK(farthest < 3 * edge);
     CHECK(farthest_beyond < 2 * edge);
-    // Without noise they are as close as asked: on a ball no neighbourhood is that wide.
+    // Without noise the nodes are as close as requested: no neighbourhood on a ball is that wide.
     for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 
@@ -366,7 +368,7 @@ TEST_CASE("points selected four at a time are those in the ball on the frame's s
     for (std::size_t begin = 0; begin < places.size(); begin += 7)
         for (std::size_t end = begin; end <= places.size(); ++end) {
             near.clear(end - begin + 5);
-            select_near(cloud, 0, 5, frame, near);  // what it appends to
+            select_near(cloud, 0, 5, frame, near);  // results are appended
             select_near(cloud, begin, end, frame, near);
             near.fill_up();
             std::vector<std::size_t> expected;

@@ -1,4 +1,4 @@
-// Chunks that are decoded when they are asked for: once each, and the same values as at once.
+// Chunks that are decoded on demand: each of them once, with the same values as if all were decoded at once.
 #include <tbb/parallel_for.h>
 
 #include <atomic>
@@ -49,7 +49,7 @@ public:
     [[nodiscard]] double fill_value() const noexcept override { return -3; }
 };
 
-/// 1024^2 x 256 voxels of a byte: enough to be read chunk by chunk. Eight chunks of 64^3 are there.
+/// 1024^2 x 256 voxels of one byte: large enough to be read chunk by chunk. Eight chunks of 64^3 exist.
 std::string write_large(const Scratch& scratch) {
     const std::string folder = scratch.path("large");
     std::string meta = zarr_stores::metadata_2(1024, 64, "|u1", "zstd", "5");
@@ -62,7 +62,7 @@ std::string write_large(const Scratch& scratch) {
     return folder;
 }
 
-/// World = index. Around the chunks that are there.
+/// World = index. Around the chunks that exist.
 const WorldBox kPart{{180, 440, 60}, {330, 590, 200}};
 
 }  // namespace
@@ -203,7 +203,7 @@ TEST_CASE("chunks: percentiles and range depend on what was read, not on threads
     CHECK(touched[3] == 63);
     CHECK(touched == measure(2, true));
     CHECK(touched == measure(8, true));
-    // where nothing was read, some chunks on a lattice are
+    // if nothing was read, some chunks on a lattice are decoded
     const auto untouched = measure(1, false);
     CHECK(untouched[4] == 27);
     CHECK(untouched == measure(8, false));

@@ -21,7 +21,7 @@ using detail::ChunkSource;
 
 namespace {
 
-/// Voxel (i,j,k) is i + 3 j + 7 k, times `scale`; the chunk at the origin is missing if that is asked for.
+/// Voxel (i,j,k) is i + 3 j + 7 k, times `scale`; the chunk at the origin may be missing.
 class Slope final : public ChunkSource {
 public:
     Slope(const Index3& size, int chunk, int scale, bool lacks_first = false)
@@ -54,7 +54,7 @@ ImageGeometry geometry_of(const Index3& size, const Vec3& spacing) {
     return geometry;
 }
 
-/// Levels of factors 1, 2 and 4, the last of half as many along k.
+/// Levels of factors 1, 2 and 4, the last one of factor 2 along k.
 struct Pyramid {
     Index3 size{40, 24, 36};
     std::shared_ptr<Slope> fine = std::make_shared<Slope>(size, 8, 1);
@@ -87,7 +87,7 @@ TEST_CASE("A cache of chunks keeps what was used last, up to its bound") {
     const Slope source({64, 8, 8}, 8, 1);
     ChunkCache cache(3 * kChunkBytes);
     for (int n = 0; n < 3; ++n) static_cast<void>(cache.get(source, {n, 0, 0}));
-    static_cast<void>(cache.get(source, {0, 0, 0}));  // chunk 1 is the oldest now
+    static_cast<void>(cache.get(source, {0, 0, 0}));  // chunk 1 is now the least recently used
     CHECK(source.reads == 3);
     CHECK(cache.bytes() == 3 * kChunkBytes);
     const ChunkCache::Chunk held = cache.get(source, {1, 0, 0});
@@ -96,7 +96,7 @@ TEST_CASE("A cache of chunks keeps what was used last, up to its bound") {
     static_cast<void>(cache.get(source, {5, 0, 0}));
     CHECK(cache.bytes() == 3 * kChunkBytes);
     CHECK(cache.decoded() == 6);
-    CHECK(reinterpret_cast<const std::uint16_t*>(held.get())[0] == 8);  // whoever holds it keeps it
+    CHECK(reinterpret_cast<const std::uint16_t*>(held.get())[0] == 8);  // a chunk in use stays valid
     static_cast<void>(cache.get(source, {5, 0, 0}));
     CHECK(source.reads == 6);
     static_cast<void>(cache.get(source, {1, 0, 0}));
@@ -139,7 +139,7 @@ TEST_CASE("A level whose voxels span no whole number of fine ones is left out") 
     REQUIRE(levels.levels().size() == 2);
     CHECK(levels.levels()[1].factor == Index3{4, 4, 2});
     pyramid.sources[2].geometry.size = {11, 6, 18};
-    CHECK(pyramid.open().levels().size() == 2);  // the last voxel lacks some
+    CHECK(pyramid.open().levels().size() == 2);  // the last voxel is only partly covered
     pyramid.sources[2].geometry.size = {17, 6, 18};
     CHECK(pyramid.open().levels().size() == 1);
 }
@@ -163,7 +163,7 @@ TEST_CASE("A slice for a page comes from its level alone, in whole and in part")
     const std::vector<int> some = unpacked(part);
     for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 9; ++x) CHECK(some[std::size_t(y * 9 + x)] == values[std::size_t((y + 7) * 20 + x + 5)]);
-    // Of the level that is finer than a pixel, means; along each axis.
+    // If the level is finer than a pixel, means of voxels, along each axis.
     const std::vector<int> means = unpacked(make_page_slice(levels, {0, 39, 6, {}}, range));
     REQUIRE(means.size() == 4 * 6);
     CHECK(means[1 * 4 + 2] == 2 * (19 + 3 * 7 + 7 * 4));
@@ -196,7 +196,7 @@ TEST_CASE("A plane of any direction is sampled between voxels, of the level that
                 if (!is_there) {
                     ++outside;
                     REQUIRE(value == 0);
-                } else if (!is_at_rim) {  // there the last voxel goes on
+                } else if (!is_at_rim) {  // at the rim the last voxel's value continues
                     ++inside;
                     REQUIRE(std::abs(value - expected) <= 0.51);
                 }
@@ -212,7 +212,7 @@ TEST_CASE("A plane of any direction is sampled between voxels, of the level that
     CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1e300, 0}, 9}, range), Error);
     CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0}, range), Error);
     CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1025}, range), Error);
-    // Pixels far apart need no more memory than those that lie close.
+    // Pixels that are far apart need no more memory than pixels close to each other.
     CHECK(unpacked(make_oblique_slice(levels, {{1, 1, 1}, {1e6, 0, 0}, {0, 1e6, 0}, 64}, range))[0] > 0);
 }
 
@@ -223,7 +223,7 @@ TEST_CASE("Of an image in chunks no more is kept than is allowed") {
         for (int at = 0; at < pyramid.size[std::size_t(axis)]; ++at)
             static_cast<void>(make_page_slice(levels, {axis, at, 1, {}}, {0, 1000}));
     CHECK(levels.cache().bytes <= 20 * kChunkBytes);
-    CHECK(levels.cache().decoded > 75);  // all of its chunks, some of them again
+    CHECK(levels.cache().decoded > 75);  // all of its chunks, some of them more than once
     const auto [low, high] = levels.percentiles(0, 1);
     CHECK(low == 0);
     CHECK(high == 4 * (9 + 3 * 5 + 7 * 17));  // of the coarsest level
@@ -239,5 +239,5 @@ TEST_CASE("An image that is held is shown as it is") {
     CHECK(levels.cache().max_bytes == 0);
     CHECK(levels.range() == std::array<double, 2>{0, 23});
     const std::vector<int> coded = unpacked(make_page_slice(levels, {2, 1, 2, {}}, {0, 65535}));
-    CHECK(coded == std::vector<int>{15, 17, 21, 23});  // means of 2 x 2, and of what is left
+    CHECK(coded == std::vector<int>{15, 17, 21, 23});  // means of 2 x 2 voxels, and of the remainder at the end
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Zarr stores that tests make: of Zarr 2 with any codec, and of Zarr 3 in shards.
+// Zarr stores for tests: Zarr 2 with any codec, and Zarr 3 with shards.
 #include <blosc.h>
 #include <lz4.h>
 #include <zlib.h>
@@ -50,7 +50,7 @@ inline void write(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// Bytes of 6 bits, so that codecs find something to do.
+/// Bytes with 6 random bits, so that codecs can compress them.
 inline std::string random_bytes(std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::string bytes(count, '\0');

@@ -1,4 +1,4 @@
-// Zarr stores, whole and damaged. tests/cli/zarr_test.py reads what zarr-python writes.
+// Zarr stores, intact and damaged. tests/cli/zarr_test.py reads what zarr-python writes.
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -35,7 +35,8 @@ struct Outcomes {
     int read = 0, refused = 0;
 };
 
-/// Reads the store with `bytes` in place of a file's; what is no covol::Error goes through to the test.
+/// Reads the store with `bytes` in place of a file's content; exceptions other than covol::Error are passed on to the
+/// test.
 void try_with(const std::string& store, const std::string& file, const std::string& bytes, Outcomes& outcomes) {
     const std::string good = bytes_of(file);
     std::ofstream(file, std::ios::binary) << bytes;
@@ -63,7 +64,7 @@ std::string mutated(const std::string& good, std::mt19937& random) {
     return bad;
 }
 
-/// A value that should not stand where it does.
+/// A value of an unexpected type or range.
 nlohmann::json odd_value(std::mt19937& random) {
     static const std::vector<nlohmann::json> kValues{nullptr,
                                                      true,
@@ -149,7 +150,7 @@ TEST_CASE("zarr: of a chunk that is longer than the array only the array is held
         CHECK(image.chunks()->size == Index3{5, 5, 5});
         for (const Index3& v : {Index3{0, 0, 0}, Index3{4, 0, 0}, Index3{0, 4, 0}, Index3{1, 2, 4}, Index3{4, 4, 4}})
             CHECK(image.at(v[0], v[1], v[2]) == voxel(v[0], v[1], v[2]));
-        // 256 MiB that the store does not have, and that a few bytes do not give
+        // 256 MiB that the store does not contain, and that so few bytes cannot decode to
         zarr_stores::write(store + "/.zarray", zarr_stores::metadata_2(5, 512, "<u2", codec, "7"));
         CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("0.0.0: ") != std::string::npos);
         if (!codec.empty())
@@ -166,7 +167,7 @@ TEST_CASE("zarr: damaged shards are errors wherever they are damaged") {
     std::mt19937 random(4);
     Outcomes outcomes;
     for (int n = 0; n < 400; ++n) try_with(store, shard, mutated(bytes_of(shard), random), outcomes);
-    CHECK(outcomes.read <= 40);  // two flips of one bit, or bytes before the index that no chunk uses
+    CHECK(outcomes.read <= 40);  // two flips of the same bit, or bytes before the index that no chunk uses
 }
 
 TEST_CASE("zarr: damaged metadata is an error or a result") {
@@ -184,7 +185,7 @@ TEST_CASE("zarr: damaged metadata is an error or a result") {
             for (const auto& [place, value] : flat.items())
                 for (int n = 0; n < 12; ++n) {
                     nlohmann::json bad = whole;
-                    // the value, or all that it stands in
+                    // replaces the value, or the object or array that contains it
                     nlohmann::json::json_pointer at(place);
                     if (n % 4 == 3 && !at.parent_pointer().empty()) at = at.parent_pointer();
                     bad[at] = odd_value(random);
@@ -209,7 +210,7 @@ TEST_CASE("zarr: metadata that is large, deep or no JSON is refused") {
     CHECK(message("[]").find("expected a JSON object") != std::string::npos);
     fs::resize_file(store + "/.zarray", std::uintmax_t(65) << 20);
     CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("64 MiB at most") != std::string::npos);
-    // a size that memory could not hold is compared with the file first
+    // the size is compared with the file before any memory is allocated
     CHECK(message(zarr_stores::metadata_2(1 << 20, 8, "|u1", "")).find("claims") != std::string::npos);
     CHECK(message(zarr_stores::metadata_2(2048, 2048, "|u1", "")).find("1 GiB at most") != std::string::npos);
 }

@@ -50,7 +50,7 @@ TEST_CASE("what is written is parsed, with and without VRs, in items of items") 
         REQUIRE(item.items(0x30060040).size() == 2);
         CHECK(item.items(0x30060040)[1].text(0x30060050) == "1\\2\\3");
         CHECK(tree.items(0x30060020).empty());
-        // A file that ends anywhere is an error, or holds less; it is never read beyond its end.
+        // A truncated file is an error or has fewer elements; it is never read beyond its end.
         for (std::size_t end = 0; end < bytes.size(); ++end) {
             const std::string some = bytes.substr(0, end);
             try {

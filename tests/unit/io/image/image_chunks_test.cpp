@@ -1,4 +1,4 @@
-// Large files are decoded part by part: the parts have the values that were written, and damage is an Error.
+// Large files are decoded in parts: the values are those that were written, and damage is an Error.
 #include <tbb/parallel_for.h>
 #include <tiffio.h>
 #include <zlib.h>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kAdler = 15, kGzip = 15 + 16;
 
-/// Packed by zlib in one stream.
+/// Compressed by zlib in one stream.
 std::string packed(const std::string& bytes, int kind) {
     z_stream stream{};
     REQUIRE(deflateInit2(&stream, 1, Z_DEFLATED, kind, 8, Z_DEFAULT_STRATEGY) == Z_OK);
@@ -39,7 +39,7 @@ std::uint16_t value(int i, int j, int k) {
     return std::uint16_t((std::uint32_t(i) * 2654435761U + std::uint32_t(j) * 40503U + std::uint32_t(k) * 97U) >> 20);
 }
 
-/// 21 MB, so that there are several places to begin at.
+/// 21 MB, so that there are several positions to start from.
 std::string ramp() {
     std::string bytes(voxel_count(kSize) * 2, '\0');
     std::size_t at = 0;
@@ -207,7 +207,7 @@ TEST_CASE("a TIFF's tiles and strips are read one by one, by several threads") {
                 TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, kind.rows);
             }
             for (int plane = 0; plane < kind.planes; ++plane) {
-                const auto shift = plane + 1 < kind.planes ? 9 : 0;  // of the plane that is not read
+                const auto shift = plane + 1 < kind.planes ? 9 : 0;  // for the plane that is not read
                 for (int y = 0; kind.tile == 0 && y < kPages[1]; ++y) {
                     std::vector<std::uint16_t> row;
                     for (int x = 0; x < kPages[0]; ++x) row.push_back(std::uint16_t(value(x, y, k) + shift));
@@ -272,7 +272,7 @@ TEST_CASE("the header of a large packed file tells the chunks that it will be re
     const std::string small = scratch.write("small.nrrd", nrrd + "600 600 600\n\n" + stream);
     CHECK(read_image_info(small).chunk_size == Index3{0, 0, 0});
 
-    // pages whose tiles, but the first one, were never written
+    // pages of which only the first tile was written
     const std::string path = scratch.path("a.tif");
     TIFF* tiff = TIFFOpen(path.c_str(), "w");
     for (int k = 0; k < 3; ++k) {

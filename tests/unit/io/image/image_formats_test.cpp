@@ -1,4 +1,4 @@
-// Files of the formats that have no writer in Debian's Python, and damaged files of every format.
+// Files in formats that Debian's Python packages cannot write, and damaged files of every format.
 #include <itkHDF5ImageIO.h>
 #include <itkImageIOBase.h>
 #include <openvdb/openvdb.h>
@@ -59,7 +59,7 @@ std::string mrc(std::int32_t mode) {
     return bytes;
 }
 
-/// An element of explicit VR, little endian.
+/// A data element with explicit VR, little endian.
 void element(std::string& bytes, std::uint16_t group, std::uint16_t number, const std::string& vr, std::string data) {
     if (data.size() % 2 != 0) data += vr == "UI" ? '\0' : ' ';
     put(bytes, bytes.size(), group);
@@ -142,7 +142,7 @@ void write_hdf5(const std::string& path) {
     io->Write(values.data());
 }
 
-/// Files that are damaged must neither crash nor be read beyond what they hold.
+/// Damaged files must neither crash nor be read beyond their end.
 void fuzz_image(const Scratch& scratch, const std::string& path) {
     INFO(path);
     const auto read = [](const std::string& bad) {
@@ -168,7 +168,7 @@ TEST_CASE("MRC: pixels, spacing and origin") {
     put(permuted, 68, std::int32_t(1));
     put(permuted, 72, std::int32_t(2));
     const ImageGeometry g = read_image_geometry(scratch.write("p.mrc", permuted));
-    // one step along the columns goes along the world's z, by the cell's z over its samples
+    // one step along the columns goes along the world's z, by the cell size in z over its number of samples
     const Vec3 step = g.index_to_world({1, 0, 0});
     CHECK(step[0] == Approx(kOrigin[0]));
     CHECK(step[2] == Approx(kOrigin[2] + kSpacing[2]));
@@ -237,7 +237,7 @@ TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
     const Scratch scratch;
     fuzz_image(scratch, scratch.write("f.mrc", mrc(1)));
     const std::string slice = dicom(0);
-    // a file of its own: its series has one slice, which is an Error; what counts is that reading ends
+    // the series has only one slice, which is an Error; the test is that reading ends
     fuzz(
         scratch, scratch.write("d.dcm", slice), [](const std::string& bad) { (void)read_image(bad); }, 200,
         slice.size());
@@ -267,7 +267,7 @@ TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
     const std::string folder = scratch.path("series");
     write_series(folder);
     CHECK(message_of([&] { (void)read_image(folder); }).empty());
-    std::ofstream(folder + "/7.dcm", std::ios::binary) << slice;  // is passed over
+    std::ofstream(folder + "/7.dcm", std::ios::binary) << slice;  // is skipped
     CHECK_THAT(message_of([&] { (void)read_image(folder); }), Catch::Contains("a slice is missing"));
 }
 
@@ -275,7 +275,7 @@ TEST_CASE("a damaged slice at the end of a DICOM series is warned of") {
     const Scratch scratch;
     const std::string folder = scratch.path("series");
     write_series(folder);
-    std::filesystem::resize_file(folder + "/9.dcm", 200);  // the lowest
+    std::filesystem::resize_file(folder + "/9.dcm", 200);  // the lowest slice
     std::vector<std::string> warnings;
     RunContext run;
     run.log = [&](LogLevel level, const std::string& line) {

@@ -58,7 +58,7 @@ struct TiffFormat {
     int pages = 3;
 };
 
-/// Pages of 20 x 17 whose bytes come from `value(page, pixel, out)`.
+/// Pages of 20 x 17 with the bytes of `value(page, pixel, out)`.
 template <typename T>
 std::string make_tiff(const std::string& path, const TiffFormat& f, T (*value)(int page, int x, int y)) {
     constexpr int kWidth = 20, kHeight = 17;
@@ -91,7 +91,7 @@ std::string make_tiff(const std::string& path, const TiffFormat& f, T (*value)(i
                                   0);
                 }
         } else {
-            TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 5);  // the last strip is short
+            TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 5);  // the last strip is shorter
             for (int y = 0; y < kHeight; ++y) {
                 std::vector<T> row;
                 for (int x = 0; x < kWidth; ++x)
@@ -266,7 +266,7 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     g = geometry("ImageJ=1.11a\nimages=3\nslices=3\n", 1.0F);
     CHECK(g.spacing == Vec3{1, 1, 1});
     CHECK_FALSE(g.spacing_known);
-    g = geometry("", 72.0F);  // a scanner's dots per inch
+    g = geometry("", 72.0F);  // dots per inch of a scanner, not a voxel size
     CHECK(g.spacing == Vec3{1, 1, 1});
     CHECK_FALSE(g.spacing_known);
     g = geometry(
@@ -278,7 +278,7 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     CHECK(g.spacing[2] == Approx(0.7));
     CHECK(g.unit == "um");
     CHECK(g.spacing_known);
-    // what the user says wins
+    // the user's options take precedence
     ReadImageOptions stated;
     stated.spacing = Vec3{0.4, 0.5, 3};
     CHECK(read_image_geometry(path, stated).spacing == stated.spacing);
@@ -325,7 +325,7 @@ TEST_CASE("ImageJ's way with huge stacks: one directory, the slices behind each 
         for (std::size_t n = 0; n < 8; ++n) page[n] = static_cast<std::uint16_t>(1000 + n);
         TIFFWriteEncodedStrip(tiff, 0, page.data(), 16);
         TIFFClose(tiff);
-        // the strip is the file's beginning; put the directory aside by pointing the strip at appended pixels
+        // the strip is at the file's beginning; point it at appended pixels instead
         std::string bytes = bytes_of(path);
         const bool big = mode[1] == 'b';
         const auto text = [&](std::uint64_t value, int width) {
@@ -435,7 +435,7 @@ TEST_CASE("damaged image files end in an Error, never in a crash") {
         INFO(name);
         write_image(scratch.path(name), g, ramp<std::uint8_t>(g).data());
         const FuzzCounts counts = fuzz(scratch, scratch.path(name), read);
-        // a checksum at the end may be all that is missing
+        // some truncated files lack only a checksum at their end
         CHECK(counts.truncated_accepted <= counts.truncated / 20);
     }
     const std::string tiled =
@@ -451,7 +451,7 @@ TEST_CASE("samples on the image's own lattice are its values") {
     const std::vector<std::uint8_t> values = ramp<std::uint8_t>(g);
     const Image image = Image::from_values(g, values.data());
     Domain frame;
-    frame.voxel_size = 0.35000001;  // a rounded spacing must not blur
+    frame.voxel_size = 0.35000001;  // a rounded spacing must not interpolate
     frame.origin = g.origin;
     std::vector<float> out(2 * 3 * 4);
     image.sample(frame, {1, 1, 0}, {2, 3, 3}, out.data());
@@ -459,7 +459,7 @@ TEST_CASE("samples on the image's own lattice are its values") {
     for (int i = 1; i <= 2; ++i)
         for (int j = 1; j <= 3; ++j)
             for (int k = 0; k <= 3; ++k) CHECK(out[n++] == float(image.at(i, j, k)));
-    // a position outside takes the nearest voxel's value
+    // a position outside takes the value of the nearest voxel
     float corner[1];
     image.sample(frame, {-7, -7, -7}, {-7, -7, -7}, corner);
     CHECK(corner[0] == float(image.at(0, 0, 0)));

@@ -20,7 +20,7 @@ ImageGeometry lattice(const Index3& size) {
     return geometry;
 }
 
-/// Voxel (i,j,k) has the value i + 10 j + 100 k; it lies where `stride` says.
+/// Voxel (i,j,k) has the value i + 10 j + 100 k and lies at the offset given by `stride`.
 std::shared_ptr<const void> fill(std::vector<float>& memory, const Index3& size,
                                  const std::array<std::int64_t, 3>& stride, std::int64_t first) {
     for (int k = 0; k < size[2]; ++k)

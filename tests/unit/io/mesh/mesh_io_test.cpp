@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A folder that goes with the test.
+/// A folder that is removed at the end of the test.
 struct Folder {
     fs::path path = fs::temp_directory_path() / ("covol_mesh_io_test_" + std::to_string(::getpid()));
     Folder() { fs::create_directories(path); }
@@ -209,7 +209,7 @@ TEST_CASE("a file is the same to those who want its mesh and to those who want i
             read();
         } catch (const Error& error) {
             const std::string message = error.what();
-            return message.substr(message.find(':'));  // behind the function's name
+            return message.substr(message.find(':'));  // without the function's name before it
         }
         return "was read";
     };
@@ -322,7 +322,7 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
     const std::string obj = folder.file("s.obj");
     write_meshes(obj, meshes);
     CHECK_THAT(text_of(obj), Catch::Contains("o ve\n") && Catch::Contains("o ex e\n"));
-    // Corners have the normals of their vertices, numbered on from object to object.
+    // Corners have the normals of their vertices; numbers continue from object to object.
     CHECK_THAT(text_of(obj), Catch::Contains("f 1//1 3//3 2//2\n") && Catch::Contains("f 5//5 7//7 6//6\n"));
     const TriangleMesh both = read_mesh(obj);
     REQUIRE(both.vertices.size() == 8);
@@ -356,7 +356,7 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
 
 namespace {
 
-/// A .glb file of this JSON and these bytes.
+/// A .glb file with this JSON and binary chunk.
 std::string glb_of(std::string json, std::string binary) {
     json.resize((json.size() + 3) / 4 * 4, ' ');
     binary.resize((binary.size() + 3) / 4 * 4, '\0');
@@ -382,7 +382,8 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 TEST_CASE("glb of other programs: interleaved vertices, short indices, shared positions; what is not read is named") {
     const Folder folder;
-    // Positions with a stride of 16, then two primitives of 16-bit indices that share them, and one without indices.
+    // Positions with a stride of 16, then two primitives with 16-bit indices that use the same positions, and one
+    // without indices.
     const std::string binary = raw(std::vector<float>{0, 0, 0, 9, 1, 0, 0, 9, 0, 1, 0, 9, 0, 0, 1, 9}) +
                                raw(std::vector<std::uint16_t>{0, 2, 1, 0, 1, 3});
     const std::string json =
@@ -426,7 +427,7 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco",
             Errc::Unsupported);
     refused(R"("byteLength":76)", R"("byteLength":76,"uri":"a.bin")", "another file", Errc::Unsupported);
-    // The same indices over and over.
+    // The same indices many times.
     std::string many;
     for (int n = 0; n < 200; ++n) many += R"({"attributes":{"POSITION":0},"indices":1},)";
     refused(R"("primitives":[)", R"("primitives":[)" + many, "over and over");
@@ -470,7 +471,7 @@ TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "
         const bool is_relative = std::string(name) == "a.stl";
         for (std::size_t v = 0; v < 4; ++v) {
             const Vec3 place = again.place(v);
-            double nearest = 1;  // STL has its vertices in another order
+            double nearest = 1;  // STL stores vertices in another order
             for (std::size_t other = 0; other < 4; ++other) {
                 const Vec3 there = mesh.place(other);
                 double apart = 0;

@@ -9,7 +9,7 @@
 #include "covol/points.h"
 #include "support/scratch.h"
 
-// Each format, byte by byte from its specification.
+// Each format, byte by byte according to its specification.
 
 using namespace covol;
 
@@ -70,7 +70,7 @@ struct RoiSpec {
     RoiType type = kPolygon;
     std::vector<std::array<float, 2>> xy;
     bool sub_pixel = true;
-    std::vector<int> positions;  ///< of each point, from 1
+    std::vector<int> positions;  ///< slice of each point, from 1
     int position = 0, z = 0, channel = 0;
     std::string name;
     std::array<float, 4> box{};  ///< x, y, width, height, or the ends of a line
@@ -139,7 +139,7 @@ std::string zip(const std::vector<std::pair<std::string, std::string>>& files, b
             .put(std::uint32_t(0))
             .put(std::uint32_t(w.size()))
             .put(name);
-        // sizes that follow the data (bit 3), as Java writes them: only the directory has them
+        // the sizes follow the data (bit 3), as Java writes them: only the directory has them
         w.put(std::uint32_t(0x04034b50))
             .put(std::uint16_t(20))
             .put(std::uint16_t(8))
@@ -251,7 +251,7 @@ ImageGeometry image() {
     return geometry;
 }
 
-/// One line for each mark; # stands for its place, X, Y, Z for its coordinates.
+/// One line for each mark; # is replaced by its position, X, Y, Z by its coordinates.
 std::string rows(const std::vector<Vec3>& points, const std::string& pattern) {
     std::string text;
     int n = 0;
@@ -286,7 +286,7 @@ RoiSpec multi_point() {
     return spec;
 }
 
-/// The marks of one slice as the outline of an area: by pixel corners.
+/// The marks of one slice as the outline of an area, in coordinates of pixel corners.
 RoiSpec outline(RoiType type, int slice) {
     RoiSpec spec;
     spec.type = type;
@@ -312,7 +312,7 @@ std::string markups(const std::vector<Vec3>& points, const std::string& type, co
 struct File {
     const char* name;
     std::string content;
-    const char* rule;  ///< part of what is told of it
+    const char* rule;  ///< part of the expected summary
 };
 
 std::vector<File> all_formats() {
@@ -472,7 +472,8 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
             CHECK(std::pow((p[0] - 12.5) / 3, 2) + std::pow((p[1] - 23.5) / 4, 2) == Approx(1));
     }
     spec.type = kLine;
-    CHECK(read(spec).points == std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});  // both ends, by pixel centres
+    CHECK(read(spec).points ==
+          std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});  // both ends, in coordinates of pixel centres
     CHECK_FALSE(read(spec).lines[0].closed);
 
     // a square with a square hole
@@ -563,7 +564,7 @@ TEST_CASE("archives that lie are refused before memory is taken") {
     std::string archive = zip({{"a.roi", roi(multi_point())}});
     const std::size_t entry = archive.find("PK\1\2");
     std::string huge = archive;
-    huge.replace(entry + 24, 4, "\xF0\xFF\xFF\xFF");  // the size it claims
+    huge.replace(entry + 24, 4, "\xF0\xFF\xFF\xFF");  // its claimed size
     contains(read_error(scratch, "a.zip", huge), "bytes cannot hold 4294967280");
     std::string secret = archive;
     secret[entry + 8] = 1;

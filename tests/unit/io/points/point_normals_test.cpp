@@ -83,7 +83,7 @@ TEST_CASE("normals turn with the axes and signs of their points, and do not scal
     options.space = PointSpace::World;
     options.order = PointOrder::ZYX;
     check_normal(read("a.ply", text, options).normals.at(0), {0.8, 0, 0.6});
-    options.space = PointSpace::Index;  // voxels are no space of directions
+    options.space = PointSpace::Index;  // voxels have no directions in the world
     CHECK(read("a.ply", text, options).normals.empty());
 }
 
@@ -98,7 +98,7 @@ TEST_CASE("columns: normals by name, or six columns of which the last three are 
     CHECK(six.normals[1] == kNone);
     CHECK(read("b.xyz", "0 0 0 255 128 0\n1 0 0 255 255 255\n").normals.empty());  // colours
     CHECK(read("c.xyz", "0 0 0 0.2 0.5 0.1\n1 0 0 1 0 0\n").normals.empty());
-    CHECK(read("d.xyz", "0 0 0 0 0 1 9\n1 0 0 0 0 1 9\n").normals.empty());  // seven columns say nothing
+    CHECK(read("d.xyz", "0 0 0 0 0 1 9\n1 0 0 0 0 1 9\n").normals.empty());  // seven columns are ambiguous
     CHECK(read("e.xyz", "0 0 0 0 0 1\n1 0 0\n").normals.at(1) == kNone);     // a short row has none
 }
 
@@ -122,7 +122,8 @@ TEST_CASE("PCD: normals stay beside their points where invalid ones are left out
     check_normal(cloud.normals[2], {0, 0, 1});
     REQUIRE(cloud.sensor);
     CHECK(*cloud.sensor == Vec3{1, 2, 3});
-    // What writers put where they know none; in rows of pixels the camera is there.
+    // The default that writers use for an unknown viewpoint; in an organized cloud (rows of pixels) it is the camera's
+    // position.
     CHECK_FALSE(read("b.pcd", pcd("VIEWPOINT 0 0 0 1 0 0 0\n", 4, 1, rows)).sensor);
     CHECK(read("c.pcd", pcd("VIEWPOINT 0 0 0 1 0 0 0\n", 2, 2, rows)).sensor == std::optional(Vec3{0, 0, 0}));
     CHECK_FALSE(read("d.pcd", pcd("", 2, 2, rows)).sensor);

@@ -24,7 +24,7 @@ PointCloud cloud_of(const std::vector<Vec3>& points, PointSpace space = PointSpa
     return cloud;
 }
 
-/// What a check says: the error, or the warnings in brackets.
+/// The result of a check: the error, or the warnings in brackets.
 std::string verdict(const PointCloud& cloud, const ImageGeometry& geometry) {
     std::string warnings;
     RunContext run;
@@ -42,7 +42,7 @@ bool contains(const std::string& message, const std::string& part) {
     return message.find(part) != std::string::npos;
 }
 
-/// Marks on a slanted closed line through an image whose voxels and place are all different, in voxels.
+/// Marks on an oblique closed line through an image whose voxel sizes and origin differ along each axis, in voxels.
 std::vector<Vec3> marks() {
     std::vector<Vec3> points;
     for (int slice = 4; slice < 16; slice += 2)
@@ -84,7 +84,7 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
              "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
     contains(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
     contains(advice({{100, 80, 20}}, PointSpace::Index), "; `points_space = index1` would bring");
-    // the positions of a multi-point in a hyperstack of two channels
+    // positions of a multi-point in a hyperstack of two channels
     contains(advice({{15, 70, 39}}, PointSpace::Index),
              "`points_channels = 2` would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};
@@ -113,7 +113,7 @@ TEST_CASE("an image without spacing is asked for it where points are lengths") {
 
 TEST_CASE("points that lie inside by accident are told by their slices") {
     ImageGeometry geometry;
-    geometry.size = {400, 400, 400};  // all readings fit into it
+    geometry.size = {400, 400, 400};  // every interpretation lies within it
     geometry.spacing = {0.35, 0.4, 0.7};
     geometry.origin = {-1.11, -2.33, -3.77};
     std::vector<Vec3> voxels, world, reversed;
@@ -125,7 +125,7 @@ TEST_CASE("points that lie inside by accident are told by their slices") {
     contains(verdict(cloud_of(voxels), geometry), "`points_space = index` would put them on voxel centres");
     contains(verdict(cloud_of(reversed), geometry), "`points_order = zyx` would put them on voxel centres");
     CHECK(verdict(cloud_of(world), geometry).empty());
-    // who says it is not asked again
+    // a stated space is not questioned
     PointCloud stated = cloud_of(voxels);
     stated.stated = true;
     CHECK(verdict(stated, geometry).empty());
@@ -171,13 +171,13 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
 }
 
 TEST_CASE("numbers that are small in the image's unit are not taken for voxels") {
-    // Micrometres in millimetres: all lie in the first voxel if they are read as voxels.
+    // Micrometres in an image in millimetres: read as voxels, all lie in the first voxel.
     ImageGeometry geometry = small_image();
     geometry.spacing = {1e-4, 1e-4, 5e-4};
     std::vector<Vec3> points;
     for (const Vec3& p : marks()) points.push_back(geometry.index_to_world(p));
     CHECK(verdict(cloud_of(points), geometry).empty());
-    // ... nor where they lie outside.
+    // ... and no advice if they lie outside.
     for (Vec3& p : points) p[0] += 1;
     CHECK(verdict(cloud_of(points), geometry).find("Index") == std::string::npos);
 }

@@ -34,8 +34,8 @@ std::string bytes(T value, bool big_endian) {
     return text;
 }
 
-/// Colour before the coordinates, which are z, x, y of mixed types with a list between, behind another element that
-/// holds a list.
+/// Colour before the coordinates, which are z, x, y of different types with a list between them, after another element
+/// that contains a list.
 std::string awkward_ply(const std::string& format) {
     const bool ascii = format == "ascii";
     const bool big = format == "binary_big_endian";
@@ -105,7 +105,7 @@ TEST_CASE("column names that mean voxels are understood as such") {
     CHECK(cloud.points == kThree);
     CHECK(cloud.space == PointSpace::Index);
     CHECK(cloud.rule.find("napari") != std::string::npos);
-    // what the user says wins
+    // the user's options take precedence
     cloud = read_points(napari, {PointSpace::World, PointOrder::XYZ});
     CHECK(cloud.space == PointSpace::World);
     CHECK(cloud.points[0] == Vec3{3, 2, 1});
@@ -141,7 +141,7 @@ TEST_CASE("a column of kinds says which marks lie inside and outside") {
     CHECK(marks.cloud.rule.find("with kinds") != std::string::npos);
     CHECK(marks.of(MarkKind::Surface).points == std::vector<Vec3>{{1, 2, 3}});
     CHECK(marks.of(MarkKind::Outside).points == std::vector<Vec3>{{7, 8, 9}});
-    // Another program's column of that name, in the middle of the file, too, and a row without one.
+    // A column of that name from another program, also in the middle of the file, and a row without it.
     for (const char* rows : {"x,y,z,kind\n1,2,3,soma\n-4.5,.25,.001,inside\n7,8,9,axon\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001,5\n7,8,9,inside\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001\n7,8,9,inside\n"}) {
@@ -181,7 +181,7 @@ TEST_CASE("a selection of Fiji holds 16-bit pixels") {
 
 TEST_CASE("contours of slices are ordered, closed lines") {
     const Scratch scratch;
-    // contour 0 of slices 3 and 4, contour 1 of slice 3; the last row comes late
+    // contour 0 of slices 3 and 4, contour 1 of slice 3; the last row is out of order
     const PointCloud cloud = read_points(scratch.write(
         "contours.csv", "slice,contour,x_px,y_px\n3,0,1,2\n3,0,4,2.5\n3,1,9,9\n4,0,7,7\n4,0,8,7\n3,0,4,6\n"));
     CHECK(cloud.space == PointSpace::Index);
@@ -406,7 +406,7 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
         };
         const double before = double(std::count_if(all.begin(), all.end(), is_in)),
                      after = double(std::count_if(some.begin(), some.end(), is_in));
-        CHECK(after / before == Approx(0.15).margin(0.003));  // drawn at random: 0.006
+        CHECK(after / before == Approx(0.15).margin(0.003));  // for random points it is 0.006
     }
     std::sort(order.begin(), order.end());
     CHECK(order == all);
@@ -424,7 +424,7 @@ TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
     CHECK(s.mean == Approx(0.5));
     CHECK(s.max == Approx(0.5));
 
-    // clusters of very unequal scale, far from the origin
+    // clusters of very different sizes, far from the origin
     std::vector<Vec3> points = random_points(1000, 4);
     for (std::size_t n = 0; n < points.size(); ++n) {
         const double scale = n % 2 == 0 ? 1e-4 : 50.0;

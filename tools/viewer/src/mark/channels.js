@@ -1,4 +1,4 @@
-// The channels of an image that has several, seen together: each in a colour of its own, added up.
+// Displays several channels of an image together: each in a colour of its own, added up.
 import {el} from '../dom.js';
 import {greyTable} from '../grey.js';
 import {menuItem} from '../menu.js';
@@ -7,7 +7,7 @@ const COLORS = [[70, 220, 90], [235, 75, 235], [70, 205, 235], [240, 215, 70], [
 const hex = (rgb) => `#${rgb.map((v) => v.toString(16).padStart(2, '0')).join('')}`;
 const rgb = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16));
 
-/** What was kept of the channels that are shown, as far as it makes sense: colours by their numbers. */
+/** The stored colours of the displayed channels by their numbers, as far as they are valid. */
 export function keptMix(kept, {channels = []}) {
   const isColor = (color) => Array.isArray(color) && color.length === 3 && color.every((v) => Number.isInteger(v) && v >= 0 && v <= 255);
   return Object.fromEntries(Object.entries(kept ?? {}).filter(([n, color]) => Number(n) in channels && isColor(color)));
@@ -22,7 +22,7 @@ export class Channels {
     this.show(kept);
   }
 
-  /** Colours by the channels' numbers; the others are not shown, and without any the one that is marked is grey. */
+  /** Colours by channel number; other channels are hidden. If `mix` is empty, the marked channel is shown in grey. */
   async show(mix) {
     try {
       for (const n of Object.keys(mix).map(Number)) {
@@ -43,7 +43,7 @@ export class Channels {
     const mix = {...this.state.get('mix')}, own = this.image.channel;
     if (n in mix) delete mix[n];
     else mix[n] = COLORS[n % COLORS.length];
-    if (n !== own && n in mix) mix[own] ??= COLORS[own % COLORS.length];  // grey below it would hide its colour
+    if (n !== own && n in mix) mix[own] ??= COLORS[own % COLORS.length];  // grey would hide the colour of the other channel
     if (Object.keys(mix).every((one) => Number(one) === own)) delete mix[own];
     return this.show(mix);
   }
@@ -57,7 +57,7 @@ export class Channels {
     state.set({grey});
   }
 
-  /** Of the menu of grey values; nothing where there is one channel. */
+  /** Entries for the menu of grey values; none for a single channel. */
   items() {
     const {image, state} = this;
     if (image.channels.length < 2) return [];

@@ -1,8 +1,8 @@
-// The WebSocket: what waits is sent in order; where the connection is lost, it is opened again.
+// The WebSocket: sends queued actions in order, and reconnects when the connection is lost.
 import {Store} from '../store.js';
 
 const MOST_ON_THE_WAY = 64;
-const PATIENCE = 15000;  // ms without an answer: the other end is gone, though nobody said so
+const PATIENCE = 15000;  // ms without an answer, after which the connection is considered lost
 const WAITS = [200, 400, 800, 1500, 2500, 4000];
 
 export class Connection {
@@ -37,7 +37,7 @@ export class Connection {
     this.count();
   }
 
-  /** Whether this is the study that the page shows. */
+  /** Whether the server has the study that the page shows. */
   welcome(state) {
     if (this.study.name === null) {
       this.study.name = state.study;
@@ -60,10 +60,10 @@ export class Connection {
     this.count();
     this.timer = setTimeout(() => this.open(), WAITS[Math.min(this.tries++, WAITS.length - 1)]);
     if (this.tries < 2) return;
-    try {  // a server that was started anew knows neither the cookie nor the page
+    try {  // a server that was restarted knows neither the cookie nor the page
       const answer = await fetch('/image', {method: 'HEAD'});
       if (answer.status === 403 && !this.isOpen) this.state.set({link: 'refused'});
-    } catch { /* there is no server at all */ }
+    } catch { /* no server is running */ }
   }
 
   hurry() {
@@ -85,7 +85,7 @@ export class Connection {
     for (const item of this.queue.items) {
       if (item.seq !== null) continue;
       if (item.sentOn !== this.number) {
-        // What follows must not overtake one that waits for an ID.
+        // Later actions must not overtake one that waits for an ID.
         if (onTheWay >= MOST_ON_THE_WAY || !this.queue.isReady(item)) return;
         item.sentOn = this.number;
         item.sentAt = performance.now();
@@ -95,7 +95,7 @@ export class Connection {
     }
   }
 
-  /** A question; it is not kept. False where nobody hears it. */
+  /** Sends a query, which is not queued. Returns false if it cannot be sent. */
   ask(what, structure) {
     if (!this.isOpen || typeof structure === 'string') return false;
     this.socket.send(JSON.stringify({key: this.queue.nextKey(), ask: what, structure}));

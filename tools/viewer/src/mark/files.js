@@ -1,9 +1,9 @@
-// Files of a person's choice that become part of the study: marks, a guess to correct, labels as structures.
+// Files that the user adds to the study: marks, a guess to correct, labels as structures.
 import {el} from '../dom.js';
 
 const MARKS = /\.(csv|tsv|txt|xyz|pts|asc|roi|zip|json|fcsv|annot)$/i;
-const MOST_BYTES = 256 * 2 ** 20;  // the program refuses more
-const PATIENCE = 5000;  // ms until a structure has its number
+const MOST_BYTES = 256 * 2 ** 20;  // limit of the program
+const PATIENCE = 5000;  // maximum time in ms until a structure has its number
 
 export class Files {
   constructor({study, tools, toast, queue}) {
@@ -29,7 +29,7 @@ export class Files {
     if (file) this.send(file, this.as);
   }
 
-  /** The number of the active structure; one that was just made gets it from the program. */
+  /** The number of the active structure; a new structure gets it from the program. */
   async structure() {
     const own = this.tools.open();
     if (!own) return null;

@@ -1,8 +1,8 @@
-// What the structures will be once the actions that are under way have been applied.
+// The structures after all pending actions have been applied.
 import {applyAction, isSameMark, isSameOutline} from '../changes.js';
 import {referenceOf} from './queue.js';
 
-/** Undo takes back the action before it that is still under way; what is older than that only the server knows. */
+/** Undo cancels the preceding pending action; only the server can undo earlier ones. */
 function withoutUndone(actions) {
   const done = [], undone = [];
   for (const action of actions) {
@@ -18,7 +18,7 @@ function withoutUndone(actions) {
   return done;
 }
 
-/** The newest ID of what an action has made, for a server that does not tell it; `taken` are those of others. */
+/** The newest ID of the object that an action has made, for servers that do not send it; `taken` are IDs of other objects. */
 export function madeBy(action, structures, taken) {
   const own = structures.find((s) => s.id === action.structure);
   const made = action.do === 'add_structure' ? structures.filter((s) => s.name === action.name)
@@ -26,7 +26,7 @@ export function madeBy(action, structures, taken) {
   return (made ?? []).map(({id}) => id).filter((id) => !taken.has(id)).sort((a, b) => b - a)[0];
 }
 
-/** `resolve` gives the ID for a reference where it is known. */
+/** `resolve` returns the ID for a reference if it is known. */
 export function fold(structures, actions, resolve) {
   return withoutUndone(actions).reduce((list, a) => {
     const action = {...a, structure: resolve(a.structure), mark: resolve(a.mark), to: resolve(a.to)};

@@ -1,6 +1,6 @@
-// The image on a plane of any direction, as the server samples it.
+// The image on an oblique plane, sampled by the server.
 
-/** For an ObliquePlane: of one that is turned on the newest counts. */
+/** For an ObliquePlane: a new request cancels the previous one. */
 export function codesOf() {
   let controller = null;
   return async ({first, alongX, alongY, count}) => {
@@ -10,7 +10,7 @@ export function codesOf() {
       const answer = await fetch(`/oblique?first=${first}&right=${alongX}&down=${alongY}&count=${count}`, {signal: controller.signal});
       return answer.ok ? new Uint16Array(await answer.arrayBuffer()) : null;
     } catch {
-      return null;  // another one is wanted, or the connection is lost
+      return null;  // a newer request replaced it, or the connection is lost
     }
   };
 }

@@ -1,4 +1,4 @@
-// Keys of the mark page, beside those that every page has.
+// Keys of the mark page, in addition to those of both pages.
 import {listenToKeys, VIEW_ROWS, viewKeys} from '../keyboard.js';
 import {TOOLS} from './tools.js';
 
@@ -11,7 +11,7 @@ export const SHEET = [
   ['Views', [...VIEW_ROWS, ['y', 'oblique plane in 3D, facing you'], ['[ ]', 'in 3D: moves the oblique plane']]],
 ];
 
-/** `app` has state, study, tools, panels, image and the rest of the page. */
+/** `app` has state, study, tools, panels, image and the other parts of the page. */
 export function keyboard(app, {suggestions, sidebar, help, theme, oblique, view}) {
   const {state, study, tools, space} = app, {keys: shared, panel, moveCrosshair} = viewKeys(app, {help, theme, view});
   const own = () => tools.active() ?? study.structures[0];

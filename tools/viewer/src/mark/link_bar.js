@@ -1,4 +1,4 @@
-// The bar that says that there is no server.
+// The bar that reports a missing connection to the server.
 import {el} from '../dom.js';
 
 const LINKS = {
@@ -17,7 +17,7 @@ export function linkBar(state) {
     if (tell) text.textContent = tell(state.get('waiting'));
     again.hidden = link !== 'other';
     clearTimeout(timer);
-    // The first moment of a page is no loss.
+    // While a page is loading, the connection has not been lost yet.
     if (link === 'connecting' && element.hidden) timer = setTimeout(() => { element.hidden = !LINKS[state.get('link')]; }, 1200);
     else element.hidden = !tell;
   };

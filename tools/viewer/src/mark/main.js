@@ -1,4 +1,4 @@
-// The page of covol mark: an image in three planes, marks upon it, and the surfaces that they make.
+// The page of covol mark: an image in three planes, its marks, and the surfaces that are computed from them.
 import {el, unitText} from '../dom.js';
 import {greyTable} from '../grey.js';
 import {icon} from '../icons.js';
@@ -46,7 +46,7 @@ function firstState(image, space, kept) {
     keyPanel: 2, link: 'connecting', waiting: 0, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
-/** What is chosen follows the structures: IDs come, and what is gone is not chosen any more. */
+/** Updates the selection when structures change: references are replaced by IDs, and removed objects are deselected. */
 function follow(state, study) {
   const known = (target) => {
     const own = target && study.structure(target.structure);
@@ -58,7 +58,7 @@ function follow(state, study) {
   };
   study.on('change', () => {
     const active = study.resolve(state.get('active')), first = study.structures[0]?.id ?? null;
-    // Before the first state nothing is known of what was active.
+    // Before the first state it is not known whether the active structure exists.
     const isKept = study.seq < 0 || study.structure(active);
     state.set({study: state.get('study') + 1, active: isKept ? active : first, selected: known(state.get('selected')), hover: known(state.get('hover')), drag: known(state.get('drag'))});
   });
@@ -113,7 +113,7 @@ async function start() {
   showFocus();
   keyboard(app, {suggestions, sidebar, help, theme, oblique, view: () => view});
   remember(state, store, KEPT, (name, value) => name !== 'active' || !isReference(value));
-  // Where nothing can be kept, what was not sent would be lost.
+  // If the queue cannot be stored, unsent actions would be lost.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();
   window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing, tools, files, channels: app.channels,

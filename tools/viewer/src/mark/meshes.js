@@ -1,9 +1,9 @@
-// The surfaces of the newest results, fetched and decoded.
+// Fetches and decodes the surfaces of the latest results.
 import {decodeCorners, decodePositions} from '../mesh_codec.js';
 import {indexCoordinates} from '../outline.js';
 
 const HEAD = 40;  // bytes before the positions
-export const GOODBYE = 1000;  // ms for which the surface before is still outlined
+export const GOODBYE = 1000;  // ms for which the previous surface is still outlined
 
 function decode(buffer, space) {
   const view = new DataView(buffer), float3 = (at) => [0, 4, 8].map((n) => view.getFloat32(at + n, true));
@@ -13,30 +13,30 @@ function decode(buffer, space) {
   return {...mesh, positions, corners, index: indexCoordinates(positions, space)};
 }
 
-/** After a new connection the same surface may come again. */
+/** After reconnecting, the same surface may be sent again. */
 const isSame = (a, b) => a.vertices === b.vertices && a.triangles === b.triangles && a.min.every((x, n) => x === b.min[n]) && a.max.every((x, n) => x === b.max[n]);
 
 export class Meshes {
-  /** `changed(id, mesh or null)` is called for each that comes or goes. */
+  /** `changed(id, mesh or null)` is called for each surface that is added or removed. */
   constructor(space, changed) {
     Object.assign(this, {space, changed, items: new Map(), wanted: new Map()});
   }
 
   get(id) { return this.items.get(id) ?? null; }
 
-  /** A result came; `isNew`: of a server that may count from the beginning again. */
+  /** Handles a result; `isNew`: from a new connection, whose server may have restarted its version numbers. */
   async take({structure: id, version, stage, seq}, isNew) {
     if (stage === 'empty') return this.drop(id);
     const wanted = this.wanted.get(id);
     if (!isNew && wanted >= version) return;
-    // One that is worked on has a surface only where there was one before.
+    // While a structure is being solved, it has a surface only if it had one before.
     if (!(version > 0) || (!['first', 'refined'].includes(stage) && !isNew && wanted)) return;
     this.wanted.set(id, version);
     let mesh = null;
     try {
       const answer = await fetch(`/mesh?structure=${id}&version=${version}`);
       if (answer.ok) mesh = decode(await answer.arrayBuffer(), this.space);
-    } catch { /* the connection is lost: the next state brings it */ }
+    } catch { /* the connection is lost: the next state includes the result */ }
     if (this.wanted.get(id) !== version) return;
     if (!mesh) this.wanted.delete(id);
     else this.put(id, {...mesh, id, version, seq, stage, arrived: performance.now(), isShown: false});
@@ -58,7 +58,7 @@ export class Meshes {
     if (this.items.delete(id)) this.changed(id, null);
   }
 
-  /** What no structure has any more goes. */
+  /** Removes the surfaces of structures that do not exist any more. */
   keepOnly(ids) {
     const kept = new Set(ids);
     for (const id of this.items.keys()) if (!kept.has(id)) this.drop(id);

@@ -1,4 +1,4 @@
-// How all structures of the study are segmented; empty fields are chosen by the program.
+// Options for segmenting all structures of the study; the program chooses values for empty fields.
 import {el} from '../dom.js';
 
 export function optionsSheet({study, unitText}) {

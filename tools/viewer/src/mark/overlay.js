@@ -1,4 +1,4 @@
-// What the mark page draws upon a slice: paint, outlines, finished and not, beside what every page draws.
+// What the mark page draws on a slice in addition to the parts of both pages: paint, finished and unfinished outlines.
 import {away, drawCrosshair, drawMark, drawMarks, drawRing, drawRuler, drawSurface, FAINT_WITHIN, inkOf, stroke} from '../overlay.js';
 import {isBrush} from './tools.js';
 
@@ -60,7 +60,7 @@ function drawPaint(panel, context) {
   if (stroke) draw(painting.draft(stroke, axis, at, stroke.erases ? [255, 255, 255] : tools.active()?.color ?? [255, 210, 74]), stroke.erases ? 0.3 : 0.45);
 }
 
-/** How large the brush is, where the pointer is. */
+/** Shows the size of the brush at the pointer. */
 function drawBrush(panel, context) {
   const {state, input, plane} = panel;
   if (!isBrush(state.get('tool')) || !input.spot) return;
@@ -77,7 +77,7 @@ export function drawOverlay(panel, context) {
   drawPaint(panel, context);
   drawCrosshair(panel, context);
   const active = panel.tools.active();
-  const ordered = [...panel.study.structures].sort((a, b) => (a === active) - (b === active));  // the active one lies on top
+  const ordered = [...panel.study.structures].sort((a, b) => (a === active) - (b === active));  // the active one is drawn on top
   for (const structure of ordered)
     if (structure.visible) {
       drawSurface(panel, context, structure, structure === active);

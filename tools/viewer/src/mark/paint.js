@@ -1,9 +1,9 @@
-// Painted voxels on a slice: strokes as lib/src/study/paint.cpp draws them.
+// Painted voxels on a slice; draws strokes like lib/src/study/paint.cpp.
 
 const NOTHING = {};
 const lengthOf = (space, along) => Math.sqrt(space.product(along, along));
 
-/** Pieces of at most twice the radius: the box around a long one is mostly empty. */
+/** Splits segments into pieces of at most twice the radius, because the bounding box of a long one is mostly empty. */
 function* pieces(space, corners, radius) {
   if (corners.length === 1) yield [corners[0], corners[0]];
   for (let n = 1; n < corners.length; ++n) {
@@ -13,7 +13,7 @@ function* pieces(space, corners, radius) {
   }
 }
 
-/** Draws a stroke into the values of a slice: `take` is called with columns and rows of it. Lengths are along the image's axes. */
+/** Draws a stroke on a slice: `take` is called with the column and row of each voxel. Lengths are along the image's axes. */
 export function drawStroke(space, stroke, axis, at, take) {
   const isDisc = stroke.axis !== undefined && stroke.axis !== null;
   if (isDisc && stroke.axis === axis && stroke.at !== at) return;
@@ -52,11 +52,11 @@ function pictureOf(space, strokes, axis, at, rgb) {
   return {canvas};
 }
 
-/** Keeps the pictures of the slices that are seen; strokes never change, so that a list of them stands for its paint. */
+/** Caches the pictures of displayed slices; strokes never change, so a list of strokes identifies its picture. */
 export class PaintPictures {
   constructor(space) { Object.assign(this, {space, kept: new Map()}); }
 
-  /** A canvas with a pixel for each voxel of the slice; null where nothing is painted. */
+  /** A canvas with one pixel per voxel of the slice; null if nothing is painted on it. */
   get(structure, axis, at) {
     const name = `${structure.id} ${axis}`, known = this.kept.get(name), {strokes = []} = structure, last = strokes.at(-1);
     if (strokes.length === 0) return null;
@@ -67,6 +67,6 @@ export class PaintPictures {
     return picture.canvas ?? null;
   }
 
-  /** A stroke that is being drawn. */
+  /** The picture of an unfinished stroke. */
   draft(stroke, axis, at, rgb) { return pictureOf(this.space, [{...stroke, erases: false}], axis, at, rgb).canvas ?? null; }
 }

@@ -1,10 +1,10 @@
-// Outlines and paint by mouse, pen and fingers, beside what a plane and marks have.
+// Outlines and paint by mouse, pen and touch, in addition to gestures of planes and marks.
 import {MarkPointer} from '../mark_pointer.js';
 import {CLICK, TAP} from '../pointer.js';
 import {isBrush} from './tools.js';
 
 const HIT_LINE = 6;  // CSS pixels
-const FREEHAND = 3;  // between two corners
+const FREEHAND = 3;  // CSS pixels between two corners
 const NEAR_BEGINNING = 10;
 
 function distanceToLine([x, y], [ax, ay], [bx, by]) {
@@ -97,7 +97,7 @@ export class PointerInput extends MarkPointer {
     if (panel.tools.stroke(panel, [index], erases)) this.begin('stroke', spot, {corner: spot, at: panel.shownAt});
   }
 
-  /** Corners a third of the brush apart: between them it paints a straight line. */
+  /** Adds corners a third of the brush radius apart; between them the stroke is a straight line. */
   goOnPainting(gesture, event) {
     const {panel} = this, places = [], apart = Math.max(2, panel.state.get('brush').radius * panel.plane.scale / 3);
     for (const one of event.getCoalescedEvents?.() ?? [event]) {
@@ -130,7 +130,7 @@ export class PointerInput extends MarkPointer {
     if (places.length > 0) panel.tools.addCorners(panel, places);
   }
 
-  /** Back at the beginning: it is closed. */
+  /** Closes the outline if it ends at its beginning. */
   endFreehand(spot) {
     const {panel} = this, draft = panel.state.get('draft');
     if (!draft || draft.places.length < 6) return;

@@ -1,9 +1,9 @@
-// Actions that the server has not acknowledged yet. Each is kept in localStorage until then: a tab that is opened later
-// takes them up, and two tabs that send the same one do no harm, because the server applies a key once.
+// Actions that the server has not acknowledged yet. Until then each is stored in localStorage: a tab that is opened later
+// sends them, and sending an action from two tabs does no harm, because the server applies each key once.
 
 const REFERENCES = ['structure', 'mark', 'to'];
 
-/** An ID that the server has not given yet: "of" and the key of the action that asks for it. */
+/** Reference to an ID that the server has not assigned yet: "of" and the key of the action that requests it. */
 export const referenceOf = (key) => `of ${key}`;
 export const isReference = (id) => typeof id === 'string';
 
@@ -15,7 +15,7 @@ export class Queue {
     this.store = null;
   }
 
-  /** The study is known: what was left over of it comes first. */
+  /** Called when the study is known: actions left from earlier sessions precede the new ones. */
   open(store) {
     this.store = store;
     const old = store.names().map((key) => ({key, ...store.get(key)})).filter(({key, action}) => action?.key === key);
@@ -43,7 +43,7 @@ export class Queue {
     this.store?.remove(item.action.key);
   }
 
-  /** An action made something, and this is its ID. */
+  /** Replaces a reference by the ID of the object that the action made. */
   settle(reference, id) {
     for (const item of this.items)
       for (const name of REFERENCES)
@@ -53,7 +53,7 @@ export class Queue {
         }
   }
 
-  /** What waits for something that will never be. */
+  /** Actions that refer to objects that will never exist. */
   orphans() {
     const made = new Set(this.items.map(({action}) => referenceOf(action.key)));
     return this.items.filter(({action}) => REFERENCES.some((name) => isReference(action[name]) && !made.has(action[name])));
@@ -61,6 +61,6 @@ export class Queue {
 
   isReady({action}) { return !REFERENCES.some((name) => isReference(action[name])); }
 
-  /** Those that are not known to be on disk. */
+  /** The number of actions that are not known to be on disk. */
   get waiting() { return this.items.filter(({seq}) => seq === null).length; }
 }

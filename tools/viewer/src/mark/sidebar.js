@@ -1,4 +1,4 @@
-// The structures: what they are called, how good they are, what is to be said about them.
+// The structures: names, quality, and messages about them.
 import {colorOf, el, number} from '../dom.js';
 import {icon} from '../icons.js';
 import {isReference} from './queue.js';
@@ -6,7 +6,7 @@ import {isReference} from './queue.js';
 const hex = (rgb) => `#${rgb.map((v) => v.toString(16).padStart(2, '0')).join('')}`;
 const rgb = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16));
 
-/** A text that only changes where it differs: whoever reads it is not disturbed. */
+/** Changes a text only if it differs, so that selections and screen readers are not disturbed. */
 function put(element, text) { if (element.textContent !== text) element.textContent = text; }
 
 function iconButton(name, label, onclick, more = {}) { return el('button', {type: 'button', class: 'icon', title: label, 'aria-label': label, onclick, ...more}, icon(name)); }
@@ -135,7 +135,7 @@ class Card {
   }
 }
 
-/** The mark that is chosen: where it is, and whose. */
+/** The selected mark: its position and its structure. */
 function markCard(app) {
   const {state, study, space, tools} = app, place = el('span', {class: 'place'}), kind = el('b', {});
   const give = el('select', {'aria-label': 'give the mark to another structure', onchange: () => {
@@ -166,7 +166,7 @@ export function sidebar(app) {
     const active = tools.active(), seen = new Set(), references = [...cards.keys()].filter(isReference);
     nothing.hidden = study.structures.length > 0;
     study.structures.forEach((structure, n) => {
-      // A card stays the same one when its structure gets its ID.
+      // A card is kept when its structure gets its ID.
       const waiting = cards.has(structure.id) ? structure.id : references.find((id) => study.resolve(id) === structure.id), card = cards.get(waiting) ?? new Card(structure.id, app);
       if (waiting !== structure.id) cards.delete(waiting);
       cards.set(structure.id, card);

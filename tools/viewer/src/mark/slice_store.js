@@ -1,16 +1,16 @@
-// Slices of the image as the server has them: those seen last are kept, those that come next are fetched before, and what
-// is not looked at any more is not waited for.
+// Slices of the image from the server: a cache of the last ones, which also fetches the next ones ahead, and cancels
+// requests for slices that are not needed any more.
 
 const MOST_SLICES = 200, MOST_BYTES = 48 * 2 ** 20, MOST_AT_ONCE = 4, AHEAD = 6;
 const MOST_STEP = 1024;
 const BUSY = 503, PAUSE = 200;  // ms
-const SLOW = 400;  // ms: slices that take longer are not fetched before
-const MOST_LATE = 12;  // slices that one which comes late may lie beside the one that is wanted
+const SLOW = 400;  // ms: slower slices are not fetched ahead
+const MOST_LATE = 12;  // maximum distance in slices of a late slice that is shown instead of the requested one
 const MOST_PIXELS = 1.5 * 2 ** 20, OVERVIEW = 2 ** 19, GRID = 256;
 
 const partKey = (part) => part ? ` ${part.x} ${part.y} ${part.width} ${part.height}` : '';
 
-/** The part of a slice of so many voxels that is seen between two of them, in whole squares; null where the slice is small. */
+/** The displayed part of a slice between two voxels, rounded to whole squares; null if the slice is small. */
 function partOf([across, rows], step, [x0, y0], [x1, y1]) {
   const width = Math.ceil(across / step), height = Math.ceil(rows / step);
   if (width * height <= MOST_PIXELS) return null;
@@ -23,15 +23,15 @@ function partOf([across, rows], step, [x0, y0], [x1, y1]) {
 }
 
 export class SliceStore {
-  /** `image` is what the server says of it; `arrived` is called for each slice that came, or that did not. */
+  /** `image` is the server's description; `arrived` is called for each slice that was received, or that failed. */
   constructor(space, image, arrived) {
     Object.assign(this, {space, image, arrived, slices: new Map(), bytes: 0, wanted: [[], [], []], ahead: [], underWay: new Map(), failed: new Set(), took: [0, 0, 0], mixed: [], generation: 0});
   }
 
-  /** What is to be fetched of a slice, of which the part between two voxels is seen; null: all of it. */
+  /** The part to fetch of a slice that is displayed between two voxels; null: the whole slice. */
   partFor(axis, step, from, to) { return partOf(this.space.planeAxes(axis).map((a) => this.space.size[a]), step, from, to); }
 
-  /** The voxels that a slice stands for: of a coarse level several have the same one. */
+  /** The number of voxels that a slice represents: at coarse levels, several positions have the same slice. */
   thickness(axis, step) {
     const level = (this.image.levels ?? []).filter((factors) => factors.every((f) => step % f === 0)).pop();
     return level?.[axis] ?? 1;
@@ -42,16 +42,16 @@ export class SliceStore {
     return `${axis} ${Math.floor(at / thick)} ${step}${partKey(part)}`;
   }
 
-  /** The slice, if it is here. */
+  /** The slice, if it is cached. */
   get(axis, at, step, part = null) {
     const key = this.key({axis, at, step, part}), slice = this.slices.get(key);
     if (!slice) return null;
-    this.slices.delete(key);  // the last of the map is the one that was used last
+    this.slices.delete(key);  // a Map keeps the order of insertion: the last one is the one used last
     this.slices.set(key, slice);
     return slice;
   }
 
-  /** The whole slice, or the finest that is here; null where there is none. */
+  /** The whole slice, or the finest one that is cached; null if there is none. */
   best(axis, at, step) {
     const own = this.get(axis, at, step);
     if (own) return own;
@@ -62,14 +62,14 @@ export class SliceStore {
     return null;
   }
 
-  /** The place of the slice that came last and lies nearer to the wanted one than the one that is shown; or null. */
+  /** The position of the cached slice that is nearest to the requested one, if it is nearer than the displayed one; or null. */
   late(axis, at, step, shownAt) {
     const limit = Math.min(MOST_LATE * this.thickness(axis, step), Math.abs(shownAt - at) - 1), towards = Math.sign(shownAt - at);
     for (let n = 1; n <= limit; ++n) if (this.slices.has(this.key({axis, at: at + n * towards, step}))) return at + n * towards;
     return null;
   }
 
-  /** A part of that slice that overlaps with this one. */
+  /** A cached part of that slice that overlaps with this one. */
   partial(axis, at, step, part) {
     const own = this.get(axis, at, step, part);
     if (own) return own;
@@ -81,7 +81,7 @@ export class SliceStore {
 
   hasFailed(axis, at, step, part = null) { return this.failed.has(this.key({axis, at, step, part})); }
 
-  /** The step at which a slice is small: what is shown until the rest is there. */
+  /** The step at which a slice is small, for display until the full slice has been received. */
   coarse(axis, step, most = OVERVIEW) {
     const [right, down] = this.space.planeAxes(axis), {size} = this.space;
     let coarse = step * 2;
@@ -89,10 +89,10 @@ export class SliceStore {
     return coarse;
   }
 
-  /** Asks for a slice or a part of it and, in the direction of travel, for those after it. */
+  /** Requests a slice or a part of it and, in the direction of travel, the next ones. */
   want(axis, at, step, direction, part = null) {
     const own = {axis, at, step, part}, list = [own];
-    // Of chunks that have to be unpacked a coarse level's few are there first; under a part there is always a whole.
+    // For chunks, which have to be decompressed, a coarse slice arrives first; a part is always shown on top of a whole slice.
     const coarse = part ? this.coarse(axis, step) : 4 * step;
     if ((part || (this.image.in_chunks && !this.has(own))) && coarse <= MOST_STEP && !this.best(axis, at, step)) list.unshift({axis, at, step: coarse, part: null});
     this.wanted[axis] = list.filter((one) => !this.has(one) && !this.failed.has(this.key(one)));
@@ -106,7 +106,7 @@ export class SliceStore {
     this.work();
   }
 
-  /** What is far from the slice that is looked at now, or of another zoom, is not waited for. */
+  /** Cancels requests for slices that are far from the displayed one, or of another zoom. */
   dropStale({axis, at, step, part}) {
     const near = 2 * AHEAD * this.thickness(axis, step);
     for (const [key, {of, controller}] of this.underWay) {
@@ -123,7 +123,7 @@ export class SliceStore {
     return this.slices.has(key) || this.underWay.has(key);
   }
 
-  /** Slices have the values of these other channels, too; what is here without them goes. */
+  /** Fetches these other channels with each slice, too; slices without them are dropped. */
   mixWith(channels) {
     if (String(channels) === String(this.mixed)) return;
     for (const {controller} of this.underWay.values()) controller.abort();
@@ -132,7 +132,7 @@ export class SliceStore {
     this.arrived();
   }
 
-  /** The connection is back: what failed may be asked for again. */
+  /** After reconnecting: failed slices may be requested again. */
   retry() {
     this.failed.clear();
     this.arrived();
@@ -141,7 +141,7 @@ export class SliceStore {
   work() {
     while (this.underWay.size < MOST_AT_ONCE) {
       const list = this.wanted.find((one) => one.length > 0);
-      // One way stays free for what is looked at next.
+      // One request is kept free for the slice that is displayed next.
       if (!list && this.underWay.size >= MOST_AT_ONCE - 1) return;
       const next = list ? list.shift() : this.ahead.shift();
       if (!next) return;
@@ -172,7 +172,7 @@ export class SliceStore {
     this.work();
   }
 
-  /** The server has too much to do: it is asked again. */
+  /** Repeats a request that the server refused because it was busy. */
   later(key, one, {signal}) {
     setTimeout(() => {
       if (signal.aborted) return;
@@ -192,7 +192,7 @@ export class SliceStore {
     }
   }
 
-  /** The value of a voxel where a slice holds it: {value, isExact}, or null. */
+  /** The value of a voxel if a cached slice contains it: {value, isExact}, or null. */
   valueAt(index, image) {
     let best = null;
     for (const slice of this.slices.values()) {

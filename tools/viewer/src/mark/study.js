@@ -1,10 +1,10 @@
-// The study: what the server says, and upon that what was done here and is on its way.
+// The study: the state from the server, and on top of it the pending actions of this page.
 import {fold, madeBy} from './fold.js';
 import {referenceOf} from './queue.js';
 
 const OF_A_SURFACE = ['triangles', 'volume', 'area', 'extent', 'mean', 'sd', 'expected', 'warnings'];
 
-/** While a surface is worked on, and where that failed, the figures of the one that is there stay. */
+/** While a surface is recomputed, and if that failed, the figures of the existing one stay. */
 function merged(before, result) {
   if (!before || !result || !['working', 'failed'].includes(result.stage) || before.stage === 'empty') return result;
   return {...result, ...Object.fromEntries(OF_A_SURFACE.filter((name) => before[name] !== undefined).map((name) => [name, before[name]]))};
@@ -29,7 +29,7 @@ export class Study {
     return this.structures.find((s) => s.id === known) ?? null;
   }
 
-  /** Something done by hand: shown at once, sent as soon as that is possible. The reference to what it makes, if it does. */
+  /** An action of the user: displayed at once, sent as soon as possible. Returns the reference to the object that it makes, if any. */
   act(action) {
     const item = this.queue.add(action);
     this.lastAction = performance.now();
@@ -59,7 +59,7 @@ export class Study {
 
   takePatch(patch) {
     if (patch.seq <= this.seq) return;
-    if (patch.seq !== this.seq + 1) return this.emit('gap');  // one was lost: only a whole state helps
+    if (patch.seq !== this.seq + 1) return this.emit('gap');  // a message was lost: only a complete state helps
     Object.assign(this, {seq: patch.seq, canUndo: patch.can_undo, canRedo: patch.can_redo, options: patch.options ?? this.options});
     const known = new Map(this.confirmed.map((s) => [s.id, s]));
     for (const s of patch.structures) known.set(s.id, {...s, result: merged(known.get(s.id)?.result, s.result)});
@@ -104,7 +104,7 @@ export class Study {
     this.emit('result', result, false);
   }
 
-  /** What is acknowledged goes when the structures hold it: a mark is never gone in between. */
+  /** Removes acknowledged actions once the structures contain their effects, so that a mark never disappears in between. */
   sweep() {
     for (const {action} of this.queue.items.filter((item) => item.seq !== null && item.seq <= this.seq)) {
       if (!this.ids.has(referenceOf(action.key))) {
@@ -116,7 +116,7 @@ export class Study {
     this.dropOrphans();
   }
 
-  /** What belongs to something that will never be: it was refused, or is gone again. */
+  /** Removes actions on objects that were refused, or do not exist any more. */
   dropOrphans() {
     for (let orphans = this.queue.orphans(); orphans.length > 0; orphans = this.queue.orphans()) {
       for (const orphan of orphans) this.queue.remove(orphan);
@@ -127,7 +127,7 @@ export class Study {
   refold() {
     const taken = new Set(this.ids.values());
     this.guesses.clear();
-    // A structure that is already there, though nobody has said yet that it is this one: its marks are shown in it.
+    // A structure may already exist, although its ID has not been reported yet: its marks are shown in it.
     for (const {action, sentOn} of this.queue.items)
       if (action.do === 'add_structure' && sentOn > 0) this.guesses.set(referenceOf(action.key), madeBy(action, this.confirmed, taken));
     this.structures = fold(this.confirmed, this.queue.items.map(({action}) => action), (id) => this.resolve(id));

@@ -1,4 +1,4 @@
-// All structures in a table that can be sorted, and saved.
+// All structures in a table that can be sorted and saved.
 import {dot, el, number} from '../dom.js';
 
 const extentOf = ({extent}) => (extent ? Math.max(...extent) : undefined);
@@ -24,7 +24,7 @@ export function tableSheet(app) {
     if (!dialog.open) return;
     const value = COLUMNS[order.by][1], of = (s) => value(s, s.result ?? {});
     const rows = [...study.structures];
-    // What is not known comes last either way.
+    // Unknown values come last in both orders.
     if (!order.isNatural) rows.sort((a, b) => {
       const [x, y] = [of(a), of(b)], isKnown = (v) => v !== undefined && v !== null;
       if (!isKnown(x) || !isKnown(y)) return isKnown(y) - isKnown(x);

@@ -1,4 +1,4 @@
-// When what was done was seen: for people who measure the page.
+// Records when results became visible, to measure the latency of the page.
 
 const KEPT = 200;
 
@@ -8,7 +8,7 @@ export class Timing {
     addEventListener('pointerup', (event) => { this.pointer = event.timeStamp; }, true);
   }
 
-  /** The outline of a surface was drawn for the first time: it is on the screen when the next picture begins. */
+  /** The outline of a surface was drawn for the first time: it becomes visible with the next frame. */
   drawn({id, version, seq, stage}) {
     const {pointer} = this;
     this.lastShown = performance.now();

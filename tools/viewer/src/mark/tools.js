@@ -1,4 +1,4 @@
-// What a click, a drag or a key does with the active structure: outlines and structures as a whole, beside marks.
+// Effects of clicks, drags and keys on the active structure: outlines and whole structures, in addition to marks.
 import {MARK_TOOLS, MarkTools} from '../mark_tools.js';
 
 const OUTLINE = ['outline', 'outline', 'c', 'Click: corner, drag: freehand \u00b7 Enter closes, Shift+Enter leaves it open, Escape cancels'];
@@ -9,7 +9,7 @@ export const TOOLS = [...MARK_TOOLS.slice(0, 3), OUTLINE, ...BRUSHES, ...MARK_TO
 const COLORS = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68], [102, 204, 238], [170, 51, 119], [238, 119, 51],
   [0, 153, 136], [136, 34, 85], [153, 153, 51], [51, 34, 136], [187, 187, 187]];
 
-/** Without the corners that lie within `most` of the line between their neighbours. */
+/** Removes corners within `most` of the line between their neighbours. */
 function thinned(places, most) {
   if (places.length < 3) return places;
   const [a, b] = [places[0], places[places.length - 1]], dx = b[0] - a[0], dy = b[1] - a[1], length = Math.hypot(dx, dy);
@@ -39,7 +39,7 @@ export class Tools extends MarkTools {
     return reference;
   }
 
-  /** The stroke that is being painted goes on; false where nothing may be painted. */
+  /** Continues the stroke that is being painted; returns false if painting is not possible. */
   stroke(panel, places, erases) {
     const {axis, shownAt: at} = panel, {radius, isBall} = this.state.get('brush'), old = this.state.get('stroke');
     if (!old && (!this.isReady() || !this.open())) return false;
@@ -65,7 +65,7 @@ export class Tools extends MarkTools {
     this.toast(isBall ? 'The brush paints on one slice.' : 'The brush is a ball: it paints on the slices beside it as well.');
   }
 
-  /** The outline that is being drawn gets a corner; `places` are voxels in the plane. */
+  /** Adds corners to the outline that is being drawn; `places` are voxels in the plane. */
   addCorners(panel, places) {
     const {axis, at} = panel, draft = this.state.get('draft');
     if (draft && (draft.axis !== axis || draft.at !== at))
@@ -83,7 +83,7 @@ export class Tools extends MarkTools {
     return true;
   }
 
-  /** `fine` is the size of a pixel in voxels: what is smaller is not kept. */
+  /** `fine` is the size of a pixel in voxels: smaller details are removed. */
   closeDraft(closed, fine = 0) {
     const draft = this.state.get('draft');
     if (!draft) return false;
@@ -101,7 +101,7 @@ export class Tools extends MarkTools {
     return true;
   }
 
-  /** Something about a structure as a whole. */
+  /** Changes a property of a structure as a whole. */
   change(what, id, value) {
     const own = this.study.structure(id);
     if (!own) return;

@@ -1,8 +1,8 @@
-// What is switched upon the 3D view, and the list of suggested slices.
+// Controls on the 3D view, and the list of suggested slices.
 import {colorings, rangeOf, SUPPORT, viridis} from '../colors.js';
 import {colorOf, dot, el, number} from '../dom.js';
 
-/** The structures: their colours, on and off, and whose marks are set. */
+/** The structures: their colours, visibility, and the choice of the active one. */
 function structureList({study, state, tools}) {
   const rows = study.structures.map((structure) => {
     const box = el('input', {type: 'checkbox', checked: true, 'aria-label': `show ${structure.name}`, onchange: () => study.act({do: 'show', structure: structure.id, visible: box.checked})});
@@ -29,7 +29,7 @@ function legend(data, name) {
   return [el('span', {}, number(low, 3)), bar, el('span', {}, `${number(high, 3)}${unit}`)];
 }
 
-/** Where the surfaces are cut, on a page that has no planes which show it. */
+/** The position of the cut, on a page without planes that show it. */
 function cutPlace({state, space}) {
   const slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': 'place of the cut', oninput: () => state.set({slices: state.get('slices').map((at, axis) => axis === state.get('cut') ? Number(slider.value) : at)})});
   const row = el('label', {}, el('span', {}, 'cut at'), slider), update = () => {
@@ -44,7 +44,7 @@ function cutPlace({state, space}) {
   return row;
 }
 
-/** Upon the 3D view: structures, colours, opacity. */
+/** The box on the 3D view: structures, colours, opacity. */
 export function lookBox(app) {
   const {data, state} = app, colors = colorings(data.structures), key = el('div', {class: 'legend'}), parts = [structureList(app)];
   if (colors.length > 1) {
@@ -64,7 +64,7 @@ export function lookBox(app) {
   return el('details', {class: 'look', open: !matchMedia('(max-width: 760px)').matches}, el('summary', {}, data.structures.length > 1 ? `${data.structures.length} structures` : 'Surface'), el('div', {}, parts));
 }
 
-/** Marks on and off, for the row above the 3D view. */
+/** Shows and hides marks, for the row above the 3D view. */
 export function marksButton(state) {
   const button = el('button', {type: 'button', class: 'small', title: 'marks (q)', 'data-key': 'marks', onclick: () => state.set({marks: !state.get('marks')})}, 'marks');
   const update = () => button.setAttribute('aria-pressed', String(state.get('marks')));
@@ -73,12 +73,12 @@ export function marksButton(state) {
   return button;
 }
 
-/** Places where new marks would help most, each with its structure's ID. */
+/** Positions at which new marks would improve the result most, each with its structure's ID. */
 export function suggestedPlaces(data) {
   return data.structures.flatMap((structure, n) => (structure.evidence?.suggestions ?? []).map((place) => ({id: n + 1, structure, ...place})));
 }
 
-/** A click goes there. */
+/** A click goes to the suggested position. */
 export function suggestionList({data, state, goTo}) {
   const items = suggestedPlaces(data), unit = data.unitText ? `\u2009${data.unitText}\u00b2` : '';
   if (items.length === 0) return null;

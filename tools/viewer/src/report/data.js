@@ -1,4 +1,4 @@
-// What lib/src/report writes, decoded.
+// Decodes the data that lib/src/report writes.
 import {decodeCorners, decodePositions} from '../mesh_codec.js';
 
 function bytesOf(base64) {
@@ -36,14 +36,14 @@ async function decodeStructure(structure) {
   };
 }
 
-/** A number that tells this page from others (FNV-1a over some of its text). */
+/** A number that distinguishes this page from others (FNV-1a over a part of its text). */
 function digestOf(text) {
   let hash = 2166136261;
   for (let n = 0; n < text.length; n += 61) hash = Math.imul(hash ^ text.charCodeAt(n), 16777619);
   return `${text.length}-${(hash >>> 0).toString(16)}`;
 }
 
-/** The page's data, meshes decoded, slices not yet, and a digest of it. */
+/** The page's data, with decoded meshes but without decoded slices, and its digest. */
 export async function readData() {
   const text = document.getElementById('data').textContent, data = JSON.parse(text);
   data.structures = await Promise.all(data.structures.map(decodeStructure));

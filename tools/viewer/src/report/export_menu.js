@@ -1,4 +1,4 @@
-// The menu of files: marks of each structure by their kind, the table.
+// The menu of files: marks of each structure by kind, and the table.
 import {dot, el} from '../dom.js';
 import {icon} from '../icons.js';
 import {menu, menuItem} from '../menu.js';
@@ -17,7 +17,7 @@ export function exportMenu({study, data, space}, saveTable) {
       const whole = data.structures[own.id - 1], isThinned = whole.markCount > study.given.get(own.id), items = [];
       for (const [kind, what, flag] of KINDS) {
         const marks = own.marks.filter((m) => m.kind === kind), set = marks.filter((m) => m.isNew);
-        // Of very many marks the page holds some: these alone would not be the run's.
+        // If there are very many marks, the page contains only some: a file with these would be incomplete.
         if (marks.length > 0 && !(isThinned && kind === 'surface')) items.push(file(own, marks, what, flag));
         if (set.length > 0 && (set.length < marks.length || isThinned)) items.push(file(own, set, `new_${what}`, flag));
       }

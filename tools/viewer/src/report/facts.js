@@ -1,7 +1,7 @@
-// What the run was and how good its result is: tables, bars, the command.
+// Settings and quality of the run: tables, bars, the command.
 import {dot, el, number, svg} from '../dom.js';
 
-/** What there is of each structure: of several, one is open at first. */
+/** A section for each structure; if there are several, the first one is open. */
 function perStructure(parts) {
   if (parts.length === 1) return parts[0][1];
   return parts.map(([structure, content], n) => el('details', {class: 'one', open: n === 0}, el('summary', {}, dot(structure.color), el('span', {}, structure.name)), content));
@@ -17,7 +17,7 @@ export function structureFacts(data) {
   return data.structures.map((structure, n) => ({structure, facts: list.find((f) => f.name === structure.name) ?? list[n] ?? data.facts}));
 }
 
-/** What was warned of one structure: lines that begin with its name, or all where there is no other one. */
+/** Warnings about one structure: lines that begin with its name, or all if there is no other one. */
 export function warningsAbout(data, structure) {
   const warnings = (Array.isArray(data.facts.warnings) ? data.facts.warnings : []).map(String);
   return data.structures.length === 1 ? warnings : warnings.filter((line) => line.startsWith(`${structure.name}: `));
@@ -72,7 +72,7 @@ function optionRows(facts, data) {
   const isGiven = (name) => given.has(name) || given.has(name.replace(/_/g, '-'));
   for (const name of new Set([...Object.keys(automatic), ...Object.keys(resolved)])) {
     const reason = automatic[name], value = name in resolved ? text(resolved[name]) : '';
-    if (value === '\u2013' && !reason) continue;  // not needed, and so not chosen
+    if (value === '\u2013' && !reason) continue;  // not needed, and therefore not chosen
     rows.push({name: name.replace(/_/g, ' '), value, how: isGiven(name) && name in resolved ? 'given' : reason ? 'automatic' : 'default', reason: reason ?? ''});
   }
   const rank = {automatic: 0, given: 1, default: 2};

@@ -1,7 +1,7 @@
-// Frames of a time-lapse: each has a page of its own beside this one, and what is seen is the same there.
+// Frames of a time-lapse: each has a page of its own in the same folder, with the same view.
 import {el} from '../dom.js';
 
-/** A slider through the pages; null where there is one. `step(by)` goes to another one. */
+/** A slider for the pages; null if there is only one. `step(by)` goes to another one. */
 export function frameBar(frames) {
   if (!frames) return null;
   const {at, pages} = frames, last = pages.length - 1, text = el('output', {}, `${at} of 0\u2013${last}`);

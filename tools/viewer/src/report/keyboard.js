@@ -1,4 +1,4 @@
-// Keys of the report page, beside those that every page has.
+// Keys of the report page, in addition to those of both pages.
 import {listenToKeys, VIEW_ROWS, viewKeys} from '../keyboard.js';
 import {isMarkTool, MARK_TOOLS} from '../mark_tools.js';
 
@@ -30,6 +30,6 @@ export function keyboard(app, {suggestions, help, theme, view, oblique, frames})
   };
   for (const [tool, , key] of MARK_TOOLS) keys[key] = () => state.set({tool});
   const digit = (n) => { if (study.structures[n]) state.set({active: study.structures[n].id, selected: null}); };
-  // The page is longer than the window: arrows scroll it, but on a plane.
+  // The page is longer than the window: arrow keys scroll it, except on a plane.
   listenToKeys(keys, {help, view, moveCrosshair, digit, enter: () => suggestions.accept(), taking: 'canvas'});
 }

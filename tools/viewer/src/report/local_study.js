@@ -1,10 +1,10 @@
-// Structures and marks of a page without a server: what is done can be undone, and survives a reload.
+// Structures and marks of a page without a server: actions can be undone, and are kept over a reload.
 import {applyAction} from '../changes.js';
 
 const KINDS = ['surface', 'inside', 'outside'];
 
 export class LocalStudy {
-  /** `data` are decoded structures; `store` keeps what was done. */
+  /** `data` are decoded structures; `store` saves the actions. */
   constructor(data, store) {
     let id = 0;
     const marksOf = ({marks}) => Array.from({length: marks.length / 3}, (_, n) => ({id: ++id, kind: 'surface', world: [...marks.subarray(3 * n, 3 * n + 3)]}));
@@ -46,7 +46,7 @@ export class LocalStudy {
       const [again, state] = this.undone.pop();
       this.done.push(again);
       this.states.push(state);
-    } else if (action.do === 'show') {  // how it is looked at, no change of marks
+    } else if (action.do === 'show') {  // changes the display only, not the marks
       this.hidden[action.visible ? 'delete' : 'add'](action.structure);
     } else {
       this.undone = [];

@@ -1,4 +1,4 @@
-// The page of covol report: the image in three planes, surfaces and marks, and the figures of the run. There is no server.
+// The page of covol report: the image in three planes, surfaces and marks, and the figures of the run. It needs no server.
 import {barButton, historyButtons, suggestButtons, toolChoice, windowMenu} from '../bar.js';
 import {colorings} from '../colors.js';
 import {el, unitText} from '../dom.js';
@@ -32,7 +32,7 @@ import {ReportScene} from './scene.js';
 import {saveTable, structureTable} from './table.js';
 import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
-const MOST_MARKS = 10000;  // more hide what they lie on, at first
+const MOST_MARKS = 10000;  // more marks are hidden at first, because they would hide the surface
 const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity', 'oblique'];
 
 const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
@@ -45,18 +45,18 @@ function firstState(image, space, data, kept) {
     keyPanel: 2, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
-/** What is chosen is gone when its mark is. */
+/** Removes the selection when its mark is removed. */
 function follow(state, study) {
   const known = (target) => target && study.structure(target.structure)?.marks.some((m) => m.id === target.mark) ? target : null;
   study.on('change', () => state.set({study: state.get('study') + 1, selected: known(state.get('selected')), hover: known(state.get('hover')), drag: known(state.get('drag'))}));
 }
 
-/** Everything that the parts of the page share. */
+/** Objects that the parts of the page share. */
 function appOf(data, digest) {
   const base = data.origin ?? [0, 0, 0], volume = data.image ? new Volume(data.image, base) : null, space = volume ?? spaceAround(data.structures, base);
   const {black, white} = data.image ?? {black: 0, white: 1}, image = {black, white, low: black, high: white, anatomical: data.anatomical};
   for (const structure of data.structures) Object.assign(structure, {index: indexCoordinates(structure.positions, space), isShown: true});
-  // All frames of a time-lapse are looked at in the same way.
+  // All frames of a time-lapse share their view.
   const view = new Store(`covol-report/${data.frames ? `${location.pathname.replace(/[^/]*$/, '')}${data.frames.pages[0]}` : digest}`, () => sessionStorage), kept = Object.fromEntries(KEPT.map((name) => [name, view.get(name)]));
   const state = firstState(image, space, data, kept), study = new LocalStudy(data.structures, new Store(`covol-report/${digest}`)), toasts = new Toasts();
   const app = {data, image, volume, space, unitText: data.unitText, state, study, toasts, kept: view, panels: [], slices: volume && new VolumeSlices(volume),
@@ -112,7 +112,7 @@ async function start() {
   const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, volume ? hintsOf(MARK_TOOLS) : Object.fromEntries(MARK_TOOLS.map(([tool]) => [tool, 'Shift and a click on the surface: a mark']))), warnings = warningsOf(data), oblique = obliqueButton(state, () => view, 'd'), stage = stageOf(app, () => view, oblique);
   try {
     figures = factsOf(data);
-  } catch (error) {  // a report that another version wrote
+  } catch (error) {  // for example, a report of another version
     figures = el('p', {class: 'notice'}, `The figures of this run cannot be shown: ${error.message}.`);
   }
   document.getElementById('page').replaceChildren(header(app, {theme, help, warnings, frames}), el('main', {}, stage.element, status.element,

@@ -1,4 +1,4 @@
-// The 3D view of the report page: colours by what is known of the surface, and opacity.
+// The 3D view of the report page: colours by properties of the surface, and opacity.
 import {BufferAttribute, Color} from 'three';
 import {rangeOf, vertexColors} from '../colors.js';
 import {ObliqueScene} from '../oblique_scene.js';
@@ -8,8 +8,8 @@ import {codesOf} from './volume_plane.js';
 export class ReportScene extends ObliqueScene {
   constructor(canvas, app) {
     super(canvas, app);
-    this.patience = 0;  // marks make no new surface here
-    if (app.panels.length === 0) this.frame.visible = false;  // there is no image to be framed
+    this.patience = 0;  // on this page marks do not change the surface
+    if (app.panels.length === 0) this.frame.visible = false;  // there is no image whose frame could be drawn
     if (app.volume) this.addOblique(codesOf(app.volume));
     this.look(EYE, true);
   }

@@ -1,10 +1,10 @@
-// The image of a page: slices are decoded into one array of bytes, and cut along any axis.
+// The image of a page: slices are decoded into one array of bytes, which can be sliced along any axis.
 import {ImageSpace} from '../space.js';
 
-const FULL = 257;  // from 8 to 16 bits
+const FULL = 257;  // factor from 8 to 16 bits
 
 export class Volume extends ImageSpace {
-  /** `image` is what the page holds, `base` the place in the world that it counts from. */
+  /** `image` is the page's image, `base` the position in the world that its coordinates are relative to. */
   constructor(image, base) {
     super(image, base);
     Object.assign(this, {first: image.first, step: image.step, ofSize: image.of_size, jpegs: image.slices});
@@ -35,7 +35,7 @@ export class Volume extends ImageSpace {
     this.jpegs[k] = null;
   }
 
-  /** All of them, from what `wanted()` says outwards. `tell` hears of progress. */
+  /** Decodes all slices, beginning at the position that `wanted()` returns. `tell` is called with the progress. */
   async decodeAll(wanted, tell) {
     const left = Array.from({length: this.size[2]}, (_, k) => k).filter((k) => !this.decoded[k]);
     let last = performance.now();
@@ -60,7 +60,7 @@ export class Volume extends ImageSpace {
   }
 }
 
-/** What the planes ask for slices: all that is decoded is here, whole and in full detail, and the rest comes by itself. */
+/** The slices for the planes: decoded ones are complete and in full detail, and the others follow automatically. */
 export class VolumeSlices {
   constructor(volume) { Object.assign(this, {volume, kept: [null, null, null]}); }
 
@@ -78,10 +78,10 @@ export class VolumeSlices {
     return this.kept[axis];
   }
 
-  /** More of the image is there. */
+  /** Called when more of the image has been decoded. */
   forget() { this.kept = [null, null, null]; }
 
-  /** JPEGs of 8 bits tell a value to some parts of a hundred. */
+  /** JPEGs of 8 bits represent a value to within some percent. */
   valueAt([i, j, k], {low, high}) {
     const {volume} = this, [nx, ny] = volume.size;
     return volume.decoded[k] ? {value: low + volume.data[(k * ny + j) * nx + i] / 255 * (high - low), isExact: false} : null;

@@ -1,6 +1,6 @@
-// The image of a page on a plane of any direction.
+// The image of a page on an oblique plane.
 
-/** The volume's value at an index between voxels, 0 to 255; -1 outside. */
+/** The volume's value at a fractional index, 0 to 255; -1 outside. */
 function sample({data, size: [nx, ny, nz]}, i, j, k) {
   if (i < -0.5 || j < -0.5 || k < -0.5 || i > nx - 0.5 || j > ny - 0.5 || k > nz - 0.5) return -1;
   const hold = (x, n) => Math.min(n - 1, Math.max(0, x)), [x, y, z] = [hold(i, nx), hold(j, ny), hold(k, nz)], [a, b, c] = [Math.floor(x), Math.floor(y), Math.floor(z)];

@@ -10,7 +10,7 @@ namespace {
 
 using std::string_view;
 
-/// Words, whatever parts them.
+/// The words of a text, separated by any white space.
 class Words {
 public:
     Words(const std::string& path, const std::string& text) : path_(path), lines_(text) {}
@@ -25,7 +25,7 @@ public:
         return words_[at_++];
     }
     double number(const char* what) { return to_coordinate(path_, lines_.number(), next(what)); }
-    /// A whole number from `least` to `most`.
+    /// An integer from `minimum` to `maximum`.
     std::size_t count(const char* what, std::size_t minimum, std::size_t maximum) {
         return to_count(next(what), what, minimum, maximum);
     }
@@ -52,7 +52,7 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
     PointTable table;
     Words words(path, text);
     if (words.next("CSLC") != "CSLC") fail(path, "expected the header CSLC of sections in planes");
-    // No number of things is larger than the file, which holds each in two bytes at least.
+    // No count exceeds the size of the file, which needs at least two bytes for each item.
     const std::size_t maximum = text.size();
     const std::size_t planes = words.count("the number of planes", 0, maximum);
     const std::size_t labels = words.count("the number of labels", 1, maximum);

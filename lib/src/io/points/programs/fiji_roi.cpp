@@ -10,14 +10,14 @@
 
 // Layout and meaning: ij/io/RoiDecoder.java and ij/gui/PointRoi.java of ImageJ 1.54.
 //
-// Coordinates of outlines of areas refer to the corners of pixels, those of lines and points to their centres
-// (Roi.useLineSubpixelConvention()), so that areas lose half a pixel here. Slices count from 1.
+// Coordinates of area outlines refer to the corners of pixels, those of lines and points to their centres
+// (Roi.useLineSubpixelConvention()), so half a pixel is subtracted from those of areas. Slices count from 1.
 namespace covol::detail {
 namespace {
 
 enum Type { kPolygon, kRectangle, kOval, kLine, kFreeLine, kPolyline, kNothing, kFreehand, kTraced, kAngle, kPoint };
 enum Subtype { kText = 1, kImage = 4 };
-constexpr int kSubPixel = 128;  // of the options
+constexpr int kSubPixel = 128;  // a bit of the options
 constexpr std::uint64_t kHeader = 64;
 
 const char* name_of(int type) {
@@ -44,13 +44,13 @@ public:
 
     [[nodiscard]] const char* kind() const { return is_composite() ? "composite" : name_of(type_); }
 
-    /// The group that it belongs to in the ROI Manager, from 1; 0: none.
+    /// The group of the ROI in the ROI Manager, from 1; 0: none.
     [[nodiscard]] int group() const {
         return version_ >= 228 && second_ != 0 ? bytes_.at<std::uint8_t>(second_ + 30) : 0;
     }
 
-    /// Puts its points into the table; false when it has none to give (a text, a picture).
-    /// @param structures_by  "group", "counter" or empty
+    /// Adds its points to the table; false if it has none (a text, a picture). @param structures_by  "group", "counter"
+    /// or empty
     bool add_to(PointTable& table, const std::string& structures_by) const {
         if (!add_marks(table, structures_by == "counter")) return false;
         if (structures_by == "group") name_structure(table, path_, "group " + std::to_string(group()));
@@ -81,11 +81,11 @@ private:
         if (offset == 0 || length == 0) return;
         const std::string_view text = bytes_.part(offset, 2 * std::uint64_t(length));
         name_.clear();
-        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; what is not ASCII is only shown as such
+        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; characters outside ASCII are only indicated
             name_ += text[n - 1] == 0 && static_cast<unsigned char>(text[n]) < 128 ? text[n] : '?';
     }
 
-    /// ImageJ's getShort: coordinates far below zero are large ones.
+    /// As ImageJ's getShort(): numbers far below zero are large coordinates that overflowed.
     [[nodiscard]] double coordinate(std::uint64_t offset) const {
         const int value = bytes_.at<std::int16_t>(offset);
         return value < -5000 ? value + 65536 : value;
@@ -97,8 +97,8 @@ private:
         return value;
     }
 
-    /// Slice from 0 of the whole ROI, none where it lies on all slices: the z of a hyperstack, the position in a
-    /// stack, or the name that the ROI Manager gave it ("0012-0100-0200": slice, y, x).
+    /// The slice of the whole ROI from 0, none if it is on all slices. It is the z of a hyperstack, the position in a
+    /// stack, or part of the name that the ROI Manager assigned ("0012-0100-0200": slice, y, x).
     [[nodiscard]] std::optional<double> slice() const {
         if (second_ != 0) {
             const int channel = bytes_.at<std::int32_t>(second_ + 4), z = bytes_.at<std::int32_t>(second_ + 8),
@@ -126,7 +126,7 @@ private:
         return count != 0 || type_ != kPoint ? count : bytes_.at<std::uint32_t>(18);
     }
 
-    /// x, y as the file has them.
+    /// x, y as stored in the file.
     [[nodiscard]] std::vector<std::array<double, 2>> vertices() const {
         const std::uint64_t n = vertex_count();
         (void)bytes_.part(kHeader, (sub_pixel_ ? 12 : 4) * n);
@@ -185,7 +185,7 @@ private:
         add_line(table, {{real(18), real(22), z}, {real(26), real(30), z}}, false, name_);
     }
 
-    /// java.awt.geom.PathIterator's segments: the type, then 0 to 3 points. Curves are cut into chords.
+    /// Segments as in java.awt.geom.PathIterator: the type, then 0 to 3 points. Curves are approximated by chords.
     void add_composite(PointTable& table) const {
         const std::uint64_t count = bytes_.at<std::uint32_t>(36);
         (void)bytes_.part(kHeader, 4 * count);
@@ -199,7 +199,7 @@ private:
         };
         for (std::uint64_t n = 0; n < count;) {
             const double segment = real(kHeader + 4 * n++);
-            if (segment == 4) continue;  // close: every outline here is closed
+            if (segment == 4) continue;  // close: every outline is closed anyway
             if (segment != 0 && segment != 1 && segment != 2 && segment != 3)
                 fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " +
                                 std::to_string(segment));
@@ -232,10 +232,10 @@ private:
     std::string name_;
     int version_ = 0, type_ = 0, subtype_ = 0;
     bool sub_pixel_ = false;
-    std::uint64_t second_ = 0;  ///< where the second header begins; 0: there is none
+    std::uint64_t second_ = 0;  ///< position of the second header; 0 if there is none
 };
 
-/// Gathers ROIs, and says of which kinds they were.
+/// Collects ROIs and their kinds.
 class RoiCollector {
 public:
     RoiCollector(const std::string& path, const std::string& structures_by)

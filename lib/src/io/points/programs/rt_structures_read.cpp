@@ -20,12 +20,12 @@ constexpr std::uint32_t kRois = 0x30060020, kRoiNumber = 0x30060022, kRoiName = 
 constexpr std::uint32_t kRoiContours = 0x30060039, kContours = 0x30060040, kContourType = 0x30060042;
 constexpr std::uint32_t kPointCount = 0x30060046, kContourData = 0x30060050, kReferencedRoi = 0x30060084;
 
-/// A curve that touches itself at a vertex, as curves with two loops. A hole that is joined to its outline by a channel
-/// of no width ("keyhole", PS3.3 C.8.8.6.3) parts from it; what encloses nothing is left out.
+/// Splits a curve that touches itself at a vertex into its loops. This separates a hole that is joined to its outline
+/// by a channel of zero width ("keyhole", PS3.3 C.8.8.6.3). Loops that enclose nothing are omitted.
 std::vector<std::vector<Vec3>> loops_of(const std::vector<Vec3>& curve) {
     std::vector<std::vector<Vec3>> loops;
     std::vector<Vec3> walked;
-    std::map<Vec3, std::size_t> place;  // of each point, among `walked`
+    std::map<Vec3, std::size_t> place;  // index of each point in `walked`
     const auto keep = [&](std::vector<Vec3> loop) {
         if (loop.size() > 2) loops.push_back(std::move(loop));
     };

@@ -6,7 +6,7 @@
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
 
-// Marks of programs that work in anatomical space: 3D Slicer, ITK-SNAP, Convert3D.
+// Marks of programs that use anatomical coordinates: 3D Slicer, ITK-SNAP, Convert3D.
 namespace covol::detail {
 namespace {
 
@@ -38,7 +38,7 @@ Vec3 to_point(const std::string& path, const Json& position) {
 
 struct ControlPoints {
     std::vector<Vec3> points;
-    std::vector<std::string> labels;  ///< of each, as people type them
+    std::vector<std::string> labels;  ///< of each point, as typed by the user
 };
 
 ControlPoints control_points(const std::string& path, const Json& markup) {
@@ -63,7 +63,7 @@ PointTable read_markups(const std::string& path, const Json& file, const std::st
         const std::string type = markup.value("type", "Fiducial");
         auto [points, labels] = control_points(path, markup);
         if (points.empty() || type == "ROI" || type == "Plane") continue;
-        // Slicer's own default; files that mix both take the first one's
+        // LPS is Slicer's own default; if a file mixes both, the first one is used
         const PointSpace space = to_space(path, markup.value("coordinateSystem", "LPS"));
         if (table.space == PointSpace::Unstated) table.space = space;
         if (space != table.space) turn(points);
@@ -100,10 +100,10 @@ PointTable parse_markups(const std::string& path, const std::string& text, const
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
-    std::string system = "RAS";  // of files that state none: before Slicer 4.11
+    std::string system = "RAS";  // default of files without a system: before Slicer 4.11
     bool stated = false;
     std::array<std::size_t, 3> at{1, 2, 3};
-    std::size_t label = 11;  // as Slicer has them where a file names no columns
+    std::size_t label = 11;  // Slicer's default for files that do not name columns
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
@@ -161,7 +161,7 @@ PointTable parse_landmarks(const std::string& path, const std::string& text) {
     while (lines.next_words(line, fields)) {
         if (fields.size() < 4)
             fail(path, lines.number(), "expected x y z and a label, or a label and x y z, got " + quote(line));
-        // A number first is x unless the label at the end is none.
+        // If the first field is a number, it is x: the label is then at the end, if there is one.
         const std::size_t first = to_number(fields[0]) ? 0 : 1;
         Vec3 point;
         for (std::size_t a = 0; a < 3; ++a) point[a] = to_coordinate(path, lines.number(), fields[first + a]);

@@ -11,9 +11,9 @@ namespace {
 
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEntrySignature = 0x02014b50, kLocalSignature = 0x04034b50;
 constexpr std::uint64_t kEndSize = 22, kEntrySize = 46, kLocalSize = 30;
-constexpr std::uint64_t kLargestRatio = 1032;  // of deflate
-// Outlines and their names pack to between a half and a tenth.
-constexpr std::uint64_t kLargestArchiveRatio = 16, kAlways = std::uint64_t(16) << 20;
+constexpr std::uint64_t kLargestRatio = 1032;  // for deflate
+// Outlines and their names are compressed to between a half and a tenth of their size.
+constexpr std::uint64_t kLargestArchiveRatio = 16, kAlwaysAllowed = std::uint64_t(16) << 20;
 
 struct Entry {
     std::string name;
@@ -60,7 +60,7 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
     return content;
 }
 
-/// The entry's packed bytes, which may hold what it says that they do.
+/// The compressed bytes of an entry, after checking that they can hold its claimed size.
 std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
         throw Error(Errc::Unsupported, path + ": entry " + quote(entry.name) + " is " + what);
@@ -94,12 +94,12 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
     const std::uint64_t end = find_end(bytes, path);
     const int count = bytes.at<std::uint16_t>(end + 10);
     std::uint64_t at = bytes.at<std::uint32_t>(end + 16);
-    const std::uint64_t maximum = kAlways + kLargestArchiveRatio * bytes.size();
+    const std::uint64_t maximum = kAlwaysAllowed + kLargestArchiveRatio * bytes.size();
     std::uint64_t total = 0, unpacked = 0;
     for (int n = 0; n < count; ++n) {
         const Entry entry = read_entry(bytes, at, path);
         at += kEntrySize + entry.name.size() + bytes.at<std::uint16_t>(at + 30) + bytes.at<std::uint16_t>(at + 32);
-        // Entries that share their bytes are how a small archive becomes a huge one.
+        // In archive bombs, entries overlap so that a small archive expands to a huge one.
         total += entry.packed;
         if (total > bytes.size()) fail(path, "the archive's entries overlap");
         if (!wanted(entry.name)) continue;

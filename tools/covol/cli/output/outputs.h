@@ -1,0 +1,87 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "covol/file_set.h"
+
+namespace covol::tool {
+
+enum class OutputKind {
+    Vdb,
+    NanoVdb,
+    Image,
+    Mesh,
+    Points,
+    Picture,
+    Page,
+    Scene,
+    Table,
+    Text,
+    ProgramMarks,
+    StructureSet
+};
+
+/// The files of one run: checked before the computation, written at its end, and moved into place together when all are
+/// complete. If one fails, the previous files stay unchanged.
+class Outputs {
+public:
+    /// Waiting for another program is reported through `run`, and can be cancelled. @param run  must outlive this
+    /// object
+    explicit Outputs(const RunContext& run) : run_(run) {}
+
+    /// Adds files and folders that this run reads: no output may replace one of them, or a file that it refers to.
+    void protect(const std::vector<std::string>& inputs);
+
+    /// Checks the ending, that the folder exists, is writable and is not locked, and that the output is not a file that
+    /// this run reads, another output, or anything but a regular file (a device; texts may go to one) or, for .zarr, a
+    /// Zarr store. An empty path is an output that was not requested. @throws Error InvalidOptions, Io, Cancelled.
+    void check(const std::string& flag, const std::string& path, OutputKind kind);
+
+    /// Queues a file that write_queued() writes; does nothing for an empty path.
+    void add(const std::string& path, std::function<void(const std::string& path)> write);
+
+    /// Writes a file at once; it stays even if the run fails later. @returns false for an empty path.
+    bool write(const std::string& path, const std::function<void(const std::string& path)>& write);
+    [[nodiscard]] const std::vector<std::string>& kept() const noexcept { return kept_; }
+
+    /// Writes the queued files, under temporary names. @throws what a writer throws.
+    void write_queued();
+    /// A writer's message about its file, with the final path instead of the temporary one.
+    [[nodiscard]] std::string shown(const std::string& line) const { return files_.shown(line); }
+    /// Moves the files of write_queued() into place. @throws Error Io.
+    void publish();
+    [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
+
+private:
+    /// An existing folder is replaced if it is a Zarr store that contains no input.
+    void check_store(const std::string& flag, const std::string& path, const std::filesystem::path& target);
+    void check_inputs(const std::string& flag, const std::string& path, const std::filesystem::path& target);
+    /// The files that an image's file refers to, if one of them may be in `folder`.
+    const std::vector<std::string>& files_of(const std::string& input, const std::filesystem::path& folder);
+
+    struct Pending {
+        std::string path;
+        std::function<void(const std::string&)> write;
+    };
+    const RunContext& run_;
+    std::vector<std::string> inputs_;
+    std::map<std::string, std::vector<std::string>> files_of_;  ///< by input
+    std::vector<std::string> checked_;
+    std::vector<Pending> pending_;
+    std::vector<Pending> devices_;  ///< written last, because this cannot be undone
+    FileSet files_;
+    std::vector<std::string> written_;
+    std::vector<std::string> kept_;
+};
+
+/// Writes the whole file or nothing; writes directly to anything that is not a regular file, such as /dev/stdout or a
+/// pipe, and waits for its reader. @throws Error Io, Cancelled.
+void write_text(const std::string& path, const std::string& text, const RunContext& run);
+
+/// To an open stream. @param name  for messages @throws Error Io, Cancelled.
+void write_stream(int stream, const std::string& text, const std::string& name, const RunContext& run);
+
+}  // namespace covol::tool

@@ -1,0 +1,50 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/output/json.h"
+#include "covol/fwd.h"
+#include "covol/image.h"
+
+namespace covol::tool {
+
+/// What output files state about the run that wrote them.
+class RunProvenance {
+public:
+    /// @param report  of the run, for as long as this object is used
+    RunProvenance(const CLI::App& command, std::vector<std::string> inputs, const Json& report)
+        : command_(command), inputs_(std::move(inputs)), report_(report) {}
+
+    /// The input files of the command line.
+    [[nodiscard]] const std::vector<std::string>& inputs() const noexcept { return inputs_; }
+    /// Sets the meaning of lengths and positions in outputs: the image's unit and LPS; for points without an image,
+    /// their own.
+    void set_world(const ImageGeometry& geometry);
+    void set_world_of_points();
+    /// The same from a grid that was read.
+    void set_world(const FloatGrid& grid);
+    /// Provenance for the metadata of .vdb files: version, options with file names but without folders, digests of the
+    /// inputs, the resolved options once they are known, the unit of length and the space.
+    [[nodiscard]] std::map<std::string, std::string> metadata() const;
+    /// The same as comment lines for meshes and points.
+    [[nodiscard]] std::vector<std::string> comments() const;
+    [[nodiscard]] std::string comment() const;
+    /// Identifies this run: version, command, options that change results, digests of the inputs.
+    [[nodiscard]] std::string job_text() const;
+
+private:
+    [[nodiscard]] const Json& described_inputs() const;
+    /// Command and options as stored in provenance.
+    [[nodiscard]] Json options_of_result() const;
+
+    const CLI::App& command_;
+    const std::vector<std::string> inputs_;
+    const Json& report_;
+    mutable Json inputs_described_;  ///< null: not computed yet
+    std::string unit_, space_;       ///< empty: unknown
+};
+
+}  // namespace covol::tool

@@ -1,0 +1,49 @@
+#include "cli/system/cancel_signals.h"
+
+#include <unistd.h>
+
+#include <csignal>
+
+#include "cli/exit_codes.h"
+#include "cli/system/process.h"
+
+namespace covol::tool {
+namespace {
+
+// The only state that a signal handler may touch.
+std::atomic<bool> cancel_requested = false;
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void on_signal(int signal) {
+    interrupted = true;
+    cancel_requested = true;
+    std::signal(signal, SIG_DFL);  // a second one ends the program at once
+}
+
+/// A page of a mapped file does not exist any more because another program truncated the file. Finished outputs stay;
+/// the next run removes the temporary files of this one.
+extern "C" void on_bus_error(int) {
+    constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
+    static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
+    ::_exit(kIo);
+}
+
+}  // namespace
+
+std::atomic<bool>& cancel_flag() { return cancel_requested; }
+
+bool is_interrupted() { return interrupted; }
+
+void accept_interrupt() {
+    if (interrupted) cancel_requested = false;
+}
+
+void catch_cancel_signals() { catch_signals(on_signal); }
+
+void catch_file_signals() {
+    std::signal(SIGBUS, on_bus_error);
+    std::signal(SIGXFSZ, SIG_IGN);  // exceeding the limit of file sizes is an error of the write
+}
+
+}  // namespace covol::tool

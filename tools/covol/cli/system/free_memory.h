@@ -1,0 +1,22 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace covol::tool {
+
+/// The memory that this process can allocate in addition to what it has, and what limits it.
+struct FreeMemory {
+    std::uint64_t bytes = 0;
+    std::string where;  ///< "this machine", "the control group /slurm/job_7", "the limit of address space (ulimit -v)"
+};
+
+/// The minimum of the machine's available memory, of what each control group above this process leaves (v1 and v2, hard
+/// and throttling limits, minus the group's use without file caches, which are reclaimed on demand), and of what the
+/// limits of address space and data leave. Nullopt if none of these is known.
+/// @param root  folder that replaces "/": its proc/meminfo, proc/self/cgroup, proc/self/mountinfo, proc/self/statm
+///              and the mounts that mountinfo names are read
+/// @pre limits of address space and data are always this process's own
+[[nodiscard]] std::optional<FreeMemory> find_free_memory(const std::string& root = "");
+
+}  // namespace covol::tool

@@ -1,0 +1,51 @@
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace covol::tool {
+
+/// Resident memory of this process, bytes.
+[[nodiscard]] std::uint64_t held_memory();  ///< without mapped files
+[[nodiscard]] std::uint64_t peak_rss();
+
+/// The maximum memory of a run.
+struct MemoryBound {
+    std::uint64_t bytes = 0;  ///< 0: not known
+    std::string name;         ///< for messages: "--memory-limit 8G", or the free memory and what limits it
+};
+
+/// From the text of --memory-limit; if it is empty, four fifths of the memory that is free now, plus what this process
+/// has. The remaining fifth is for other processes and for the page cache.
+/// @throws Error InvalidOptions
+[[nodiscard]] MemoryBound choose_memory_bound(const std::string& given);
+
+/// Monitors the memory of this process (without mapped files, which the system can reclaim) and sets `cancel` when it
+/// exceeds the limit. If the memory keeps growing, in a library that does not support cancellation, the process is
+/// ended.
+class MemoryGuard {
+public:
+    /// No guard if limit = 0 or if the system cannot create a thread. @param give_up  ends the process; called by the
+    /// guard's thread
+    MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up);
+    ~MemoryGuard();
+    MemoryGuard(const MemoryGuard&) = delete;
+    MemoryGuard& operator=(const MemoryGuard&) = delete;
+    /// False if the system could not create a thread for it.
+    [[nodiscard]] bool watches() const noexcept { return watches_; }
+    /// The limit was exceeded: the cancellation is due to this guard.
+    [[nodiscard]] bool tripped() const noexcept { return tripped_; }
+
+private:
+    std::atomic<bool> tripped_ = false;
+    bool done_ = false, watches_ = true;
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    std::thread watcher_;
+};
+
+}  // namespace covol::tool

@@ -1,0 +1,28 @@
+#pragma once
+#include <exception>
+
+namespace covol::tool {
+
+/// Threads that work at once, including the calling one.
+struct ThreadCount {
+    int wanted = 1, possible = 1;
+};
+
+/// Determines how many threads the system can create (ulimit -u, pids.max of a control group), and limits TBB to that
+/// number from here on: TBB creates threads in places where an exception may end the process.
+/// @param threads  the maximum requested; 0: one for each core
+[[nodiscard]] ThreadCount limit_threads(int threads);
+
+/// Messages for a lack of memory, or of threads.
+constexpr const char* kOutOfMemory = "out of memory; use a larger --voxel-size or a --roi";
+constexpr const char* kNoThread =
+    "the system makes no more threads or processes; see ulimit -u, and pids.max of the control group, or use fewer "
+    "(--threads 1)";
+
+/// Whether this was thrown because a thread cannot be created: by the standard library, or by TBB.
+[[nodiscard]] bool is_missing_thread(const std::exception& error);
+
+/// From here on there may be temporary files, which are removed if the process ends for lack of threads.
+void expect_temporary_files();
+
+}  // namespace covol::tool
