@@ -17,7 +17,7 @@ ALONE = re.compile('"' + NAME + r': "\s*(?:\+|<<)\s*')  # and if another operand
 OPTION = re.compile(r'(?:Option\{|require(?:_valid)?\(|\.require\(|field\()\s*"([a-z_]+)"')
 CODE = re.compile(r"^\s*(?://|\*)")
 # The server's own settings, which are not options.
-SETTINGS = ("frame_origins", "page_policy", "live_path", "most_message_bytes", "most_connections", "messages_per_second",
+SETTINGS = ("frame_origins", "page_policy", "live_path", "max_message_bytes", "max_connections", "messages_per_second",
             "message_burst", "live_idle", "get_threads")
 
 

@@ -1,4 +1,4 @@
-"""Seeded faults in kernels and readers: which of them do the unit tests find?
+"""Seeded faults in all modules: which of them do the unit tests find?
 
     /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1] [--only N ...] [--preset ci]
 
@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# Files, and the programs of their tests. Half of the faults are made in kernels, half in readers.
+# Files, and the programs of their tests. A third of the faults each are made in kernels, in readers, and in other modules.
 KERNELS = {
     "scheme/scheme_kernels.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
     "scheme/scheme.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
@@ -57,6 +57,23 @@ READERS = {
     "io/mesh/obj.cpp": ["mesh_io_test"],
     "io/mesh/glb.cpp": ["mesh_io_test"],
 }
+
+
+@functools.cache
+def others(source):
+    """The sources of all other modules, with the test programs in the folder of tests/unit that has the module's name."""
+    found = {}
+    for path in sorted((source / "lib/src").rglob("*.cpp")):
+        name = path.relative_to(source / "lib/src").as_posix()
+        folder = source / "tests/unit" / pathlib.PurePath(name).parent
+        if not any(folder.glob("*_test.cpp")):
+            folder = folder.parent
+        tests = sorted(test.stem for test in folder.glob("*_test.cpp"))
+        if tests and folder != source / "tests/unit" and name not in {**KERNELS, **READERS}:
+            found[name] = tests
+    return found
+
+
 FAULTS = [
     (r" < ", " <= "), (r" <= ", " < "), (r" > ", " >= "), (r" >= ", " > "), (r" == ", " != "), (r" != ", " == "),
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " + "), (r" && ", " || "), (r" \|\| ", " && "),
@@ -93,9 +110,10 @@ class Build:
         subprocess.run(["cmake", "--preset", self.preset], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
         # Removes the fault of a run that was interrupted.
         subprocess.run(["git", "-C", self.source, "checkout", "-q", "--", "lib"], check=True)
-        for name in (*KERNELS, *READERS):
+        names = (*KERNELS, *READERS, *others(self.source))
+        for name in names:
             (self.source / "lib/src" / name).touch()
-        tests = sorted({test for name in (*KERNELS, *READERS) for test in self.tests_of(name)})
+        tests = sorted({test for name in names for test in self.tests_of(name)})
         if not self.compile(tests):
             sys.exit("the tests do not build")
         for test in tests:
@@ -103,7 +121,7 @@ class Build:
                 sys.exit(f"{test} fails without a fault")
 
     def tests_of(self, name):
-        return [test for test in {**KERNELS, **READERS}[name] if self.preset != "asan" or not test.startswith("cli/")]
+        return [test for test in {**others(self.source), **KERNELS, **READERS}[name] if self.preset != "asan" or not test.startswith("cli/")]
 
     def compile(self, tests):
         targets = sorted({"covol_tool" if test.startswith("cli/") else test for test in tests})
@@ -141,8 +159,8 @@ class Build:
 
 
 def draws(sources, seed, n):
-    """One (file, fault) after another for fault number n."""
-    chance, modules = random.Random(f"{seed}:{n}"), READERS if n % 2 == 0 else KERNELS
+    """One (file, fault) after another for fault number n; kernels, readers and other modules take turns."""
+    chance, modules = random.Random(f"{seed}:{n}"), (KERNELS, READERS, others(sources.parents[1]))[n % 3]
     while True:
         name = chance.choice(sorted(modules))
         if places := faults_in(sources / name):

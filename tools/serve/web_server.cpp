@@ -81,8 +81,8 @@ std::string Options::why_invalid() const {
     }
     if (page_policy.empty() || !is_header_value(page_policy)) return "page_policy: expected one line";
     if (live_path.size() < 2 || live_path[0] != '/') return "live_path: expected /name, got \"" + live_path + "\"";
-    if (max_message_bytes < 1) return "most_message_bytes: expected >= 1, got 0";
-    if (max_connections < 1) return "most_connections: expected >= 1, got 0";
+    if (max_message_bytes < 1) return "max_message_bytes: expected >= 1, got 0";
+    if (max_connections < 1) return "max_connections: expected >= 1, got 0";
     if (!(messages_per_second > 0)) {
         return "messages_per_second: expected > 0, got " + std::to_string(messages_per_second);
     }
