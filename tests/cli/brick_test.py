@@ -142,7 +142,7 @@ class Bricks(Case):
         self.assertIn("expected plan, run or join", self.run_covol("brick", "split", "x", code=2).stderr)
         self.assertIn("cannot read", self.run_covol("brick", "run", "nowhere", code=4).stderr)
         guess = self.run_covol("brick", "plan", "segment", self.image, "--points", self.few(), "-o", "plan", code=3).stderr
-        self.assertIn("marks are a guess", guess)
+        self.assertIn("marks for a guess", guess)
         self.plan("plan")
         self.assertIn("already", self.run_covol("brick", "plan", *self.job, "-o", "plan", code=3).stderr)
         path = self.out / "plan/plan.json"

@@ -76,7 +76,7 @@ class Bundle(unittest.TestCase):
         done = subprocess.run([root / "bin/covol", "doctor", "--strict"], capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 5, done.stdout + done.stderr)
         self.assertIn("gdcm.so", done.stderr)
-        self.assertIn("reader itk: there", done.stdout)
+        self.assertIn("reader itk: found", done.stdout)
         (root / "share/covol/demo/celegans_embryo.tif").unlink()
         done = subprocess.run([root / "bin/covol", "demo", "--no-browser"], capture_output=True, text=True, env=environment, cwd=self.work)
         self.assertEqual(done.returncode, 4, done.stdout + done.stderr)

@@ -184,7 +184,7 @@ class Frames(Case):
 
     def test_times_of_one_plane_are_no_volume(self):
         self.enhanced([], [frame(0, TemporalPositionIndex=k + 1) for k in range(10)], self.data)
-        self.assertIn("times of one plane", self.refused("info", "frames.dcm"))
+        self.assertIn("time points of one plane", self.refused("info", "frames.dcm"))
 
     def test_volumes_of_ultrasound_and_dose(self):
         frames = [item(PlanePositionVolumeSequence=Sequence([item(ImagePositionVolume=[3.0, -4.0, 5 + 0.5 * k])]))
@@ -247,7 +247,7 @@ class Slices(Case):
         folder.mkdir()
         (folder / "notes").write_text("\x08 is no group\n" * 40)
         (folder / "zeros").write_bytes(bytes(4000))
-        self.assertIn("no DICOM image", self.refused("info", "series"))
+        self.assertIn("neither a DICOM image", self.refused("info", "series"))
 
     def test_a_tilted_gantry(self):
         self.series(ImagePositionPatient=lambda k: [3, -4 + 0.25 * k, 5 + k])

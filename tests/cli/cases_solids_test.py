@@ -201,7 +201,7 @@ class Grids(Case):
                 grid.name = "density"
                 pyopenvdb.write(str(self.folder / "a.vdb"), grids=[grid])
                 done = self.run_covol("mesh", "a.vdb", "-o", "m.ply")
-                self.assertIn(f"its border is taken at {high / 2:g}", done.stderr)
+                self.assertIn(f"its boundary is placed at {high / 2:g}", done.stderr)
                 volume = self.report("info", "m.ply")["mesh"]["volume"]
                 self.assertAlmostEqual(volume / (inside.sum() if not smooth else 4 / 3 * np.pi * 6 ** 3), 1, delta=0.03)
 

@@ -112,7 +112,7 @@ class Programs(Folder):
         self.write_off("open.off", vertices, faces[:-5])
         self.expect_finding("open.off", "print", "problem", "open", "--repair")
         self.write_off("crossing.off", np.r_[vertices, vertices + (5, 0, 0)], np.r_[faces, faces + len(vertices)])
-        self.expect_finding("crossing.off", "print", "problem", "cut each other", "--repair")
+        self.expect_finding("crossing.off", "print", "problem", "intersect each other", "--repair")
         # A shell 0.2 mm thick: the inner sphere's triangles are reversed.
         shell = np.r_[vertices, 0.98 * vertices], np.r_[faces, faces[:, ::-1] + len(vertices)]
         self.write_off("shell.off", *shell)

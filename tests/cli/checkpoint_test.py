@@ -115,7 +115,7 @@ class Checkpoints(Case):
         words = ["segment", "ball.nrrd", "--points", "marks.xyz", "-o", "s.vdb"]
         self.assertIn("one folder", self.run_covol(*words, "--checkpoint", "a", "--resume", "b", code=2).stderr)
         self.assertIn("--checkpoint-every", self.run_covol(*words, "--checkpoint", "a", "--checkpoint-every", "-1", code=3).stderr)
-        self.assertIn("no folder", self.run_covol(*words, "--checkpoint", "ball.nrrd", code=4).stderr)
+        self.assertIn("not a folder", self.run_covol(*words, "--checkpoint", "ball.nrrd", code=4).stderr)
         self.assertIn("time-lapse", self.run_covol("segment", "ball.nrrd", "ball.nrrd", *words[2:-1], "s_{frame}.vdb", "--checkpoint", "a",
                                                    code=2).stderr)
         self.assertEqual(self.files(), ["ball.nrrd", "marks.xyz"])

@@ -326,7 +326,7 @@ class Formats(ContoursCase):
     def test_hostile_files(self):
         bad = self.inputs / "bad.csv"
         for text, expected_text in [("slice,contour,x_px,y_px\n", "bad.csv"), ("slice,contour,x_px,y_px\n3,0,5\n", "bad.csv"),
-                           ("slice,contour,x_px,y_px\n3,0,nan,5\n", "bad.csv"), ("x,y,z\n20,40,220\n21,41,221\n", "loose points"),
+                           ("slice,contour,x_px,y_px\n3,0,nan,5\n", "bad.csv"), ("x,y,z\n20,40,220\n21,41,221\n", "separate points"),
                            ("slice,contour,x_px,y_px\n3,0,10,10\n3,0,900,10\n3,0,10,20\n", "outside"),
                            ("contour,x,y,z\n0,20,40,210\n0,30,41,222\n0,25,50,230\n", "one slice")]:
             bad.write_text(text)
@@ -395,7 +395,7 @@ class Several(ContoursCase):
             with self.subTest(command[0]):
                 done = self.run_covol(*[str(a).format("s.vdb") for a in command])
                 if command[0] != "render":  # which draws all of them
-                    self.assertIn("'layer' is taken of the level sets layer, core", done.stderr)
+                    self.assertIn("'layer' is used, one of the level sets layer, core", done.stderr)
                 done = self.run_covol(*[str(a).format("s.vdb:core") for a in command])
                 self.assertNotIn("warning", done.stderr)
                 self.assertIn("nobody", self.run_covol(*[str(a).format("s.vdb:nobody") for a in command], code=3).stderr)

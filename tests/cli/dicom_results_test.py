@@ -254,7 +254,7 @@ class Segmentations(DicomCase):
         self.assertEqual((contours.FrameOfReferenceUID, contours.StudyInstanceUID), (ds.FrameOfReferenceUID, ds.StudyInstanceUID))
         (self.out / "u.nrrd").write_bytes(header.encode() + b"\n" + data.tobytes())
         output = self.run_covol("mask", "s.vdb", "--like", "u.nrrd", "-o", "u.dcm").stderr
-        self.assertIn("taken as mm", output)
+        self.assertIn("interpreted as mm", output)
 
     def test_what_lies_beside_a_series_is_no_slice_of_it(self):
         series(self.out / "scan", self.affine)
@@ -265,7 +265,7 @@ class Segmentations(DicomCase):
         self.assertEqual(self.info("scan")["size"], list(SIZE))
 
     def test_what_is_no_segmentation_is_refused(self):
-        self.assertIn("label images alone", self.refused("convert", self.scan, "grey.dcm"))
+        self.assertIn("only label images", self.refused("convert", self.scan, "grey.dcm"))
         self.run_covol(*self.two("--mask", "m.dcm"))
         self.assertIn("a segmentation (SEG)", self.refused("info", "m.dcm"))
         leaning = ("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 4 4 4\nspace directions: (1,0,0) "
@@ -435,7 +435,7 @@ class StructureSets(DicomCase):
             self.assertIn("foreign.dcm", self.refused("segment", self.scan, "--contours", "foreign.dcm", "-o", "s.vdb"))
         deep = whole[:at] + b"\x06\x30\x39\x00SQ\0\0\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff" * 5000
         path.write_bytes(deep)
-        self.assertIn("sequences in each other", self.refused("segment", self.scan, "--contours", "foreign.dcm", "-o", "s.vdb"))
+        self.assertIn("sequences are nested", self.refused("segment", self.scan, "--contours", "foreign.dcm", "-o", "s.vdb"))
 
     def test_wrong_contents(self):
         one = lambda **more: Sequence([item(ReferencedROINumber=4, ContourSequence=Sequence([item(**more)]))])  # noqa: E731

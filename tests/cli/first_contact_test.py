@@ -88,7 +88,7 @@ class Demo(PageCase):
             self.assertEqual((folder / name).read_bytes(), (SAMPLES / name).read_bytes())
         self.assertTrue((folder / "README.md").exists() and (folder / "celegans_embryo.tif.covol").is_dir())
         # The command that the message names gives the same result without a page.
-        command = output.split("without a page: covol ")[1].splitlines()[0].split()
+        command = output.split("from the command line: covol ")[1].splitlines()[0].split()
         self.assertEqual(self.run_covol("plan", *command, "--quiet").returncode, 0)
         program, page = self.start()  # again: the study is continued, and marks are not added twice
         again = Live(page)
@@ -103,7 +103,7 @@ class Demo(PageCase):
         self.assertEqual([p.name for p in (self.out / "covol_demo").iterdir()], ["celegans_marks.csv"])
         self.assertEqual((self.out / "covol_demo/celegans_marks.csv").read_text(), "mine")
         (self.out / "file").write_text("")
-        self.assertIn("a folder cannot be made", self.run_covol("demo", "file", "--no-browser", code=4).stderr)
+        self.assertIn("the folder cannot be created", self.run_covol("demo", "file", "--no-browser", code=4).stderr)
 
 
 class Doctor(Case):
@@ -120,7 +120,7 @@ class Doctor(Case):
         self.assertEqual(sum(counts.values()), len(found["libraries"]))
         for folder in counts:  # each library is counted once
             self.assertEqual([other for other in counts if other != folder and other.startswith(folder + "/")], [])
-        for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: there"):
+        for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: found"):
             self.assertIn(word, output)
 
     def test_a_browser(self):

@@ -195,7 +195,7 @@ class Plain(Case):
         self.check("a.h5:/ones", data[0, ..., 0])
         self.check("a.h5:/labels", data[1, ..., 0], "--frame", 1)
         self.assertIn("got a dataset of 3 x 13 x 21 x 34 x 2 without it", self.error("a.h5:/unknown"))
-        self.assertIn("it is no JSON", self.error("a.h5:/bad"))
+        self.assertIn("it is not valid JSON", self.error("a.h5:/bad"))
         self.assertIn("expected axes z, y and x", self.error("a.h5:/twice"))
         self.assertIn("expected axistags for each of its 3", self.error("a.h5:/few"))
 
@@ -370,7 +370,7 @@ class Imaris(Case):
         def group(f):
             del f[channel + "/Data"]
             f.create_group(channel + "/Data")
-        for edit, word in ((larger, "as its attributes say"), (flat, "expected a 3D image"), (missing, "no such dataset"),
+        for edit, word in ((larger, "as its attributes state"), (flat, "expected a 3D image"), (missing, "no such dataset"),
                            (group, "expected 3 dimensions")):
             change(edit)
             self.assertIn(word, self.error("a.ims"))

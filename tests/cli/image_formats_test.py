@@ -463,12 +463,12 @@ class Options(Case):
                     self.assertRegex(done.stderr, message.format(module=module, formats=formats))
                     self.assertIn("install covol again", done.stderr)
 
-        expect("alone/covol-[0-9.]+/covol-reader: expected to start covol's program that reads files ")
+        expect("alone/covol-[0-9.]+/covol-reader: covol's reader, the process that decodes files, could not be started")
         # the program that reads files, and no module
         (folder,) = pathlib.Path(library.group(2)).resolve().parent.glob("covol-*")
         (alone / folder.name).mkdir()
         shutil.copy(folder / "covol-reader", alone / folder.name)
-        expect("alone/covol-[0-9.]+/{module}: expected covol's module for {formats} ")
+        expect("alone/covol-[0-9.]+/{module}: covol's module for {formats} could not be loaded")
 
     def test_a_huge_image_takes_little_memory(self):
         """A sparse file of 2048^3 bytes with a small ball in it; read as a whole and with --roi."""

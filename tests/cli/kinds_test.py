@@ -69,7 +69,7 @@ class Painted(KindsCase):
         self.assertEqual(reported["label"], 4)
         self.assertEqual(reported["slices"], [{"axis": "z", "slices": [10, 14, 18, 22, 26, 30, 34], "outlines": 7}])
         self.assertEqual(reported["scribbled"], 0)
-        self.assertIn("7 slices across z (10, 14, 18, 22, 26, 30, 34) taken as painted as a whole", reported["understood"])
+        self.assertIn("7 slices across z (10, 14, 18, 22, 26, 30, 34) taken as completely painted", reported["understood"])
         mask = read_labels(self.out / "m.nrrd")
         self.assertEqual(sorted(np.unique(mask)), [0, 4])
         self.assertGreater(dice(mask > 0, ball()), 0.96)
@@ -91,7 +91,7 @@ class Painted(KindsCase):
         paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
         result = self.run_covol("segment", self.image, "--painted", paint, "-o", "s.vdb")
         self.assertIn("label 1: ", result.stderr)
-        self.assertIn("taken as painted as a whole", result.stderr)
+        self.assertIn("taken as completely painted", result.stderr)
 
     def test_several_labels_keep_values_and_names(self):
         x, _, _ = lattice()
@@ -231,9 +231,9 @@ class Starts(KindsCase):
 
     def test_flags_that_did_nothing_are_named(self):
         done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--tau", "1vx", "-o", "s.vdb")
-        self.assertIn("--delta, --tau did nothing", done.stderr)
+        self.assertIn("--delta, --tau had no effect", done.stderr)
         done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--model", "paper", "-o", "s.vdb")
-        self.assertNotIn("did nothing", done.stderr)
+        self.assertNotIn("had no effect", done.stderr)
 
     def test_an_outline_on_the_first_slice_is_the_outline_of_the_cut(self):
         # A ball that the first slice cuts below its middle; three outlines, the first of them on that slice.
@@ -256,7 +256,7 @@ class Starts(KindsCase):
         path = self.inputs / "two.csv"
         write_points(path, [(x + 3 * p[0], 3 * p[1], 3 * p[2]) for x in (-4, 4) for p in fibonacci(60)])
         done = self.run_covol("segment", self.image, "--points", path, "--rho", 0, "-o", "two.vdb")
-        self.assertIn("falls into 2 pieces", done.stderr)
+        self.assertIn("through the marks has 2 pieces", done.stderr)
         done = self.run_covol("segment", self.image, "--points", self.marks(60), "--rho", 0, "-o", "two.vdb")
         self.assertNotIn("pieces", done.stderr)
 

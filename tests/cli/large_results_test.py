@@ -188,7 +188,7 @@ class Masks(unittest.TestCase):
             (self.folder / name).mkdir()
             (self.folder / name / "notes.txt").write_text("mine")
             done = run("mask", self.vdb, "--like", self.like, "-o", self.folder / name, code=4)
-            self.assertIn("no Zarr store", done.stderr)
+            self.assertIn("is not a Zarr store", done.stderr)
             self.assertEqual((self.folder / name / "notes.txt").read_text(), "mine")
         for like in path, path / "0":
             done = run("mask", self.vdb, "--like", like, "-o", path, code=3)

@@ -34,7 +34,7 @@ class Streams(Case):
         self.segment("--mesh", "m.ply", "--quiet")
         for words, expected_text in ((("info", "s.vdb"), "surface: Tree_float"), (("info", self.image), "spacing 0.5 x 0.5 x 0.5"),
                             (("compare", "s.vdb", "m.ply"), "Dice"), (("compare", "s.vdb", self.points), "points to surface"),
-                            (("check", "m.ply"), "no problem"), (("check", self.image), "the file names no unit"),
+                            (("check", "m.ply"), "no problem"), (("check", self.image), "the file states no unit"),
                             (("plan", "segment", self.image, "--points", self.points, "-o", "x.vdb"), "memory: about")):
             with self.subTest(words=words):
                 done = self.run_covol(*words)
@@ -177,8 +177,8 @@ class Outputs(Case):
 
     def test_what_cannot_be(self):
         job = ("segment", self.image, "--points", self.points)
-        self.refuse(*job, "-o", "a.ply", "--mesh", "b.stl", code=2, expected_text="expected one of them")
-        self.refuse(*job, "-o", "a.nrrd", "--mask", "b.nrrd", code=2, expected_text="expected one of them")
+        self.refuse(*job, "-o", "a.ply", "--mesh", "b.stl", code=2, expected_text="expected only one of them")
+        self.refuse(*job, "-o", "a.nrrd", "--mask", "b.nrrd", code=2, expected_text="expected only one of them")
         self.refuse(*job, "-o", "a.doc", code=3, expected_text=".vdb")
         self.refuse("reconstruct", self.points, "-o", "a.nrrd", code=3, expected_text=".vdb")
 
@@ -207,15 +207,15 @@ class Outputs(Case):
 
 class Words(Case):
     def test_nearest_command_and_option(self):
-        self.refuse("segmnt", self.image, code=2, expected_text="'segmnt' is no command of covol; did you mean segment?")
+        self.refuse("segmnt", self.image, code=2, expected_text="'segmnt' is not a command of covol; did you mean segment?")
         self.refuse("reconstuct", "x", code=2, expected_text="did you mean reconstruct?")
-        line = self.refuse("melt", code=2, expected_text="'melt' is no command")
+        line = self.refuse("melt", code=2, expected_text="'melt' is not a command")
         self.assertNotIn("did you mean", line)
         job = ("segment", self.image, "-o", "s.vdb")
-        self.refuse(*job, "--point", self.points, code=2, expected_text="--point is no option of covol segment; did you mean --points?")
+        self.refuse(*job, "--point", self.points, code=2, expected_text="--point is not an option of covol segment; did you mean --points?")
         self.refuse(*job, "--voxelsize=2", code=2, expected_text="did you mean --voxel-size?")
         self.refuse(*job, "--thread", "2", code=2, expected_text="did you mean --threads?")
-        self.refuse("mesh", "s.vdb", "--tetra", "1", code=2, expected_text="--tetra is no option of covol mesh. See covol mesh")
+        self.refuse("mesh", "s.vdb", "--tetra", "1", code=2, expected_text="--tetra is not an option of covol mesh. See covol mesh")
         self.assertIn("--points", self.run_covol("segment", "--help").stdout)
 
     def test_a_blank_before_the_unit(self):
@@ -236,7 +236,7 @@ class Marks(Case):
         done = self.run_covol("segment", self.image, "--points", "c.csv", "-o", "s.vdb")
         self.assertIn("warning: c.csv: its marks form 10 lines", done.stderr)
         self.assertIn("--contours", done.stderr)
-        self.assertNotIn("lines, and are taken", self.run_covol("segment", self.image, "--contours", "c.csv", "-o",
+        self.assertNotIn("lines, but are used", self.run_covol("segment", self.image, "--contours", "c.csv", "-o",
                                                                  "s.vdb").stderr)
         self.assertNotIn("marks form", self.segment().stderr)
 

@@ -266,7 +266,7 @@ class Files(ContentCase):
                 ("x.nrrd", b"nonsense", {}, "x"), ("x.csv", b"no,marks\n", {"as": "points"}, ""),
                 ("x.csv", b"x,y,z\n1e9,0,0\n", {"as": "points"}, "outside"),
                 ("x.csv", b"x,y,z\n" * 800_000, {"as": "points"}, "at most 4 MiB"),
-                ("x.nrrd", head + b"\ndata file: " + str(secret).encode() + b"\n\n", {}, "names others"),
+                ("x.nrrd", head + b"\ndata file: " + str(secret).encode() + b"\n\n", {}, "refers to others"),
                 ("x.nrrd", self.small.read_bytes(), {"as": "secret"}, "expected points, guess or labels"),
                 ("x.nrrd", self.small.read_bytes(), {"structure": 99}, "no structure 99")):
             status, text = self.send(page, name, body, **({"structure": structure} | query))
@@ -280,7 +280,7 @@ class Files(ContentCase):
         for action in ({"do": "set_guess", "structure": structure, "path": "/etc/passwd", "digest": "xxh128:0", "label": 0},
                        {"do": "add_labels", "path": "/etc/passwd", "digest": "xxh128:0", "labels": [{"label": 1, "name": "a"}]}):
             _, answer = live.act(**action)
-            self.assertIn("names no files", answer["why"])
+            self.assertIn("cannot name files", answer["why"])
         self.assertEqual(len(self.journal()), 2)
         for key in ("k" * 101, "a%0Ab", "%C3%A4"):
             status, text = page.post(f"/import?key={key}&as=points&name=a.csv&structure={structure}", self.marks.read_bytes())

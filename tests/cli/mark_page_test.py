@@ -51,7 +51,7 @@ class Marks(PageCase):
         self.assertEqual(self.structures(), [])
         self.mark_ball(3)
         self.assertEqual([s["name"] for s in self.structures()], ["structure 1"])
-        self.assertIn("1 mark more", self.driver.find_element(By.CSS_SELECTOR, ".structure .message").text)
+        self.assertIn("1 more mark is needed", self.driver.find_element(By.CSS_SELECTOR, ".structure .message").text)
         self.mark_ball(14)
         self.surface()
         self.slices(*BALL)

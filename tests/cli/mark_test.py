@@ -137,7 +137,7 @@ class Study(MarkCase):
         for bad, why in (({"do": "add_mark", "structure": structure, "kind": "surface", "world": [1e9, 0, 0]}, "outside of the image"),
                          ({"do": "add_mark", "structure": 77, "kind": "surface", "world": list(CENTER)}, "no structure 77"),
                          ({"do": "rename", "structure": structure, "name": ""}, "needs a name"),
-                         ({"do": "sing"}, "no action is called 'sing'")):
+                         ({"do": "sing"}, "expected the name of an action, got 'sing'")):
             patches, answer = live.act(**bad)
             self.assertEqual(patches, [])
             self.assertIn(why, answer["why"])
@@ -156,7 +156,7 @@ class Study(MarkCase):
         _, page = self.start()
         live = self.open(page)
         structure = self.marked(live, marks=MARKS[:3])
-        self.assertEqual(live.wait_for(structure, "empty", 4)["message"], "1 mark more and there is a surface")
+        self.assertEqual(live.wait_for(structure, "empty", 4)["message"], "1 more mark is needed for a surface")
         for mark in MARKS[3:]:
             live.add_mark(structure, mark)
         live.wait_for(structure, "refined", len(MARKS) + 1)

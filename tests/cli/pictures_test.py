@@ -125,8 +125,8 @@ class Pictures(Case):
 
     def test_mistakes(self):
         for arguments, code, message in (
-                (("--figure", "slices"), 3, "slices are of an image"),
-                (("--volume",), 3, "volume view is of an image"),
+                (("--figure", "slices"), 3, "slices: expected an image, got none"),
+                (("--volume",), 3, "volume: expected an image, got none"),
                 (("--view", "aside"), 3, "expected front, back"),
                 (("--view", "10,100"), 3, "elevation"),
                 (("--opacity", "2"), 2, "0 to 1"),

@@ -22,7 +22,7 @@ class Rerun(Case):
         self.make("--delta", "0.7vx", "--max-steps", "20", "--density", "s.vdb")
         before = self.files()
         done = self.run_covol("rerun", "s.vdb", "--threads", "2", "--quiet", "-o", "again.vdb", "--json", "r.json")
-        self.assertIn("the same bits", done.stdout)
+        self.assertIn("bit-identical", done.stdout)
         report = json.loads((self.out / "r.json").read_text())["rerun"]
         self.assertTrue(report["same"])
         self.assertEqual([grid["name"] for grid in report["grids"]], ["density", "surface"])
@@ -45,7 +45,7 @@ class Rerun(Case):
         for name in ("ball.nrrd", "marks with space.xyz"):
             (self.out / name).rename(elsewhere / name)
         self.assertIn("ball.nrrd: an input of that run is not in", self.run_covol("rerun", "away/renamed.vdb", code=4).stderr)
-        self.assertIn("the same bits", self.run_covol("rerun", "away/renamed.vdb", "--inputs", elsewhere).stdout)
+        self.assertIn("bit-identical", self.run_covol("rerun", "away/renamed.vdb", "--inputs", elsewhere).stdout)
 
     def test_inputs_that_changed_and_results_that_did(self):
         self.make()
@@ -64,10 +64,10 @@ class Rerun(Case):
     def test_points_alone_and_a_label_image(self):
         write_xyz(self.out / "p.xyz", sphere_points(6000))
         self.run_covol("reconstruct", "p.xyz", "-o", "r.vdb")
-        self.assertIn("the same bits", self.run_covol("rerun", "r.vdb").stdout)
+        self.assertIn("bit-identical", self.run_covol("rerun", "r.vdb").stdout)
         self.run_covol("phantom", "torus", "--size", "40", "-o", "t.nrrd", "--points", "t.xyz")
         self.run_covol("segment", "t.nrrd", "--points", "a=t.xyz", "--init", "sphere:0,0,0,1", "-o", "t.vdb", "--max-steps", "4")
-        self.assertIn("the same bits", self.run_covol("rerun", "t.vdb").stdout)
+        self.assertIn("bit-identical", self.run_covol("rerun", "t.vdb").stdout)
 
     def write_with(self, name, changed):
         """Writes s.vdb with other metadata."""
@@ -87,7 +87,7 @@ class Rerun(Case):
                                   ("covol_inputs", '[{"name": "../ball.nrrd", "digest": "xxh128:"}]', "expected a file's name"),
                                   ("covol_options", "[]", "damaged"), ("covol_options", json.dumps(options | {"output": []}), "damaged"),
                                   ("covol_options", json.dumps(options | {"output": {"a": 1}}), "damaged"),
-                                  ("covol_options", json.dumps(options | {"command": "rerun"}), "repeat the run that it repeated"),
+                                  ("covol_options", json.dumps(options | {"command": "rerun"}), "rerun the original result"),
                                   ("covol_options", json.dumps(options | {"command": "fly"}), "no command 'fly'")):
             with self.subTest(name=name, value=value[:40]):
                 self.write_with("t.vdb", {name: value})
@@ -95,7 +95,7 @@ class Rerun(Case):
         # Outputs are written only to where they belong.
         self.write_with("t.vdb", {"covol_options": json.dumps(options | {"output": "../../away.vdb"})})
         before = self.files()
-        self.assertIn("the same bits", self.run_covol("rerun", "t.vdb", "-o", "again.vdb").stdout)
+        self.assertIn("bit-identical", self.run_covol("rerun", "t.vdb", "-o", "again.vdb").stdout)
         self.assertEqual(self.files(), sorted(before + ["again.vdb"]))
 
     def test_a_signal_ends_the_run_within(self):

@@ -93,7 +93,7 @@ class Provenance(Stranger):
                 self.make(image=f"./{name}")
                 before = self.state()
                 done = self.run_covol("rerun", "s.vdb")
-                self.assertIn("the same bits", done.stdout)
+                self.assertIn("bit-identical", done.stdout)
                 self.assertEqual(self.state(), before)
                 self.assertIsNone(STEERS.search(done.stderr))
                 # The command is shown in the form in which a shell accepts it.
@@ -114,7 +114,7 @@ class Provenance(Stranger):
         self.write(inputs=[*facts["inputs"], {"name": "..", "digest": "xxh128:0"}])
         self.untouched("rerun", "t.vdb", expected_text="expected a file's name")
         self.write(inputs=[])
-        self.untouched("rerun", "t.vdb", expected_text="none of the inputs that it lists")
+        self.untouched("rerun", "t.vdb", expected_text="not among the inputs that the file lists")
         os.mkfifo(self.out / "pipe")  # a pipe without a writer
         self.write(options=facts["options"] | {"image": "pipe"}, inputs=[*facts["inputs"], {"name": "pipe", "digest": "xxh128:0"}])
         done = subprocess.run([COVOL, "rerun", "t.vdb"], cwd=self.out, capture_output=True, timeout=60)
@@ -155,7 +155,7 @@ class Provenance(Stranger):
         away = self.out / "away"
         away.mkdir()
         (self.out / "f1.vdb").rename(away / "f1.vdb")
-        self.assertIn("the same bits", self.run_covol("rerun", "away/f1.vdb", "--inputs", ".").stdout)
+        self.assertIn("bit-identical", self.run_covol("rerun", "away/f1.vdb", "--inputs", ".").stdout)
 
     def test_names_in_metadata_do_not_reach_the_terminal(self):
         facts = self.make()

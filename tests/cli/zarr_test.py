@@ -337,8 +337,8 @@ class Pyramids(Case):
         path = self.write2()
         errors = self.run_covol("info", path / "1", "--quiet").stderr
         self.assertIn("states no translation", errors)
-        self.assertIn("--correct-level-shift moves it", errors)
-        self.assertEqual(errors.count("where its voxels are means"), 1)
+        self.assertIn("--correct-level-shift corrects this", errors)
+        self.assertEqual(errors.count("if its voxels are means"), 1)
         self.assertNotIn("warning", self.run_covol("info", path, "--quiet").stderr)
         done = self.run_covol("info", path / "1", "--correct-level-shift", "--quiet", "--json", "r.json")
         self.assertNotIn("warning", done.stderr)

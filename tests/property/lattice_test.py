@@ -84,7 +84,7 @@ def refusal(lattice):
     if abs(np.linalg.det(lattice.steps / lattice.spacing)) < MIN_VOLUME:
         return "nearly parallel"
     if np.abs(lattice.origin).max() > MAX_VOXELS * lattice.spacing.min():
-        return "farther away voxels cannot be told apart"
+        return "farther away, neighbouring voxels cannot be distinguished"
     return None
 
 

@@ -195,7 +195,7 @@ def test_paint_on_the_outside_and_in_places(sphere):
 
 def test_a_tag_distance_that_nothing_encloses(sphere):
     image, points, _ = sphere
-    with pytest.raises(covol.Error, match="is more than the points' whole box measures") as error:
+    with pytest.raises(covol.Error, match="expected at most the diagonal of the points' bounding box") as error:
         covol.segment(image, points, init="tag", tag_distance=3.0)
     assert (error.value.code, error.value.field) == ("invalid_options", "tag_distance")
 

@@ -53,7 +53,7 @@ std::string why_unsendable(const Response& response) {
     }
     if (response.type.empty() || !is_header_value(response.type)) return "type: expected one line";
     for (const auto& [name, value] : response.headers) {
-        if (!is_header_name(name)) return "a header's name holds what cannot be sent";
+        if (!is_header_name(name)) return "a header's name contains characters that are not allowed";
         if (!is_header_value(value)) return name + ": expected one line without control characters";
         if (is_server_header(name)) return name + ": is set by the server alone";
     }

@@ -54,12 +54,12 @@ void HttpConnection::on_read(beast::error_code status) {
     waits_since_.reset();
     if (!stream_.socket().is_open() || hub_.is_stopping) return finish();
     if (status == http::error::header_limit || status == http::error::buffer_overflow) {
-        return refuse(431, "The head of a request has at most " + std::to_string(kMaxHeaderBytes) + " bytes.");
+        return refuse(431, "The header of a request may have at most " + std::to_string(kMaxHeaderBytes) + " bytes.");
     }
-    if (status == http::error::body_limit) return refuse(413, "Requests have no body here.");
+    if (status == http::error::body_limit) return refuse(413, "Requests must not have a body here.");
     const bool is_malformed = status.category() == make_error_code(http::error::bad_method).category() &&
                               status != http::error::end_of_stream && status != http::error::partial_message;
-    if (status && is_malformed) return refuse(400, "This is no request that is understood.");
+    if (status && is_malformed) return refuse(400, "This request is malformed.");
     if (status) return finish();  // the connection was closed, or timed out
 
     Decision judgement = judge(head_of(parser_->get()), hub_.rules);
@@ -83,11 +83,11 @@ void HttpConnection::answer_with(const std::string& path, std::function<Response
             if (!hub.is_stopping) response = handler();
             if (const std::string why = why_unsendable(response); !why.empty()) {
                 hub.report(path + ": " + why);
-                response = refusal(500, "This could not be answered.");
+                response = refusal(500, "The request failed because of an internal error.");
             }
         } catch (...) {
             hub.report(path + ": " + what_was_thrown());
-            response = refusal(500, "This could not be answered.");
+            response = refusal(500, "The request failed because of an internal error.");
         }
         handler = nullptr;  // releases the body that it may hold
         // Moved, because the socket must be destroyed on its own thread.
@@ -124,7 +124,7 @@ void HttpConnection::call_handler(Request request) {
 }
 
 void HttpConnection::take_body(Request request) {
-    if (hub_.is_posting) return refuse(503, "Another file is being sent: try again when it is there.");
+    if (hub_.is_posting) return refuse(503, "Another file is being sent: try again when it has arrived.");
     hub_.is_posting = is_posting_ = true;
     wants_to_stay_ = parser_->get().version() == 11 && parser_->get().keep_alive();
     auto parser = std::make_shared<BodyParser>(std::move(*parser_));
@@ -159,7 +159,7 @@ bool HttpConnection::wants_to_stay() const {
 }
 
 void HttpConnection::open_live() {
-    if (buffer_.size() != 0) return refuse(400, "A WebSocket begins with the answer to its request.");
+    if (buffer_.size() != 0) return refuse(400, "Data arrived before the WebSocket was opened.");
     if (!hub_.has_room_for_client()) return refuse(503, "Too many windows are open.");
     const auto live = std::make_shared<LiveConnection>(hub_, std::move(stream_), hub_.next_client());
     hub_.leave(shared_from_this(), false);

@@ -90,7 +90,7 @@ std::string what_was_thrown() {
     } catch (const std::exception& error) {
         return error.what();
     } catch (...) {
-        return "something that is no exception";
+        return "an unknown exception";
     }
 }
 

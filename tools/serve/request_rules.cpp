@@ -76,7 +76,7 @@ Decision judge_body(const std::vector<std::string_view>& lengths, const Rules& r
     if (last != end || lengths[0].empty() || status == std::errc::invalid_argument)
         return refuse(400, "Content-Length: expected one number.");
     if (status != std::errc() || bytes > rules.max_body_bytes)
-        return refuse(413, "A file has at most " + std::to_string(rules.max_body_bytes) + " bytes here.");
+        return refuse(413, "A file may have at most " + std::to_string(rules.max_body_bytes) + " bytes here.");
     if (bytes == 0) return refuse(400, "Content-Length: expected a file that is not empty.");
     Decision good;
     good.kind = Decision::Kind::Post;
@@ -88,18 +88,18 @@ Decision judge_body(const std::vector<std::string_view>& lengths, const Rules& r
 Decision judge_form(const RequestHead& head, const Rules& rules) {
     const bool is_post = head.method == "POST" && rules.max_body_bytes > 0;
     if (head.method != "GET" && head.method != "HEAD" && !is_post)
-        return refuse(405, "Only GET and HEAD are answered here.");
+        return refuse(405, "Only GET and HEAD are allowed here.");
     if (head.target.size() > rules.max_target_bytes) {
-        return refuse(414, "An address has at most " + std::to_string(rules.max_target_bytes) + " bytes.");
+        return refuse(414, "An address may have at most " + std::to_string(rules.max_target_bytes) + " bytes.");
     }
-    if (!values_of(head, "Transfer-Encoding").empty()) return refuse(400, "Requests have no body here.");
+    if (!values_of(head, "Transfer-Encoding").empty()) return refuse(400, "Requests must not have a body here.");
     if (is_post) return judge_body(values_of(head, "Content-Length"), rules);
     if (const auto lengths = values_of(head, "Content-Length"); !lengths.empty()) {
         const bool is_number =
             lengths.size() == 1 && !lengths[0].empty() && std::all_of(lengths[0].begin(), lengths[0].end(), is_digit);
         if (!is_number) return refuse(400, "Content-Length: expected one number.");
         if (lengths[0].find_first_not_of('0') != std::string_view::npos) {
-            return refuse(413, "Requests have no body here.");
+            return refuse(413, "Requests must not have a body here.");
         }
     }
     Decision good;
@@ -128,18 +128,18 @@ Decision judge_source(const RequestHead& head, const Rules& rules, bool may_be_l
     const auto hosts = values_of(head, "Host");
     if (hosts.size() != 1) return refuse(400, "Host: expected it once.");
     if (std::find(rules.authorities.begin(), rules.authorities.end(), hosts[0]) == rules.authorities.end()) {
-        return refuse(403, "This server is not reached by that name.");
+        return refuse(403, "This server does not answer under that name.");
     }
     const auto origins = values_of(head, "Origin");
     // Browsers send Origin with each WebSocket and each POST, and for the page itself it matches Host.
     const bool is_own = origins.size() == 1 && origins[0] == "http://" + std::string(hosts[0]);
     if (!is_own && (head.is_upgrade || is_post || !origins.empty())) {
-        return refuse(403, "Pages of other servers are not answered here.");
+        return refuse(403, "Requests from pages of other servers are refused.");
     }
     const auto sites = values_of(head, "Sec-Fetch-Site");
     const bool is_own_site = sites.size() == 1 && (sites[0] == "same-origin" || sites[0] == "none");
     if (!sites.empty() && !is_own_site && !may_be_link) {
-        return refuse(403, "Other pages do not lead here: open the link that was printed at the start.");
+        return refuse(403, "Links from other pages are refused: open the link that was printed at the start.");
     }
     Decision good;
     good.kind = Decision::Kind::Get;
@@ -166,9 +166,9 @@ Decision judge(const RequestHead& head, const Rules& rules) {
         return source;
     if (has_token) {
         if (!is_same_secret(rules.token, request->query["token"])) {
-            return refuse(403, "This link is of another run. Open the one that was printed last.");
+            return refuse(403, "This link belongs to another run. Open the one that was printed last.");
         }
-        if (request->query.size() != 1) return refuse(400, "Beside the token nothing is expected in this address.");
+        if (request->query.size() != 1) return refuse(400, "Nothing except the token is expected in this address.");
         Decision first;
         first.kind = Decision::Kind::SetCookie;
         first.is_head = head.method == "HEAD";
@@ -176,11 +176,12 @@ Decision judge(const RequestHead& head, const Rules& rules) {
         return first;
     }
     if (!is_known(head, rules)) {
-        return refuse(403, "This browser is not known here. Open the link that was printed at the start.");
+        return refuse(403, "This browser has not been admitted. Open the link that was printed at the start.");
     }
-    if (!request) return refuse(400, "This address is not understood.");
+    if (!request) return refuse(400, "This address is malformed.");
     const bool is_live = request->path == rules.live_path;
-    if (head.is_upgrade && (!is_live || head.method != "GET")) return refuse(404, "No WebSocket is opened here.");
+    if (head.is_upgrade && (!is_live || head.method != "GET"))
+        return refuse(404, "There is no WebSocket at this address.");
     if (!head.is_upgrade && is_live) return refuse(426, "This address is for WebSockets.");
     Decision good;
     good.kind = is_live ? Decision::Kind::Live : form.kind;

@@ -58,7 +58,7 @@ inline constexpr auto kOptions<EdgeOptions> = std::tuple{
     Option{"intensities", &EdgeOptions::intensities},
     Rule<EdgeOptions>{"intensities", "the darker one first",
                       [](const EdgeOptions& o) { return !o.intensities || (*o.intensities)[0] < (*o.intensities)[1]; }},
-    Rule<EdgeOptions>{"edge_contrast", "no `edge_k` beside it",
+    Rule<EdgeOptions>{"edge_contrast", "no `edge_k` at the same time",
                       [](const EdgeOptions& o) { return !o.edge_k || !o.edge_contrast; }}};
 
 struct EdgeReport {

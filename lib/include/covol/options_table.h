@@ -167,7 +167,7 @@ void complain(std::string& lines, const OptionInfo& option, const Value& value) 
         if (value) complain(lines, option, *value);
     } else if constexpr (HasWords<Value>) {
         if (std::size_t(value) >= kWords<Value>.size())
-            add_complaint(lines, option.name, "expected one of the values that the type has");
+            add_complaint(lines, option.name, "expected one of the values of its type");
     } else if constexpr (kIsNumber<Value>) {
         covol::complain(lines, option, double(value));
     } else if constexpr (requires { value[0] < value[0], value.size(); } && !std::is_same_v<Value, std::string>) {

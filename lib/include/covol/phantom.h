@@ -31,7 +31,7 @@ inline constexpr auto kOptions<PhantomOptions> = std::tuple{
     Option{"count", &PhantomOptions::point_count, kNotNegative, Group::Input, "number of points"},
     Option{"noise", &PhantomOptions::noise, kNotNegative, Group::Input, "standard deviation, in units of the contrast"},
     Option{"seed", &PhantomOptions::seed, Range{}, Group::Input, "seed of the random numbers"},
-    Rule<PhantomOptions>{"kind", "one that list_phantom_kinds() has",
+    Rule<PhantomOptions>{"kind", "one of list_phantom_kinds()",
                          [](const PhantomOptions& o) { return std::ranges::count(list_phantom_kinds(), o.kind) > 0; }}};
 
 }  // namespace covol

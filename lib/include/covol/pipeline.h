@@ -163,7 +163,7 @@ inline constexpr auto kOptions<SegmentOptions> = std::tuple{
                                  if (o.roi && o.roi->min[n] == o.roi->max[n]) return false;
                              return true;
                          }},
-    Rule<SegmentOptions>{"without_mesh", "false where holes are treated, pieces dropped or another level is wanted",
+    Rule<SegmentOptions>{"without_mesh", "false if holes are treated, pieces are dropped or another level is extracted",
                          [](const SegmentOptions& o) {
                              return !o.without_mesh || (!needs_mesh(o.holes.policy) &&
                                                         o.extract.min_component_volume == 0 && o.extract.isovalue == 0);

@@ -105,7 +105,7 @@ private:
                         throw Error(Errc::InvalidInput, quoted(structures_[a].name) + " and " +
                                                             quoted(structures_[b].name) +
                                                             " are the same solid: " + percent(fraction) +
-                                                            " of their voxels are common; mark each by its own points");
+                                                            " of their voxels coincide; mark each with its own points");
                     overlap.inner = in_a < in_b ? a : b;
                 }
                 report_.overlaps.push_back(overlap);
@@ -118,7 +118,7 @@ private:
             if (!overlap.inner) continue;
             const std::size_t outer = *overlap.inner == overlap.a ? overlap.b : overlap.a;
             run_.info(quoted(structures_[*overlap.inner].name) + " lies inside " + quoted(structures_[outer].name) +
-                      " and is carved out of it");
+                      " and is subtracted from it");
             const FloatGridPtr inner = phi_[*overlap.inner]->deepCopy();
             carved[outer] = carved[outer]->deepCopy();
             openvdb::tools::csgDifference(*carved[outer], *inner);
@@ -210,7 +210,7 @@ private:
         } catch (const Error& error) {
             if (error.code() != Errc::InvalidInput) throw;
             throw Error(Errc::InvalidInput, "nothing is left of " + quoted(structures_[i].name) +
-                                                ": the other structures cover it; mark each by its own points");
+                                                ": the other structures cover it; mark each with its own points");
         }
     }
 

@@ -39,7 +39,7 @@ void require_voxel_size(const char* where, double voxel_size) {
     std::ostringstream text;
     text << where << ": `voxel_size`: expected >= " << kMin << ", got " << voxel_size;
     if (voxel_size > 0 && voxel_size < kMin)
-        text << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `points_scale` of "
+        text << ", less than OpenVDB supports; use a smaller unit of length (`spacing` of the image, `points_scale` of "
                 "points)";
     throw Error(Errc::InvalidOptions, text.str(), "voxel_size");
 }

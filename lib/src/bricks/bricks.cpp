@@ -35,16 +35,16 @@ constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is
 void require_supported(const Problem& problem, const Resolved& resolved) {
     const auto reject = [](const std::string& what) {
         throw Error(Errc::Unsupported,
-                    "bricks: " + what +
-                        ": such a surface rests on all of them at once; solve it in one piece, "
-                        "with a larger `voxel_size` where memory does not do",
+                    "bricks: expected marks for a flow, got " + what +
+                        ", whose surface depends on all of them at once; solve it in one piece, "
+                        "with a larger `voxel_size` if the memory does not suffice",
                     "voxel_size");
     };
-    if (problem.options.contours) reject("contours, got some");
-    if (problem.options.guess) reject("expected no guess to correct, got one");
+    if (problem.options.contours) reject("contours");
+    if (problem.options.guess) reject("marks that correct a guess");
     if (resolved.choices.start == StartMethod::Guess)
         reject(std::to_string(resolved.marks.attracting.size()) +
-               " marks are a guess; `model = paper`, or more marks, flow");
+               " marks for a guess (with `model = paper`, or with more marks, there is a flow)");
 }
 
 /// The voxels of the fine lattice that the domain of a coarse solve covers.
@@ -189,9 +189,9 @@ struct BrickJob::Parts {
     /// A plan may come from elsewhere. @throws Error InvalidInput
     void require_plan_of_this_job(const BrickPlan& plan) const {
         if (plan.domain.voxel_size != h())
-            throw Error(Errc::InvalidInput, "bricks: the plan's voxels have an edge of " +
-                                                number(plan.domain.voxel_size) + ", those of its job " + number(h()) +
-                                                ": plan again, with `voxel_size`");
+            throw Error(Errc::InvalidInput, "bricks: expected a plan with the voxel size of its job, " + number(h()) +
+                                                ", got " + number(plan.domain.voxel_size) +
+                                                "; make the plan again with this `voxel_size`");
     }
 
     /// The joined field on the whole lattice.
@@ -365,10 +365,11 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
         if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);
         if (solution.solve.leaf_count == 0)
             throw Error(Errc::InvalidInput,
-                        "bricks: the surface vanished in all of them; lower `delta`, or start closer to the edges "
+                        "bricks: the surface vanished in all bricks; lower `delta`, or start closer to the edges "
                         "(`init`)",
                         "delta");
-        solution.report.remarks.choose("bricks", std::to_string(plan.bricks.size()), "solved apart and joined", run);
+        solution.report.remarks.choose("bricks", std::to_string(plan.bricks.size()), "solved separately and joined",
+                                       run);
         Surface made = make_surface(problem, choices, solution, surface);
         result.report = measure(problem, choices, before, solution, made);
         result.u = std::move(made.u);

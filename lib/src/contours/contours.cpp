@@ -58,7 +58,7 @@ public:
             throw Error(Errc::InvalidInput,
                         (clouds.empty() ? std::string("no file") : clouds.front().source) +
                             ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
-                            "give those as points");
+                            "give them as points instead of contours");
         choose_plane();
         if (lies_in_slices() || choose_tilted_plane()) {
             join_lines();
@@ -160,8 +160,8 @@ void Densifier::find_planes(Line& line) const {
     const double off = detail::thickness_along(line.world, detail::plane_through(line.world).normal);
     if (off > tolerance * geometry_.smallest_spacing()) {
         std::ostringstream text;
-        text << line.name << ": expected marks in one plane, of any direction; they reach " << off
-             << " across the plane that they lie closest to";
+        text << line.name << ": expected marks in one plane of any orientation, got marks that span " << off
+             << " across their best-fitting plane";
         throw Error(Errc::InvalidInput, text.str());
     }
 }
@@ -312,7 +312,7 @@ void Densifier::drop_repeated_loops() {
     loops_.erase(last, loops_.end());
     if (repeated > 0)
         run_.warn("contours: " + std::to_string(repeated) +
-                  " contours are there twice, with the same marks; they count once");
+                  " contours are repeated with the same marks; each is used once");
 }
 
 void Densifier::make_solid() {
@@ -359,8 +359,8 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
         (high[0] - low[0]) * (high[1] - low[1]) / (options_.step * options_.step) * double(polygons.size());
     const double cell = options_.step * std::max(1.0, std::sqrt(nodes / double(kMaxNodes)));
     if (cell > options_.step)
-        run_.info("contours: slices are filled on a grid of " + detail::number(cell) +
-                  ", coarser than the voxels, to bound memory");
+        run_.info("contours: slices are filled on a grid with cells of " + detail::number(cell) +
+                  ", coarser than the voxels, to limit memory");
     data.grid.cell = cell;
     data.grid.origin = {low[0] - kContours.margin_cells * cell, low[1] - kContours.margin_cells * cell};
     data.grid.nx = int((high[0] - low[0]) / cell + 2 * kContours.margin_cells) + 2;
@@ -458,11 +458,11 @@ void Densifier::summarise() {
          << " open contours";
     if (result_.solid)
         text << ", " << result_.slices << " slices across "
-             << (along_image_ || !has_image_ ? kAxisNames[frame_.axis()] : "an axis of their own") << ", "
+             << (along_image_ || !has_image_ ? kAxisNames[frame_.axis()] : "an axis fitted to them") << ", "
              << result_.slice_distance << " apart";
     if (result_.is_network)
-        text << " in " << result_.slices << " planes of several directions, which tell the side of "
-             << result_.inside.size() << " places inside and " << result_.outside.size() << " outside";
+        text << " in " << result_.slices << " planes of several orientations, which determine " << result_.inside.size()
+             << " positions inside and " << result_.outside.size() << " outside";
     text << ": " << result_.along.size() << " points along them, " << result_.between.size() << " between";
     result_.summary = text.str();
 }

@@ -51,7 +51,7 @@ std::string SeedCheck::warning() const {
     std::ostringstream text;
     text << wrong() << " of " << inside + outside << " " << all << " lie on the wrong side of the surface ("
          << wrong_inside << " inside " << ones << " outside, " << wrong_outside << " outside " << ones
-         << " inside), the first at " << to_text(first) << "; marks on the border beside them would move it";
+         << " inside), the first at " << to_text(first) << "; add marks on the border near them to move it";
     return text.str();
 }
 
@@ -82,8 +82,8 @@ void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outsi
     for (const Vec3& seed : outside)
         if (tree.nearest(seed) <= same * same)
             throw Error(Errc::InvalidInput,
-                        "expected each position on one side, got " + to_text(seed) +
-                            " inside and outside; take it out of one of `inside` and `outside`",
+                        "expected each position on one side only, got " + to_text(seed) +
+                            " inside and outside; remove it from `inside` or `outside`",
                         "outside");
 }
 

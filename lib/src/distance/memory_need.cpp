@@ -77,8 +77,8 @@ void require(const BytesAt& bytes_at, double voxel_size, const char* where, cons
     for (int n = 0; n < kMaxGrowths && bytes_at(fits) > kBudgetFraction * budget; ++n) fits *= kGrowth;
     std::ostringstream text;
     text.precision(2);
-    text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "
-         << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits
+    text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed)
+         << " GiB of memory, but only " << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits
          << " (`voxel_size`), or a smaller domain (`roi`)";
     throw Error(Errc::InvalidOptions, text.str(), "voxel_size");
 }

@@ -259,7 +259,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         if (!(report.low < report.high))
             throw Error(Errc::InvalidInput,
                         image.path() + ": every voxel near the band has the value " + std::to_string(report.low) +
-                            ", there is no edge to find; check that the points lie on the image's "
+                            ", so there is no edge; check that the points lie on the image's "
                             "structure, or segment with the points alone (`rho = 0`)",
                         "rho");
         normalise(window, report);
@@ -295,7 +295,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
             report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput, image.path() +
-                                                ": constant wherever the band lies, there is no edge to find; check "
+                                                ": constant throughout the band, so there is no edge; check "
                                                 "that the points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
         const auto k = static_cast<float>(report.edge_k);

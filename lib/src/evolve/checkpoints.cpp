@@ -62,7 +62,7 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     std::error_code status;
     fs::create_directories(folder, status);
     if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io, "`checkpoint`: " + folder + ": cannot be made, or is no folder", "checkpoint");
+        throw Error(Errc::Io, "`checkpoint`: " + folder + ": cannot be created, or is not a folder", "checkpoint");
     { const ScratchFolder finishes_what_was_begun(folder); }
     const fs::path job_file = fs::path(folder) / kJobFile;
     state_->had_states = fs::exists(job_file, status);
@@ -78,14 +78,16 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
         return;
     }
     if (!resume)
-        throw Error(Errc::InvalidInput,
-                    "`checkpoint`: " + folder + ": it holds states of a run; `resume` goes on with it, or remove it",
-                    "checkpoint");
+        throw Error(
+            Errc::InvalidInput,
+            "`checkpoint`: " + folder +
+                ": it contains states of an earlier run; use `resume` to continue that run, or remove the folder",
+            "checkpoint");
     if (!holds(job_file, job))
         throw Error(Errc::InvalidInput, "`resume`: " + folder +
-                                            ": its states are of a run with other options, inputs, version or "
-                                            "instruction set, which " +
-                                            job_file.string() + " tells");
+                                            ": expected states of this run, got those of a run with other options, "
+                                            "inputs, version or instruction set; see " +
+                                            job_file.string());
 }
 
 Checkpoints::~Checkpoints() = default;

@@ -85,9 +85,10 @@ public:
             if (!motion.finite) {
                 solver_->restore_previous();
                 solver_->store(u_);
-                throw Error(Errc::Numerical,
-                            "evolve: step " + std::to_string(report_.steps + 1) +
-                                ": a value that is not finite appeared; u is as after the step before");
+                throw Error(
+                    Errc::Numerical,
+                    "evolve: step " + std::to_string(report_.steps + 1) +
+                        ": a value became infinite or NaN; u was restored to its state after the previous step");
             }
             ++report_.steps;
             report_.last_change = motion.mean;
@@ -148,7 +149,8 @@ private:
                     std::string("evolve: ") + (options_.tau ? "`tau`" : "`delta`") +
                         ": expected a step (tau in voxels, times the largest of theta, rho, and delta in voxels) of " +
                         detail::number(kSmallestStep) + " to " + detail::number(kLargestStep) + ", got " +
-                        detail::number(step) + ": beyond it the coefficients of the scheme, of 16 bits, do not hold",
+                        detail::number(step) +
+                        ": outside of this range, 16 bits cannot represent the coefficients of the scheme",
                     options_.tau ? "tau" : "delta");
     }
 
@@ -182,7 +184,7 @@ private:
         u_.setTree(grids.u->treePtr());
         if (grids.edge && fields_.take_edge) fields_.take_edge(grids.edge, fields_);
         states_.read([&](detail::StateFile& file) { exchange(file); });
-        run_.info("evolve: " + std::string(is_finished_ ? "done before, " : "goes on after ") +
+        run_.info("evolve: " + std::string(is_finished_ ? "already finished after " : "continues after ") +
                   std::to_string(report_.steps) + " steps");
     }
 

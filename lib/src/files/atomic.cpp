@@ -46,7 +46,7 @@ void write_folder_atomically(const std::string& path, bool may_replace,
     const fs::path target = path_of_output(path);
     const bool exists = fs::exists(fs::symlink_status(target, status));
     if (exists && (!fs::is_directory(target, status) || !may_replace))
-        throw Error(Errc::Io, path + ": cannot write: something else is there, and not replaced; choose another name");
+        throw Error(Errc::Io, path + ": cannot write: it exists and must not be replaced; choose another name");
     const ScratchFolder scratch(target.parent_path());
     const std::string temporary = (scratch.path() / target.filename()).string();
     if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());

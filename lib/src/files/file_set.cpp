@@ -97,7 +97,7 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     fs::path target = detail::path_of_output(path);
     if (!detail::is_output_name(target.filename().string()))
         throw Error(Errc::Io, path + ": cannot write: names that begin with " + detail::kHiddenPrefix +
-                                  " are covol's own; choose another name");
+                                  " are reserved for covol; choose another name");
     const fs::path folder = target.parent_path();
     ScratchFolder& scratch = state_->folders.try_emplace(detail::id_of(folder), folder, run).first->second.scratch;
     const fs::path temporary = scratch.path() / target.filename();
@@ -111,7 +111,8 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     }
     std::error_code status;
     if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
-        throw Error(Errc::Io, path + ": cannot write: something of another kind is there");
+        throw Error(Errc::Io,
+                    path + ": cannot write: expected a file in place of a file and a folder in place of a folder");
     state_->files.push_back({path, std::move(target), temporary});
 }
 

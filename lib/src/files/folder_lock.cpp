@@ -54,12 +54,12 @@ FolderLock::FolderLock(const fs::path& folder, const RunContext& run, std::chron
         const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - begin);
         if (waited >= patience)
             throw Error(Errc::Io, folder.string() + ": cannot write: " + holder_of(id()) +
-                                      " has had a lock (flock) on this folder for " +
+                                      " has held a lock (flock) on this folder for " +
                                       std::to_string((waited.count() + 500) / 1000) +
                                       " s; expected it to be free; end that program, or choose another folder");
         if (waited >= kUntilReported && !reported) {
             run.info(folder.string() + ": waiting for " + holder_of(id()) +
-                     ", which has a lock (flock) on this folder");
+                     ", which holds a lock (flock) on this folder");
             reported = true;
         }
         std::this_thread::sleep_for(std::min(kPause, patience));

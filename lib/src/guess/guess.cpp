@@ -214,11 +214,12 @@ Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks
             },
             run);
     });
-    report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";
+    report.summary = std::to_string(report.marks) + " marks, the surface of minimum bending energy through them";
     if (report.patches > 0) report.summary += ", in " + std::to_string(report.patches) + " overlapping parts";
-    if (report.held_around) report.summary += ", kept from going on beyond them";
+    if (report.held_around) report.summary += ", prevented from extending beyond them";
     if (report.cut_marks > 0)
-        report.summary += "; " + std::to_string(report.cut_marks) + " others lie in the cut where the image ends";
+        report.summary +=
+            "; " + std::to_string(report.cut_marks) + " further marks lie in the cut at the end of the image";
     return result;
 }
 

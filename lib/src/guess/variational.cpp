@@ -355,7 +355,7 @@ void check_spread(const std::vector<Vec3>& marks) {
         throw Error(Errc::InvalidInput, "guess: expected at least 4 marks, got " + std::to_string(marks.size()));
     if (!span_space(marks))
         throw Error(Errc::InvalidInput, "guess: all " + std::to_string(marks.size()) +
-                                            " marks lie in one plane, and so enclose nothing; mark a second slice");
+                                            " marks lie in one plane, so they enclose nothing; mark a second slice");
 }
 
 }  // namespace

@@ -182,8 +182,9 @@ bool Guide::place_marks(bool first) {
         on_.push_back(mark);
     }
     if (on_.size() < kGuide.fewest_marks) {
-        report_.reason = "only " + std::to_string(on_.size()) +
-                         " places of the guess have marks near them; the image's border cannot be learnt";
+        report_.reason =
+            "only " + std::to_string(on_.size()) +
+            " positions on the guess have marks near them, too few to learn how the image looks at the border";
         return false;
     }
     double residual2 = 0;
@@ -270,7 +271,7 @@ bool Guide::learn(const Scene& scene, bool first) {
     report_.border = learnt_->brightness(0);
     report_.outside = learnt_->brightness(2 * kStepsPerVoxel);
     if (!(learnt_->sure_gain() > 0)) {
-        report_.reason = "what the image shows at some marks does not foretell the others";
+        report_.reason = "the image at some marks does not predict where the others lie";
         return false;
     }
     report_.sigma = sigma_;

@@ -165,9 +165,9 @@ holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_
     holes::CutMesh cut;
     with_threads(run, [&] { cut = HoleFinder(mesh, to_points, distance, slack).find(report, run); });
     if (std::find(cut.kept.begin(), cut.kept.end(), 1) == cut.kept.end())
-        throw Error(Errc::InvalidInput,
-                    std::string(function) + ": no part of the surface is within " + std::to_string(distance) +
-                        " of points all around; a hole is what lies farther: give a larger distance");
+        throw Error(Errc::InvalidInput, std::string(function) + ": no part of the surface lies within " +
+                                            std::to_string(distance) +
+                                            " of the points, so all of it would be a hole; use a larger distance");
     return cut;
 }
 

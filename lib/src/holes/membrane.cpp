@@ -62,7 +62,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
         matrix.setFromTriplets(entries.begin(), entries.end());
         if (round == 0) solver.analyzePattern(matrix);
         solver.factorize(matrix);
-        if (solver.info() != Eigen::Success) throw Error(Errc::Numerical, "the patch hangs at nothing");
+        if (solver.info() != Eigen::Success)
+            throw Error(Errc::Numerical, "a patch over a hole has no rim to be attached to");
         const Positions solved = solver.solve(right);
         double maximum = 0;
         for (std::size_t v = 0; v < number.size(); ++v) {

@@ -27,10 +27,10 @@ void check_direction(const std::string& where, const ImageGeometry& g) {
     if (!(volume >= kMinVolume))
         throw Error(Errc::Unsupported,
                     where +
-                        ": direction: expected axes that span the space, got nearly parallel ones or ones in a plane "
+                        ": direction: expected axes that span the space, got nearly parallel or coplanar ones "
                         "(their parallelepiped has " +
-                        number(volume) + " of a cube's volume, expected " + number(kMinVolume) +
-                        " at least); resample the image, with SimpleITK's Resample() for example",
+                        number(volume) + " of a cube's volume, expected at least " + number(kMinVolume) +
+                        "); resample the image, for example with SimpleITK's Resample()",
                     "direction");
 }
 
@@ -56,7 +56,7 @@ void check_geometry(const std::string& where, const ImageGeometry& g) {
     for (int a = 0; a < 3; ++a)
         if (!(std::abs(g.origin[a]) <= farthest))
             refuse("origin", "within " + number(farthest) + " of 0", g.origin[a], a,
-                   "farther away voxels cannot be told apart well: move the image");
+                   "farther away, neighbouring voxels cannot be distinguished reliably: move the image");
     check_direction(where, g);
 }
 

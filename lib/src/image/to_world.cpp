@@ -19,8 +19,8 @@ std::vector<Vec3> to_world(const PointCloud& cloud) {
     if (cloud.space != PointSpace::World)
         throw Error(Errc::InvalidInput,
                     cloud.source +
-                        ": the points are in an image's own frame, and there is no image; give "
-                        "one, or `points_space = world` for points in lengths",
+                        ": the points refer to the frame of an image, but there is no image; give "
+                        "one, or set `points_space = world` if they are lengths",
                     "points_space");
     return cloud.points;
 }

@@ -417,8 +417,9 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
     const ImageGeometry& geometry = image.geometry();
     Marks marks(geometry, world);
     if (marks.places.size() < kInference.fewest_marks)
-        return keep_guess(std::to_string(marks.places.size()) + " marks do not teach inside and outside, " +
-                          std::to_string(kInference.fewest_marks) + " would");
+        return keep_guess(std::to_string(marks.places.size()) +
+                          " marks are too few to learn inside and outside from the image, expected at least " +
+                          std::to_string(kInference.fewest_marks));
     add_places(geometry, sides.inside, marks.inside);
     add_places(geometry, sides.outside, marks.outside);
     Inference inference(image, std::move(marks), run);
@@ -428,7 +429,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         HeldOut held;
         for (int round = 0;; ++round) {
             if (!inference.find(report)) {
-                keep_guess("no body is likely by the image");
+                keep_guess("no body is probable given the image");
                 return;
             }
             held = inference.hold_out();
@@ -464,21 +465,23 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         // The measured errors decide, not those extrapolated to a finer lattice.
         const double worse = Predictions(held, cell, 1).guess_worse();
         if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
-            keep_guess(overlap.dice > kInference.agreement
-                           ? "the surface of least bending agrees with the image, and predicts marks as well"
-                           : "the surface of least bending predicts marks better");
+            keep_guess(
+                overlap.dice > kInference.agreement
+                    ? "the surface of minimum bending energy agrees with the image, and predicts held-out marks as well"
+                    : "the surface of minimum bending energy predicts held-out marks better");
             return;
         }
         if (fraction_off(geometry, result.marks, body, level) > kInference.max_off) {
             report.expected.reset();
-            reject_body("the likeliest body by the image leaves many marks");
+            reject_body("the most probable body given the image misses many marks");
             return;
         }
         const Level at(geometry, body.lattice, level);
         const auto at_guess = [&](const Vec3& place) { return detail::level_at(guess, place); };
         if (count_wrong(sides, at) > count_wrong(sides, at_guess)) {
             reject_body(
-                "more of the places that are known to be inside or outside are so of the surface of least bending");
+                "it puts fewer of the positions known to be inside or outside on the right side than the surface of "
+                "minimum bending energy");
             return;
         }
         result.u = start_from_level(
@@ -489,7 +492,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             run);
         report.error_slope = error_slope(held, report.weight_of_guess, shrink);
         report.used = true;
-        report.reason = "marks and image show it together";
+        report.reason = "computed from marks and image together";
     });
     return result;
 }

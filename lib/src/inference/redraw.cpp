@@ -233,7 +233,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
                const RunContext& run) {
     Redrawn result;
     result.u = guess;
-    result.reason = "the guess passes the marks";
+    result.reason = "the guess passes through the marks";
     const ImageGeometry& geometry = image.geometry();
     const double voxel = geometry.smallest_spacing(),
                  widest = *std::max_element(geometry.spacing.begin(), geometry.spacing.end()),
@@ -266,18 +266,18 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
         Redrawing redrawing(*guess, image, misses, lattice, run);
         result.bits = redrawing.learn();
         if (result.bits < kInference.redraw_bits) {
-            result.reason = "the image does not tell the sides of the guess";
+            result.reason = "the image does not distinguish inside and outside of the guess";
             return;
         }
         redrawing.draw(sides.inside, sides.outside);
         if (!(redrawing.distance_to_marks() < sum)) {
-            result.reason = "what the image shows does not pass the marks";
+            result.reason = "the surface that the image shows is not closer to the marks";
             return;
         }
         result.u = redrawing.on(*guess);
         result.box = redrawing.box();
         result.used = true;
-        result.reason = "beside marks that the guess misses";
+        result.reason = "near marks that the guess misses";
     });
     return result;
 }

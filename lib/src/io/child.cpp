@@ -178,11 +178,10 @@ public:
         pid_t process = 0;
         const int why = posix_spawn(&process, program.c_str(), &files_, &attributes_, arguments, environment);
         if (why != 0)
-            throw Error(
-                Errc::Io,
-                program + ": expected to start covol's program that reads files apart from this one, got: " +
-                    std::strerror(why) +
-                    (why == ENOENT ? "; install covol again" : "; allow more processes and threads, or memory"));
+            throw Error(Errc::Io,
+                        program + ": covol's reader, the process that decodes files, could not be started: " +
+                            std::strerror(why) +
+                            (why == ENOENT ? "; install covol again" : "; allow more processes, threads or memory"));
         return process;
     }
 
@@ -238,8 +237,8 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     if (n == batch.end || run.cancelled()) return n;
     if (batch.slots[n].now() != kBegun)  // not the file's fault: libraries start threads when they are loaded
         throw Error(Errc::Io, program +
-                                  ": expected it to read files apart from this program, but it ended before it began; "
-                                  "allow more processes and threads, or memory");
+                                  ": the reader process ended before it could read a file; "
+                                  "allow more processes, threads or memory");
     batch.slots[n].set(kCrashed);
     return n + 1;
 }
@@ -278,8 +277,9 @@ SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(de
     if (data_ != nullptr) return;
     if (descriptor >= 0) close(descriptor);
     if (why != EFBIG) throw std::bad_alloc();
-    throw Error(Errc::Io, "expected " + std::to_string(bytes) + " bytes of memory that two programs share, got: " +
-                              std::strerror(why) + "; allow larger files (ulimit -f), which that counts as");
+    throw Error(Errc::Io, "expected " + std::to_string(bytes) +
+                              " bytes of memory shared with the reader process, got: " + std::strerror(why) +
+                              "; allow larger files (ulimit -f), because this memory counts as a file");
 }
 
 SharedMemory::SharedMemory(Given given) : descriptor_(given.descriptor) {

@@ -28,8 +28,8 @@ std::string choose_level_set(const std::string& path, const RunContext& run) {
         std::string list;
         for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
         const bool last = level_sets.back() != chosen;
-        run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" +
-                 (last ? level_sets.back() : level_sets.front()));
+        run.warn(path + ": '" + chosen + "' is used, one of the level sets " + list + "; choose another with " + path +
+                 ":" + (last ? level_sets.back() : level_sets.front()));
     }
     return chosen;
 }
@@ -67,8 +67,8 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
     if (grid->getGridClass() == openvdb::GRID_LEVEL_SET || grid->background() != 0) return grid;
     const auto [minimum, maximum] = range_of(*grid);
     if (minimum < 0 || !(maximum > 0)) return grid;
-    run.warn(path + ": grid '" + grid->getName() + "' has no class, and values from 0 to " + detail::number(maximum) +
-             ", as an indicator of the inside has: its border is taken at " + detail::number(maximum / 2));
+    run.warn(path + ": grid '" + grid->getName() + "' has no class and values from 0 to " + detail::number(maximum) +
+             ", like an indicator function of the inside: its boundary is placed at " + detail::number(maximum / 2));
     make_level_set(*grid, maximum / 2);
     return grid;
 }

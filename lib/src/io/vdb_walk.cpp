@@ -57,7 +57,7 @@ void check_bool(std::uint8_t value) {
 /// Checks Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes.
 void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t bytes, std::int64_t packed) {
     if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
-        throw std::runtime_error("a block's header has other sizes than it");
+        throw std::runtime_error("a block's size differs from that in its header");
 }
 
 /// Checks OpenVDB's data about each leaf for delayed loading: two arrays, each either packed after its packed size, or
@@ -75,7 +75,8 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
         if (width > 1 && packed == kMissing) return;
         const std::int64_t bytes = leaves * std::int64_t(width), stored = packed > 0 ? packed : bytes;
         const auto at = stream.tellg();
-        if (stored > length - (at - begin)) throw std::runtime_error("more bytes for its leaves than there are");
+        if (stored > length - (at - begin))
+            throw std::runtime_error("the data about its leaves is longer than the space for it");
         if (packed > 0) {
             if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
             const auto header = read<std::array<std::uint32_t, 4>>(stream);
@@ -165,7 +166,7 @@ private:
         if (packed <= 0) {  // not packed
             if (packed != -bytes)
                 throw std::runtime_error("expected a block of " + std::to_string(bytes) +
-                                         " bytes as it is, its length says " + std::to_string(packed));
+                                         " uncompressed bytes, its length is stated as " + std::to_string(packed));
             return skip(bytes);
         }
         if (!blosc) return skip(packed);

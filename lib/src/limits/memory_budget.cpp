@@ -8,7 +8,7 @@ namespace covol::detail {
 void require_memory(double bytes, const std::string& what, const char* advice, const RunContext& run) {
     if (run.memory_budget == 0 || bytes <= double(run.memory_budget)) return;
     const auto mebibytes = [](double count) { return number(count / (1 << 20)) + " MiB"; };
-    throw Error(Errc::InvalidOptions, what + " needs " + mebibytes(bytes) + " of memory, " +
+    throw Error(Errc::InvalidOptions, what + " needs " + mebibytes(bytes) + " of memory, but only " +
                                           mebibytes(double(run.memory_budget)) + " may be used; " + advice);
 }
 

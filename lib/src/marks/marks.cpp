@@ -69,7 +69,7 @@ GivenGuess make_guess(const Image& mask, int label, const std::optional<ImageGeo
     std::string list;
     for (const LabelName& l : labels) list += (list.empty() ? "" : ", ") + std::to_string(l.label);
     if (label == 0 && labels.size() > 1)
-        throw Error(Errc::InvalidInput, who + ": expected one label, got " + list + "; choose one by `guess_label`",
+        throw Error(Errc::InvalidInput, who + ": expected one label, got " + list + "; choose one with `guess_label`",
                     "guess");
     guess.label = label != 0 ? label : labels.front().label;
     if (std::none_of(labels.begin(), labels.end(), [&](const LabelName& l) { return l.label == guess.label; }))
@@ -105,7 +105,7 @@ void thin_points(Marks& marks, std::size_t maximum, const RunContext& run) {
     if (used.size() == given) return;
     marks.thinned = used.size();
     run.info("cloud: " + std::to_string(used.size()) + " of " + std::to_string(given) +
-             " points used, evenly spread; `most_points = 0` takes all");
+             " points used, evenly distributed; `most_points = 0` uses all");
 }
 
 std::vector<Vec3> positions_of(const Marks& marks, const std::optional<ImageGeometry>& image) {

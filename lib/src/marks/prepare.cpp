@@ -22,7 +22,7 @@ public:
     const Painted& of(const PaintedImage& given, const RunContext& run) {
         const auto known = images_.find(&given);
         if (known != images_.end()) return known->second;
-        if (!image_) throw Error(Errc::InvalidInput, "expected an image that the paint belongs to");
+        if (!image_) throw Error(Errc::InvalidInput, "expected the image that the painted labels belong to, got none");
         const std::string who = given.image.path().empty() ? "painted" : given.image.path();
         Painted painted = understand_painted(placed_on(given.image, *image_, force_), given.labels, given.options, run);
         for (const PaintedLabel& label : painted.labels) run.info(who + ": " + label.summary);
@@ -35,7 +35,7 @@ public:
         for (const PaintedLabel& label : of(*paint.image, run).labels)
             if (label.label == paint.label) return label;
         throw Error(Errc::InvalidInput,
-                    paint.image->image.path() + ": label " + std::to_string(paint.label) + " is not there");
+                    paint.image->image.path() + ": label " + std::to_string(paint.label) + " does not occur");
     }
 
 private:
@@ -51,9 +51,9 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
     const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
     if (tag_distance > diagonal)
         throw Error(Errc::InvalidOptions,
-                    "`tag_distance`: " + detail::number(tag_distance) +
-                        " is more than the points' whole box measures, " + detail::number(diagonal) +
-                        ": nothing that they enclose is that far from them",
+                    "`tag_distance`: expected at most the diagonal of the points' bounding box, " +
+                        detail::number(diagonal) + ", got " + detail::number(tag_distance) +
+                        ": no enclosed position is that far from the points",
                     "tag_distance");
 }
 
@@ -213,7 +213,7 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     for (const Marks& marks : structures) names.push_back(marks.name);
     std::set<std::string> unique(names.begin(), names.end());
     if (names.empty() || unique.size() < names.size() || (names.size() > 1 && unique.contains("")))
-        throw Error(Errc::InvalidInput, "expected a name of its own for each of several structures");
+        throw Error(Errc::InvalidInput, "expected a unique name for each of several structures");
     number_labels(structures);
     const std::vector<std::string> grids = make_grid_names(names);
     Preparer preparer(std::move(structures), image, options, marks_options);

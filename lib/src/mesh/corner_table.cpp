@@ -38,11 +38,12 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
             if (vertex(next(leaving[n])) == from && leaving[n] != next(c)) twice = c;
     });
     if (twice != kNone)
-        throw Error(Errc::InvalidInput,
-                    "expected a manifold mesh of one orientation, got several triangles on a side of the edge between "
-                    "the vertices " +
-                        std::to_string(vertex(next(twice))) + " and " + std::to_string(vertex(previous(twice))) +
-                        "; repair it first");
+        throw Error(
+            Errc::InvalidInput,
+            "expected a consistently oriented manifold mesh, got several triangles on one side of the edge between "
+            "the vertices " +
+                std::to_string(vertex(next(twice))) + " and " + std::to_string(vertex(previous(twice))) +
+                "; repair it first");
     for (std::uint32_t c = 0; c < corners; ++c) {
         if (opposite_[c] != kNone) continue;
         on_boundary_[vertex(next(c))] = on_boundary_[vertex(previous(c))] = 1;

@@ -151,7 +151,7 @@ void summarise(PaintedLabel& label, std::size_t scribbled) {
     text << "label " << label.label << ": " << count_text(label.voxels, "voxel");
     for (const PaintedView& view : label.views)
         text << "; " << count_text(view.slices.size(), "slice") << " across " << kAxisNames[view.axis] << " ("
-             << list_text(view.slices) << ") taken as painted as a whole, with "
+             << list_text(view.slices) << ") taken as completely painted, with "
              << count_text(view.outlines.lines.size(), "outline");
     if (scribbled > 0)
         text << "; " << (label.views.empty() ? "" : "the other ") << count_text(scribbled, "voxel")
@@ -256,7 +256,7 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
         if (own.size == image.size) return labels.placed(image);
         if (!own.spacing_known)
             throw Error(Errc::InvalidInput, labels.path() + ": expected as many voxels as the image, " +
-                                                size_text(image.size) + ", for the file states no spacing; got " +
+                                                size_text(image.size) + ", because the file states no spacing, got " +
                                                 size_text(own.size) +
                                                 "; save it with the image's geometry, as NRRD or NIfTI");
     }

@@ -163,7 +163,7 @@ std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& opt
     if (options.simplify > 0) text << ", " << r.simplified << " by cells of " << options.simplify;
     if (options.smooth == CloudSmoothing::Jets)
         text << "; jets moved " << r.smoothed << " by " << r.mean_shift << " on average, " << r.max_shift << " at most";
-    if (options.smooth == CloudSmoothing::Wlop) text << "; WLOP made " << r.smoothed;
+    if (options.smooth == CloudSmoothing::Wlop) text << "; WLOP generated " << r.smoothed;
     return text.str();
 }
 
@@ -185,7 +185,7 @@ std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanu
     }
     own.kept = result.size();
     if (result.empty() && !points.empty())
-        throw Error(Errc::InvalidInput, "no point is left of " + std::to_string(points.size()));
+        throw Error(Errc::InvalidInput, "none of the " + std::to_string(points.size()) + " points remains");
     if (report != nullptr) *report = own;
     run.info(one_line(own, options));
     return result;

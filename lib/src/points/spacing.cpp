@@ -54,7 +54,7 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
 }
 
 std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t maximum) {
-    if (maximum == 0) throw Error(Errc::InvalidOptions, "most: expected > 0, got 0");
+    if (maximum == 0) throw Error(Errc::InvalidOptions, "maximum: expected > 0, got 0");
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
         throw Error(Errc::InvalidInput, "points: expected fewer than 2^32, got " + std::to_string(points.size()));
     if (points.empty()) return {};

@@ -45,9 +45,9 @@ public:
           gap_(int(std::lround(0.5 * text_))) {
         if (scene.structures.empty()) throw Error(Errc::InvalidInput, "render: expected a structure, got none");
         if (scene.image == nullptr && options.figure == FigureKind::Slices)
-            throw Error(Errc::InvalidInput, "render: slices are of an image: give one");
+            throw Error(Errc::InvalidInput, "render: slices: expected an image, got none");
         if (scene.image == nullptr && options.volume)
-            throw Error(Errc::InvalidInput, "render: a volume view is of an image: give one");
+            throw Error(Errc::InvalidInput, "render: volume: expected an image, got none");
         for (const RenderStructure& structure : scene.structures) boxes_.push_back(surface_box(*structure.surface));
         for (const RenderStructure& structure : scene.structures) {
             all_marks_.insert(all_marks_.end(), structure.marks.begin(), structure.marks.end());

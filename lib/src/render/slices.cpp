@@ -34,7 +34,7 @@ public:
         image.load(box, run);
         const Index3 size = box.size();
         detail::require_memory(sizeof(float) * double(size[0]) * size[1] * size[2],
-                               "render: the plane through " + image.path(), "choose a part of it", run);
+                               "render: the plane through " + image.path(), "choose a smaller part of it", run);
         values_.resize(std::size_t(size[0]) * size[1] * size[2]);
         image.copy(box, values_.data());
         std::size_t stride = 1;

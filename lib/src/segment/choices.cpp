@@ -47,8 +47,8 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double maximum = away[away.size() * 99 / 100];
     if (far < kAutomatic.wild_point * maximum || far < kMaxReach * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
-                                        number(far) + " from the middle of all points, " + number(far / maximum) +
-                                        " times as far as 99 % of them: leave it out, if it is a mistake");
+                                        number(far) + " from the centre of all points, " + number(far / maximum) +
+                                        " times as far as 99 % of them; remove it if it is a mistake");
 }
 
 // Points without an image are a cloud if they enclose something, so that they determine inside and outside themselves.
@@ -83,7 +83,7 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
     std::vector<Vec3> kept = merge_close_points(points, kAutomatic.merge_voxels * h);
     if (kept.size() < points.size())
         run.info("points: " + std::to_string(kept.size()) + " of " + std::to_string(points.size()) +
-                 " kept, the others are closer than half of " + number(kAutomatic.merge_voxels * h));
+                 " kept, the others are closer to them than half of " + number(kAutomatic.merge_voxels * h));
     return kept;
 }
 
@@ -93,7 +93,7 @@ std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& rem
     if (!(thickness > kAutomatic.noisy_fraction * h)) return points;
     points = average_layers(points, radius, run);
     remarks.choose("points_averaged", "within " + number(radius),
-                   "they lie " + number(thickness) + " from their local plane on the mean, more than " +
+                   "on average they lie " + number(thickness) + " from their local plane, more than " +
                        number(kAutomatic.noisy_fraction) + " voxels",
                    run);
     return points;
@@ -103,12 +103,12 @@ double choose_attraction_range(const EvolveOptions& evolve, bool tags, double h,
                                const RunContext& run) {
     if (!uses_points(evolve)) return 0;
     if (tags && !uses_image(evolve)) {
-        remarks.choose("attraction_range", "0", "unlimited: the band around the points bounds it", run);
+        remarks.choose("attraction_range", "0", "unlimited, because the band around the points limits it", run);
         return 0;
     }
     const double voxels = tags ? kAutomatic.tag_attraction_voxels : kAutomatic.attraction_voxels;
     remarks.choose("attraction_range", number(voxels * h),
-                   number(voxels) + (tags ? " voxels: farther from marks the image decides" : " voxels"), run);
+                   number(voxels) + (tags ? " voxels: farther from the marks, the image decides" : " voxels"), run);
     return voxels * h;
 }
 
@@ -137,7 +137,8 @@ Choices with_flow(const Problem& problem, Choices c) {
     if (!c.evolve.image_yields) {
         const bool yields = tags && uses_points(c.evolve) && uses_image(c.evolve);
         c.evolve.image_yields = yields ? 1.0 : 0.0;
-        if (yields) remarks.choose("image_yields", "1", "near marks the marks know better than the edges", run);
+        if (yields)
+            remarks.choose("image_yields", "1", "near marks, the marks are more reliable than the image's edges", run);
     }
     return c;
 }
@@ -201,10 +202,10 @@ Resolved resolve(const Problem& problem) {
         const double minimum = std::sqrt(area / (kAutomatic.max_facets * double(c.cloud->points.size())));
         if (minimum > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = minimum;
-            remarks.choose(
-                "voxel_size", number(minimum),
-                "finer ones would be more than " + number(kAutomatic.max_facets) + " of the surface for each point",
-                run);
+            remarks.choose("voxel_size", number(minimum),
+                           "with smaller voxels the surface would have more than " + number(kAutomatic.max_facets) +
+                               " of them for each point",
+                           run);
         }
     }
     points = merged(points, c.h, run);
@@ -241,12 +242,13 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
             area += 2 * (box.max[a] - box.min[a]) * (box.max[(a + 1) % 3] - box.min[(a + 1) % 3]);
         if (const double minimum = std::sqrt(area / kAutomatic.max_box_voxels);
             minimum > std::min(times, 1.0) * spacing)
-            return VoxelSizeChoice{minimum, number(kAutomatic.max_box_voxels) +
-                                                " of them on the sides of the points' box; their median distance is " +
-                                                number(spacing)};
+            return VoxelSizeChoice{
+                minimum, number(kAutomatic.max_box_voxels) +
+                             " voxels on the sides of the points' bounding box; the median distance of the points is " +
+                             number(spacing)};
         if (times >= 1) return nearest(spacing);
         return VoxelSizeChoice{times * spacing, "finer than the median distance between neighbouring points, " +
-                                                    number(spacing) + ", for there are few"};
+                                                    number(spacing) + ", because there are few"};
     };
     if (distinct.size() > kAutomatic.max_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
@@ -262,8 +264,8 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     // With few points and voxels as large as their spacing, the surface would be so few voxels wide that curvature
     // would outweigh the points.
     if (scan.voxel_size <= spacing) return finer(spacing, kAutomatic.few_points);
-    return {scan.voxel_size, "points lie " + number(scan.thickness) +
-                                 " from their local plane on the mean, noise wider than their median distance " +
+    return {scan.voxel_size, "on average the points lie " + number(scan.thickness) +
+                                 " from their local plane, a noise larger than their median distance " +
                                  number(spacing)};
 }
 

@@ -74,8 +74,8 @@ void require_outside(const Problem& problem, const FloatGrid& u, const std::vect
     throw Error(Errc::InvalidInput,
                 "segment: the surface is inside out: " +
                     number(std::round(100.0 * double(unexpected) / double(places.size()))) +
-                    " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
-                    "body, or give places outside of it (`outside`)");
+                    " % of the image's border would be inside, far from all marks and seeds; mark more of the "
+                    "body, or give positions outside of it (`outside`)");
 }
 
 Remarks doubt_isolated_marks(const Problem& problem) {
@@ -89,10 +89,10 @@ Remarks doubt_isolated_marks(const Problem& problem) {
                   number(isolated[n].distance) + " away";
     if (isolated.size() > kMaxReported) places += "; ...";
     remarks.warn(std::to_string(isolated.size()) + " of " + std::to_string(problem.given.size()) +
-                     " marks lie apart from all others (" + places +
-                     "): the surface goes there, too; look whether they are mistakes" +
-                     (problem.options.contours ? "" : ", which `remove_outliers` leaves out") +
-                     ", or mark more beside them",
+                     " marks lie far from all others (" + places +
+                     "): the surface extends to them; check whether they are mistakes" +
+                     (problem.options.contours ? "" : " (`remove_outliers` leaves them out)") +
+                     ", or add marks near them",
                  problem.run);
     return remarks;
 }

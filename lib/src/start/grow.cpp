@@ -104,11 +104,11 @@ public:
             if (level_[n] < 0) inside.push_back(image_[n]);
             if (std::abs(level_[n]) < 1.5 * voxel_) shell.push_back(image_[n]);
         }
-        if (inside.empty() || shell.empty()) return "it holds no voxel";
+        if (inside.empty() || shell.empty()) return "the start contains no voxel";
         std::sort(all.begin(), all.end());
         const double range = double(all[std::size_t(0.995 * double(all.size() - 1))]) -
                              double(all[std::size_t(0.005 * double(all.size() - 1))]);
-        if (!(range > 0)) return "the image is the same everywhere";
+        if (!(range > 0)) return "the image is constant";
         inside_ = spread_of(inside);
         inside_.width = std::max(inside_.width, kGrow.min_spread * range);
         Spread surface = spread_of(shell);
@@ -117,7 +117,7 @@ public:
             return std::abs(v - surface.middle) > kGrow.unlike * surface.width;
         });
         if (double(unlike) > kGrow.unlike_fraction * double(inside.size()))
-            return "the image inside it is not as it is on its surface";
+            return "the image differs between the inside and the surface of the start";
         return {};
     }
 
@@ -293,7 +293,7 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
             hi[a] = std::min(domain.max[a], active.max()[a] + pad);
         }
         const Box box(lo, hi);
-        if (box.count() > kMaxVoxels) return {nullptr, "too large a part of the image to look at"};
+        if (box.count() > kMaxVoxels) return {nullptr, "the part of the image to be searched is too large"};
         std::vector<float> values(box.count()), level(box.count());
         image.sample(domain, {lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}, values.data());
         image.release();
@@ -306,10 +306,10 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
         front.march(run);
         if (front.needs_more(domain)) continue;
         if (!front.is_clear()) return {nullptr, "no position of the front has a clear edge"};
-        if (front.starts_at_edge()) return {nullptr, "it lies at an edge already"};
+        if (front.starts_at_edge()) return {nullptr, "the start already lies at an edge"};
         return {level_set_of(box, front.region(), domain, run),
-                "from " + number(1 / front.growth()) + " of the volume: the image changes by " +
-                    number(front.best_edge() / front.spread()) + " times its spread inside, a voxel, across the front"};
+                "from " + number(1 / front.growth()) + " of the volume: across the front, the image changes by " +
+                    number(front.best_edge() / front.spread()) + " times its spread inside per voxel"};
     }
 }
 

@@ -75,7 +75,7 @@ void measure_again(StructureResult& structure, const std::optional<Image>& image
     // Marks that two structures claim must lie off one of them, which needs no warning.
     for (const std::string& line :
          pipeline::compare_with_marks(report, surface, image ? &*image : nullptr, structure.marks, distances))
-        run.info("beside the other structures " + line);
+        run.info("after separation from the other structures, " + line);
 }
 
 /// Makes the surfaces disjoint.
@@ -97,9 +97,9 @@ void separate_all(StructuresResult& all, const std::optional<Image>& image, cons
         const StructureResult &a = all.structures[overlap.a], &b = all.structures[overlap.b];
         const double smaller = std::min(a.result.report.surface.volume, b.result.report.surface.volume);
         if (overlap.volume < kLargeOverlap * smaller) continue;
-        run.info("'" + a.name + "' and '" + b.name + "' both claimed " + pipeline::number(overlap.volume) + " (" +
+        run.info("'" + a.name + "' and '" + b.name + "' overlapped by " + pipeline::number(overlap.volume) + " (" +
                  pipeline::number(std::round(100 * overlap.volume / smaller)) +
-                 " % of the smaller one); the surface was put halfway: mark more where they touch");
+                 " % of the smaller one); their border was placed halfway: add marks where they touch");
     }
     all.separate_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
@@ -158,16 +158,17 @@ StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks
     for (std::size_t n = 0; n < last_.size(); ++n) {
         Last& last = last_[n];
         if (n >= marks.size() || marks.size() != last_.size() || marks[n].name != last.name)
-            throw Error(Errc::InvalidInput, "TimeLapse: expected the structures of the frame before, in their order");
+            throw Error(Errc::InvalidInput,
+                        "TimeLapse: expected the structures of the previous frame, in the same order");
         if (last.look) {
             const RunContext own = speaking_for(last.name, last_.size(), run);
             Followed followed = last.look->follow(frame, own);
             marks[n].start = LevelSetStart{std::move(followed.u), true};
             motions[n] = followed.report;
             if (followed.report.correlation < kMinCorrelation)
-                own.warn("the image around the surface is not what it was in the frame before (correlation " +
+                own.warn("the image around the surface differs from that in the previous frame (correlation " +
                          pipeline::number(std::round(100 * followed.report.correlation) / 100) +
-                         "): it may have lost the structure; mark this frame");
+                         "): the surface may have lost the structure; mark this frame");
         } else {
             marks[n].start = LevelSetStart{last.surface};
         }

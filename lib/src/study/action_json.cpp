@@ -34,12 +34,12 @@ public:
     [[nodiscard]] StudyId id(const char* name) const {
         const json& value = at(name);
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMaxId)
-            refuse(std::string("'") + name + "': expected a number from 1");
+            refuse(std::string("'") + name + "': expected a whole number >= 1");
         return value.get<StudyId>();
     }
     [[nodiscard]] std::string text(const char* name) const {
         const json& value = at(name);
-        if (!value.is_string()) refuse(std::string("'") + name + "': expected a text");
+        if (!value.is_string()) refuse(std::string("'") + name + "': expected a string");
         return value.get<std::string>();
     }
     [[nodiscard]] bool flag(const char* name) const {
@@ -58,7 +58,7 @@ public:
     [[nodiscard]] Vec3 place(const char* name) const { return place_of(at(name), name); }
     [[nodiscard]] std::vector<Vec3> places(const char* name) const {
         const json& value = at(name);
-        if (!value.is_array()) refuse(std::string("'") + name + "': expected a list of places");
+        if (!value.is_array()) refuse(std::string("'") + name + "': expected a list of positions");
         std::vector<Vec3> result;
         for (const json& place : value) result.push_back(place_of(place, name));
         return result;
@@ -369,7 +369,7 @@ template <typename... Actions>
 StudyAction read_action(const std::string& word, const Fields& fields, const std::variant<Actions...>* /*types*/) {
     std::optional<StudyAction> found;
     ((word == Form<Actions>::word ? (found.emplace(Form<Actions>::read(fields)), true) : false) || ...);
-    if (!found) refuse("'do': no action is called '" + word.substr(0, kMaxKeyBytes) + "'");
+    if (!found) refuse("'do': expected the name of an action, got '" + word.substr(0, kMaxKeyBytes) + "'");
     return *std::move(found);
 }
 

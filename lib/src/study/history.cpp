@@ -22,7 +22,7 @@ void require_name(const std::string& name) {
     if (name.empty()) refuse("a structure needs a name");
     if (name.size() > kMaxNameBytes) refuse("expected a name of at most " + std::to_string(kMaxNameBytes) + " bytes");
     const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 127; };
-    if (std::any_of(name.begin(), name.end(), is_control)) refuse("a name holds no control characters");
+    if (std::any_of(name.begin(), name.end(), is_control)) refuse("expected a name without control characters");
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ struct StudyHistory::Planning {
     }
     void require_free(const std::string& name, StudyId own = 0) const {
         for (const auto& s : history.state_)
-            if (s->name == name && s->id != own) refuse("a structure is called '" + name + "' already");
+            if (s->name == name && s->id != own) refuse("there is already a structure '" + name + "'");
     }
     void require_inside(const Vec3& world) const {
         const Vec3 index = history.image_.world_to_index(world);
@@ -66,7 +66,8 @@ struct StudyHistory::Planning {
             refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
                    std::to_string(outline.world.size()));
         if (outline.world.size() > kMaxCorners) refuse("an outline has too many corners");
-        if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at)) refuse("an outline lies on no slice");
+        if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at))
+            refuse("an outline does not lie on a slice");
         for (const Vec3& corner : outline.world) require_inside(corner);
     }
     void add_outline(StudyStructure& structure, const StudyOutline& outline) {
@@ -172,7 +173,7 @@ struct StudyHistory::Planning {
         return {edited(a.structure, false, [&](StudyStructure& s) { s.marks.erase(mark_in(s, a.mark)); })};
     }
     Changes operator()(const StudyActions::GiveMark& a) {
-        if (a.structure == a.to) refuse("the mark belongs to that structure already");
+        if (a.structure == a.to) refuse("the mark already belongs to that structure");
         StudyMark mark;
         Change from = edited(a.structure, false, [&](StudyStructure& s) {
             const auto found = mark_in(s, a.mark);
@@ -193,7 +194,7 @@ struct StudyHistory::Planning {
         })};
     }
     Changes operator()(const StudyActions::AddStroke& a) {
-        if (a.stroke.world.empty()) refuse("a stroke needs a place");
+        if (a.stroke.world.empty()) refuse("a stroke needs at least one position");
         if (a.stroke.world.size() > kMaxCorners) refuse("a stroke has too many corners");
         for (const Vec3& corner : a.stroke.world) require_inside(corner);
         return {edited(a.structure, false, [&](StudyStructure& s) {

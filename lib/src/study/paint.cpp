@@ -158,17 +158,17 @@ void require_paintable(const StudyStructure& structure, const ImageGeometry& ima
     if (!(stroke.radius > 0) || !std::isfinite(stroke.radius)) refuse("a brush needs a radius > 0");
     if (stroke.axis &&
         (*stroke.axis < 0 || *stroke.axis > 2 || stroke.at < 0 || stroke.at >= image.size[std::size_t(*stroke.axis)]))
-        refuse("a stroke lies on no slice of the image");
+        refuse("a stroke does not lie on a slice of the image");
     double length = 0;
     for (std::size_t n = 1; n < stroke.world.size(); ++n) length += distance(stroke.world[n - 1], stroke.world[n]);
     double visits = 0;
     // Checked before its pieces are made, of which a very thin brush would have too many.
-    if (length / stroke.radius > kMaxVisits / 16) refuse("a stroke is too long for so thin a brush");
+    if (length / stroke.radius > kMaxVisits / 16) refuse("a stroke is too long for such a thin brush");
     each_piece(stroke, [&](const Piece& piece) { visits += 1 + voxels_in(box_around(piece, stroke, image)); });
-    if (visits > kMaxVisits) refuse("a stroke covers too many voxels: take a smaller brush, or a shorter stroke");
+    if (visits > kMaxVisits) refuse("a stroke covers too many voxels: use a smaller brush, or a shorter stroke");
     if (const VoxelBox box = box_around(structure, image); box.max[0] >= box.min[0] && voxels_in(box) > kMaxVoxels)
         refuse("the paint of '" + structure.name +
-               "' would span more than 268 million voxels: paint what lies far apart as two structures");
+               "' would span more than 268 million voxels: paint distant parts as separate structures");
 }
 
 }  // namespace detail

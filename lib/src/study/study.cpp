@@ -64,10 +64,10 @@ StudyImage parse_header(std::string_view line, const fs::path& path) {
         image.geometry.direction = from.at("direction").get<Matrix3>();
         return image;
     } catch (const json::exception&) {
-        fail(Errc::InvalidInput, path, "expected the journal of a study; its first line is none");
+        fail(Errc::InvalidInput, path, "expected the journal of a study, but its first line is not that of one");
     } catch (const Error& error) {
         if (error.code() == Errc::Unsupported) throw;
-        fail(Errc::InvalidInput, path, "expected the journal of a study; its first line is none");
+        fail(Errc::InvalidInput, path, "expected the journal of a study, but its first line is not that of one");
     }
 }
 
@@ -87,8 +87,8 @@ bool is_same(const ImageGeometry& a, const ImageGeometry& b) {
 std::string read_text(const fs::path& path) {
     std::error_code none;
     const std::uintmax_t bytes = fs::file_size(path, none);
-    if (none) fail(Errc::Io, path, "there is no study there");
-    if (bytes > kMaxBytes) fail(Errc::InvalidInput, path, "it is larger than any journal");
+    if (none) fail(Errc::Io, path, "it does not exist; expected the journal of a study");
+    if (bytes > kMaxBytes) fail(Errc::InvalidInput, path, "it is too large for the journal of a study");
     std::ifstream file = open_regular_file(path.string());
     std::string text(std::size_t(bytes), '\0');
     file.read(text.data(), std::streamsize(bytes));
@@ -112,7 +112,7 @@ void each_action(const std::vector<std::string_view>& lines, const fs::path& pat
         } catch (const Error& error) {
             fail(Errc::InvalidInput, path,
                  "line " + std::to_string(n + 1) + " is damaged (" + error.what() +
-                     "); what stands before it can be kept: delete this line and those behind it");
+                     "); to keep the lines before it, delete this line and all after it");
         }
 }
 
@@ -128,7 +128,7 @@ struct Study::Journal {
         struct stat entry {};
         if (file.get() < 0 || ::fstat(file.get(), &entry) != 0)
             fail(Errc::Io, path, "it cannot be opened for writing (" + error_text() + ")");
-        if (!S_ISREG(entry.st_mode)) fail(Errc::Io, path, "it is no file");
+        if (!S_ISREG(entry.st_mode)) fail(Errc::Io, path, "it is not a regular file");
         if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
             fail(Errc::Io, path, "another program has this study open");
     }
@@ -159,7 +159,7 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
     : folder_(std::move(folder)), history_(image) {
     std::error_code failed;
     fs::create_directories(folder_, failed);
-    if (failed) fail(Errc::Io, folder_, "the folder cannot be made (" + failed.message() + ")");
+    if (failed) fail(Errc::Io, folder_, "the folder cannot be created (" + failed.message() + ")");
     const fs::path path = fs::path(folder_) / kJournal;
     journal_ = std::make_unique<Journal>(path);
     const std::string text = read_text(path);
@@ -169,7 +169,7 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
         // and must not be overwritten.
         constexpr std::string_view kBegin = "{\"covol_study\":";
         if (!kBegin.starts_with(std::string_view(text).substr(0, kBegin.size())))
-            fail(Errc::InvalidInput, path, "expected the journal of a study; its first line is none");
+            fail(Errc::InvalidInput, path, "expected the journal of a study, but its first line is not that of one");
         const fs::path absolute = fs::absolute(image_path, failed), base = fs::absolute(folder_, failed);
         const fs::path relative = absolute.lexically_relative(base);
         journal_->cut(0);
@@ -178,9 +178,9 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
         return;
     }
     if (!is_same(parse_header(lines.front(), path).geometry, image))
-        fail(
-            Errc::InvalidInput, path,
-            "this study belongs to an image of another size, spacing or place; open that image, or name another study");
+        fail(Errc::InvalidInput, path,
+             "this study belongs to an image of another size, spacing or position; open that image, or choose another "
+             "study");
     each_action(lines, path, [&](const KeyedAction& action) {
         const StudyId made = history_.apply(action.action).made;
         ++sequence_;
@@ -189,7 +189,7 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
     const std::size_t whole = std::size_t(lines.back().data() + lines.back().size() + 1 - text.data());
     if (whole < text.size()) {
         repaired_ = "the last line was cut off (" + std::to_string(text.size() - whole) +
-                    " bytes): an action that was not confirmed was dropped";
+                    " bytes): an unconfirmed action was dropped";
         journal_->cut(off_t(whole));
     }
     journal_->end = off_t(whole);

@@ -50,7 +50,8 @@ Marks marks_of(const StudyStructure& structure, const StudySite& site) {
     add_study_paint(marks, structure, site.image);
     if (structure.guess) {
         if (!site.read_guess)
-            throw Error(Errc::InvalidInput, "study: '" + marks.name + "' has a guess, and nothing that reads it");
+            throw Error(Errc::InvalidInput,
+                        "study: '" + marks.name + "' has a guess, but no function that reads it was given");
         marks.guess = [read = site.read_guess, guess = *structure.guess](const RunContext& run) {
             return read(guess, run);
         };

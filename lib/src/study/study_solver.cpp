@@ -83,7 +83,7 @@ std::string missing(const StudyStructure& structure) {
     if (!structure.outlines.empty() || structure.guess) return {};
     if (!structure.strokes.empty())
         return structure.marks.empty() && is_on_one_slice(structure.strokes)
-                   ? "paint a second slice, or set marks beside this one, and there is a surface"
+                   ? "paint a second slice, or set marks beside this one, to get a surface"
                    : "";
     std::vector<Vec3> places;
     for (const StudyMark& mark : structure.marks)
@@ -92,7 +92,7 @@ std::string missing(const StudyStructure& structure) {
         return are_flat(places) ? "all marks lie in one plane: set some on other slices, or in another view" : "";
     const std::size_t more = kFewestMarks - places.size();
     return std::to_string(more) +
-           (more == 1 ? " mark more and there is a surface" : " marks more and there is a surface");
+           (more == 1 ? " more mark is needed for a surface" : " more marks are needed for a surface");
 }
 
 /// Estimated number of voxels of edge h in the band: as for the previous surface, else as for a body that fills the box

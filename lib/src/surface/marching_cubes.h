@@ -363,10 +363,10 @@ private:
             domain_.index_to_world({double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
         for (const double c : p)
             if (domain_.voxel_size < 16 * std::abs(c) * std::numeric_limits<float>::epsilon())
-                throw Error(Errc::Unsupported, "coordinates near " + std::to_string(c) +
-                                                   " are too far from each other for a voxel size of " +
-                                                   std::to_string(domain_.voxel_size) +
-                                                   " in single precision; take the data in parts");
+                throw Error(Errc::Unsupported,
+                            "near " + std::to_string(c) +
+                                ", single-precision coordinates are too coarse for a voxel size of " +
+                                std::to_string(domain_.voxel_size) + "; process the data in parts");
     }
 
     void place_vertices(const Block& block, std::array<float, 3>* out) {

@@ -25,8 +25,9 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
         remove_small_components(mesh, options.min_component_volume);
         if (mesh.empty()) {
             std::ostringstream text;
-            text << "every piece of the surface is smaller than " << options.min_component_volume << "; all of it has "
-                 << whole << ", as a cube of edge " << std::cbrt(whole) << "; use a smaller `min_component`";
+            text << "every piece of the surface has a volume below " << options.min_component_volume
+                 << "; the whole surface has " << whole << ", as a cube of edge " << std::cbrt(whole)
+                 << "; use a smaller `min_component`";
             throw Error(Errc::InvalidInput, text.str(), "min_component");
         }
     }

@@ -66,7 +66,7 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
         if (distance.tree().isValueOn(voxel) && !(double(d) > options.tag_distance)) {
             std::ostringstream s;
             s << "exterior seed " << to_text(seed)
-              << ": expected further from the points than the tag distance D = " << options.tag_distance
+              << ": expected a position farther from the points than the tag distance D = " << options.tag_distance
               << ", got d = " << d << "; move the seed to the middle of the cavity, or use a smaller tag distance";
             throw Error(Errc::InvalidInput, s.str());
         }
@@ -128,8 +128,8 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 
 std::string BandReport::leak() const {
     return "the points leave gaps wider than the tag distance " + detail::number(tag_distance) +
-           (holding_distance > 0 ? "; it would hold at " + detail::number(holding_distance)
-                                 : "; no tag distance that holds was found");
+           (holding_distance > 0 ? "; a tag distance of " + detail::number(holding_distance) + " would close them"
+                                 : "; no tag distance that closes them was found");
 }
 
 BandResult tag_interior(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {

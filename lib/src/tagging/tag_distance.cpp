@@ -92,7 +92,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
             reason.str({});
             reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores")
                    << " whose largest gap has radius " << verdict.saddle * a << " (inner radius " << verdict.peak * a
-                   << "), seen on a grid of " << a;
+                   << "), found on a grid with cells of " << a;
         }
         const double finer = std::max(h, 0.5 * a);
         const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;

@@ -374,7 +374,7 @@ TEST_CASE("file_set: a lock of another program is waited for, and told; then it 
         cleaned.push_back(line);
     };
     const std::string why = message_of([&] { detail::FolderLock(root, run, std::chrono::milliseconds(1200)); });
-    CHECK(why.find("has had a lock (flock) on this folder for 1 s") != std::string::npos);
+    CHECK(why.find("has held a lock (flock) on this folder for 1 s") != std::string::npos);
     REQUIRE(cleaned.size() == 1);
     CHECK(cleaned.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
     run.log = [&](LogLevel, const std::string&) { cancel = true; };

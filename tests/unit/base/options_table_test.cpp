@@ -121,5 +121,5 @@ TEST_CASE("options without a check of their own so far are refused") {
     edge.intensities = {2, 2};
     edge.edge_k = edge.edge_contrast = 1;
     CHECK(why_invalid(edge) ==
-          "intensities: expected the darker one first\nedge_contrast: expected no `edge_k` beside it");
+          "intensities: expected the darker one first\nedge_contrast: expected no `edge_k` at the same time");
 }

@@ -229,6 +229,6 @@ TEST_CASE("bricks tell of a mark that went astray, as a job in one piece does") 
     solve_all(job, plan, states);
     const std::vector<std::string> warnings = job.join(plan, [&](std::size_t n) { return states[n]; }).report.warnings;
     CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
-        return warning.starts_with("1 of 3001 marks lie apart from all others");
+        return warning.starts_with("1 of 3001 marks lie far from all others");
     }));
 }

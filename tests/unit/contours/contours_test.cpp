@@ -662,7 +662,7 @@ TEST_CASE("a contour that is there twice counts once") {
     REQUIRE(c.solid != nullptr);
     CHECK(c.solid->level({30, 30, 12}) == Approx(-10).margin(0.1));
     REQUIRE(warnings.lines.size() == 1);
-    CHECK(warnings.lines[0].find("5 contours are there twice") != std::string::npos);
+    CHECK(warnings.lines[0].find("5 contours are repeated") != std::string::npos);
 }
 
 TEST_CASE("the slices are across the axis that most marks lie on; lines in other planes are marks") {

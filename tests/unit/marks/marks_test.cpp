@@ -186,7 +186,8 @@ TEST_CASE("What a structure adds to the options of all") {
     options.tag_distance = 6.9;  // the box measures 6.93
     CHECK_NOTHROW(prepare_marks({marks}, lattice(), options));
     options.tag_distance = 7;
-    CHECK_THROWS_WITH(prepare_marks({marks}, lattice(), options), Catch::Contains("`tag_distance`: 7 is more than"));
+    CHECK_THROWS_WITH(prepare_marks({marks}, lattice(), options),
+                      Catch::Contains("`tag_distance`: expected at most") && Catch::Contains(", got 7"));
 }
 
 TEST_CASE("Structures have names of their own") {

@@ -297,7 +297,7 @@ TEST_CASE("what goes wrong in a handler is told to the log alone") {
     for (const char* target : {"/exception", "/number", "/header"}) {
         const Answer answer = site.get(target);
         CHECK(answer.result_int() == 500);
-        CHECK(answer.body() == "This could not be answered.\n");
+        CHECK(answer.body() == "The request failed because of an internal error.\n");
         check_protection(answer);
     }
     CHECK(log.count("/exception: secret detail") == 1);

@@ -113,7 +113,7 @@ TEST_CASE("Too few marks are told, and no surface is left") {
     solver.wait();
     const auto empty = listener.of(1, Stage::Empty);
     REQUIRE(empty.size() == 1);
-    CHECK(empty[0].message == "1 mark more and there is a surface");
+    CHECK(empty[0].message == "1 more mark is needed for a surface");
     CHECK(solver.surface(1) == nullptr);
 }
 

@@ -273,12 +273,12 @@ TEST_CASE("Strokes that would take too long or too much memory are refused, and 
     };
     CHECK_THROWS_WITH(history.apply(stroke(1e4, {{5, 5, 5}})), Catch::Matchers::Contains("too many voxels"));
     CHECK_THROWS_WITH(history.apply(stroke(1e-9, {{5, 5, 5}, {900, 5, 5}})),
-                      Catch::Matchers::Contains("so thin a brush"));
+                      Catch::Matchers::Contains("such a thin brush"));
     CHECK_THROWS_WITH(history.apply(stroke(0, {{5, 5, 5}})), Catch::Matchers::Contains("radius > 0"));
-    CHECK_THROWS_WITH(history.apply(stroke(1, {})), Catch::Matchers::Contains("needs a place"));
+    CHECK_THROWS_WITH(history.apply(stroke(1, {})), Catch::Matchers::Contains("needs at least one position"));
     CHECK_THROWS_WITH(history.apply(stroke(1, {{5, 5, 5000}})), Catch::Matchers::Contains("outside of the image"));
     CHECK_THROWS_WITH(history.apply(act::AddStroke{1, {0, false, 1, 2, 2000, {{5, 5, 5}}}}),
-                      Catch::Matchers::Contains("no slice"));
+                      Catch::Matchers::Contains("does not lie on a slice"));
     (void)history.apply(stroke(3, {{5, 5, 5}}));
     CHECK_THROWS_WITH(history.apply(stroke(3, {{1900, 1900, 1900}})), Catch::Matchers::Contains("268 million voxels"));
     CHECK(history.state().front()->strokes.size() == 1);
@@ -403,15 +403,15 @@ TEST_CASE("Damage before the last line is an error that names the line") {
     CHECK(read(folder.journal()) == text);
     write(folder.journal(), "this is no journal\n");
     CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
-                      Catch::Matchers::Contains("its first line is none"));
+                      Catch::Matchers::Contains("its first line is not that of one"));
     // A last line without a line end is not taken for a truncated line of a journal, and is not removed.
     write(folder.journal(), "somebody's notes");
     CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
-                      Catch::Matchers::Contains("its first line is none"));
+                      Catch::Matchers::Contains("its first line is not that of one"));
     CHECK(read(folder.journal()) == "somebody's notes");
     write(folder.journal(), "{\"covol_study\":1,\"ima");
     CHECK(Study(folder.text(), "stack.tif", image_of()).sequence() == 0);
-    CHECK_THROWS_WITH(read_study_image(folder.text() + "/none"), Catch::Matchers::Contains("there is no study there"));
+    CHECK_THROWS_WITH(read_study_image(folder.text() + "/none"), Catch::Matchers::Contains("it does not exist"));
 }
 
 TEST_CASE("A study says where its image is from its own folder") {

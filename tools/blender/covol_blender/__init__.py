@@ -32,7 +32,7 @@ def is_marks(_, candidate):
 class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
     program: bpy.props.StringProperty(name="Program", subtype="FILE_PATH",
-                                      description="Path of the program covol; empty: the variable COVOL, or as the shell finds it")
+                                      description="Path of the program covol; if empty, the variable COVOL or the search path is used")
 
     def draw(self, _):
         self.layout.prop(self, "program")
@@ -42,14 +42,14 @@ class Settings(bpy.types.PropertyGroup):
     image: bpy.props.StringProperty(name="Image", subtype="FILE_PATH",
                                     description="3D image, of any format that covol reads; empty: the marks are a point cloud")
     marks: bpy.props.PointerProperty(name="Marks", type=bpy.types.Object, poll=is_marks,
-                                     description="An empty whose children are marks, or a mesh whose vertices are")
+                                     description="An empty whose children are the marks, or a mesh whose vertices are the marks")
     space: bpy.props.PointerProperty(name="Space", type=bpy.types.Object,
-                                     description="The object in whose space the image lies, in its own unit, its first voxel at the image's "
-                                     "origin; where it moves, scales and turns, results go with it. Made where there is none")
+                                     description="The object whose coordinate system is that of the image, in the image's unit and with its "
+                                     "origin; results follow when it is moved, scaled or rotated. It is created if there is none")
     scale: bpy.props.FloatProperty(name="Scale", default=0.01, min=1e-9, soft_max=1000,
-                                   description="Blender's units for one unit of the image, of a space that is made")
-    is_lapse: bpy.props.BoolProperty(name="Time-lapse", description="All frames of the image, from Blender's current frame on; the marks are of the "
-                                     "first one")
+                                   description="Blender's units for one unit of the image, for a space that is created")
+    is_lapse: bpy.props.BoolProperty(name="Time-lapse", description="All frames of the image, from Blender's current frame on; the marks belong to "
+                                     "the first one")
     voxel_size: bpy.props.StringProperty(name="Voxel size", description="In the image's unit, or voxels as in 2vx; empty: automatic")
     options: bpy.props.StringProperty(name="Options", description="Further options of covol segment, --model paper for example")
     folder: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", default="//covol",

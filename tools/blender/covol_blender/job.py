@@ -40,7 +40,7 @@ class Job:
         except ValueError as error:
             raise _process.Failed(2, f"further options: {options}: {error}") from None
         if is_lapse and not image:
-            raise _process.Failed(3, "a time-lapse is of an image: choose one")
+            raise _process.Failed(3, "a time-lapse needs an image: choose one")
         found = _process.find_program(program)
         self.is_lapse = is_lapse
         self.folder = pathlib.Path(folder)

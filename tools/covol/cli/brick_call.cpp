@@ -47,15 +47,16 @@ JobOptions job_of_plan(const std::string& folder, const CLI::App& program, const
     const std::string path = plan_file(folder);
     const Json plan = read_plan_file(folder);
     if (!plan.contains("job"))
-        throw Error(Errc::InvalidInput, path + ": expected a plan of covol brick plan, got no job");
+        throw Error(Errc::InvalidInput,
+                    path + ": expected a plan written by covol brick plan, got a file without a job");
     JobOptions job = job_from_json(plan["job"], path);
     if (job.command != "segment" && job.command != "reconstruct")
         throw Error(Errc::InvalidInput, path + ": job: expected segment or reconstruct, got '" + job.command + "'");
     command = program.get_subcommand(job.command);
     for (const auto& [name, values] : job.values)
         if (role_of(option_of_job(*command, name, path)) == OptionRole::Output)
-            throw Error(Errc::Unsupported, path + ": it asks for --" + name +
-                                               ", a file to write: name it behind brick join, a plan does not");
+            throw Error(Errc::Unsupported, path + ": it contains --" + name +
+                                               ", an output, which a plan cannot contain: give it to covol brick join");
     return job;
 }
 
@@ -122,10 +123,10 @@ Json read_plan_file(const std::string& folder) {
     constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 26U;
     try {
         Json plan = read_json(plan_file(folder), kMaxBytes);
-        if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": got no object");
+        if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": expected a JSON object");
         return plan;
     } catch (const Error& error) {
-        throw Error(error.code(), plan_file(folder) + ": expected a plan of covol brick plan: " + error.what());
+        throw Error(error.code(), plan_file(folder) + ": expected a plan written by covol brick plan: " + error.what());
     }
 }
 

@@ -180,7 +180,7 @@ int Session::execute() {
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
         if (threads.possible < threads.wanted)
-            note("on " + std::to_string(threads.possible) + " of " + std::to_string(threads.wanted) +
+            note("using " + std::to_string(threads.possible) + " of " + std::to_string(threads.wanted) +
                  " threads: " + kNoThread);
         if (!guard->watches()) warn(std::string("memory is not watched: ") + kNoThread);
         bodies_.at(command_)();
@@ -256,7 +256,8 @@ std::string Session::memory_text() const {
 }
 
 std::string Session::interrupted_text() const {
-    return outputs_.kept().empty() ? "interrupted, nothing was written" : "interrupted; what was finished before stays";
+    return outputs_.kept().empty() ? "interrupted, nothing was written"
+                                   : "interrupted; outputs that were finished before are kept";
 }
 
 int Session::fail(int code, const std::string& message) {

@@ -98,6 +98,7 @@ public:
     [[nodiscard]] std::optional<std::uint64_t> memory_limit() const;
     /// Of the command that runs.
     [[nodiscard]] RunProvenance& provenance() noexcept { return *provenance_; }
+    [[nodiscard]] const RunProvenance& provenance() const noexcept { return *provenance_; }
     /// The run succeeded, but ends with this exit code.
     void set_exit_code(int code) { exit_code_ = code; }
 

@@ -60,12 +60,13 @@ void check_extent(double extent, const std::string& what, Findings& findings) {
     if (!findings.in_general()) return;
     if (extent > kLargeScene)
         findings.remark(what + " is " + std::to_string(extent) +
-                        " units wide: Blender and Houdini take a unit for a metre and clip it; write meshes with "
+                        " units wide: Blender and Houdini interpret a unit as a metre and clip it; write meshes with "
                         "--unit-scale, or scale the object");
     if (extent > 0 && extent < kSmallScene)
-        findings.remark(what + " is " + std::to_string(extent) +
-                        " units wide: Blender and Houdini take a unit for a metre and show a dot; write meshes with "
-                        "--unit-scale, or scale the object");
+        findings.remark(
+            what + " is " + std::to_string(extent) +
+            " units wide: Blender and Houdini interpret a unit as a metre and show a dot; write meshes with "
+            "--unit-scale, or scale the object");
 }
 
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
@@ -101,18 +102,18 @@ void check_level_set(const std::string& path, const VdbGridInfo& info, const Run
 void check_grid(const std::string& path, const VdbGridInfo& g, const RunContext& run, Findings& findings) {
     const std::string what = "grid '" + g.name + "'";
     if (!is_identifier(g.name))
-        findings.remark(what + ": the name is no identifier: expressions in Houdini and Blender cannot address it");
+        findings.remark(what + ": the name is not an identifier: expressions in Houdini and Blender cannot address it");
     if (!is_float_grid(g)) findings.remark(what + " holds " + g.type + ": covol and mesh tools read float grids only");
     if (g.active_voxels == 0) {
         findings.problem(what + " has no active voxel: nothing is drawn");
         return;
     }
-    if (!g.uniform) findings.problem(what + " has voxels that are no cubes: level-set tools refuse it");
+    if (!g.uniform) findings.problem(what + " has voxels that are not cubes: level-set tools reject it");
     if (!g.metadata.contains("file_bbox_min"))
         findings.remark(what + " has no statistics metadata: viewers must load it to find its box");
     for (const auto& [key, value] : g.metadata)
         if (key == "creator" && value.starts_with("Houdini"))
-            findings.remark(what + ": its creator is Houdini: importers may turn its axes");
+            findings.remark(what + ": its creator is Houdini: importers may rotate its axes");
     FileFacts& facts = findings.facts;
     facts.has_level_set = facts.has_level_set || g.grid_class == "level set";
     facts.has_density = facts.has_density || (g.name == "density" && g.grid_class == "fog volume");
@@ -157,21 +158,21 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     const bool of_chunks = chunks && chunks->read < chunks->total;
     const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of a mapped file, only some slices
     if (of_chunks)
-        findings.remark("of " + std::to_string(chunks->total) + " chunks " + std::to_string(chunks->read) +
-                        " were read: what is wrong with the others is found when they are");
+        findings.remark(std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
+                        " chunks were read: problems of the others are found only when these are read");
     if (range[0] == range[1] && !is_sample)
         findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
-    if (g.unit.empty()) findings.remark("the file names no unit of length: lengths are in its own units");
+    if (g.unit.empty()) findings.remark("the file states no unit of length: lengths are in its own units");
     const auto [minimum, maximum] = std::minmax_element(g.spacing.begin(), g.spacing.end());
     if (*maximum > kFlatVoxels * *minimum)
         findings.remark("voxels are " + std::to_string(*maximum / *minimum) +
                         " times longer along one axis: between the slices the surface is interpolated");
     if (!g.spacing_known)
-        findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
+        findings.remark("the file states no complete spacing: 1 is used for missing values; see --spacing");
     else if (g.spacing == Vec3{1, 1, 1})
-        findings.remark("spacing is 1, 1, 1: the file may not know its own; see --spacing");
+        findings.remark("spacing is 1, 1, 1: this may be a placeholder; see --spacing");
     if (!g.is_axis_aligned())
-        findings.remark("the image is rotated: TIFF cannot keep that, NRRD, NIfTI and MetaImage can");
+        findings.remark("the image is rotated: NRRD, NIfTI and MetaImage can store that, TIFF cannot");
 }
 
 void check_mesh_file(const std::string& path, const RunContext& run, Findings& findings) {
@@ -188,8 +189,8 @@ void check_mesh_file(const std::string& path, const RunContext& run, Findings& f
     if (own > 0 && findings.program() != Program::Print)
         findings.problem("the mesh has " + std::to_string(own) + " self-intersections");
     if (apart && crossings.between > 0)
-        findings.remark("triangles of different pieces meet " + std::to_string(crossings.between) +
-                        " times: solids that touch or overlap; to make one of them, join them by a Boolean union");
+        findings.remark("triangles of different pieces intersect " + std::to_string(crossings.between) +
+                        " times: the solids touch or overlap; join them by a Boolean union if one solid is needed");
     std::vector<Vec3> corners;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) corners.push_back(mesh.place(v));
     const WorldBox box = bounding_box(corners);

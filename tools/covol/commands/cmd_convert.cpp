@@ -77,7 +77,7 @@ struct ConvertJob {
         const double finest = choose_voxel_size(pixels).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
         session.require_memory(bytes_of_grid(pixels.geometry(), h),
-                               "a grid with voxels of " + to_text(h) + " for all of the image");
+                               "a grid with voxels of " + to_text(h) + " for the whole image");
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
         session.report()["image"] = to_json(pixels.geometry());
         session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
@@ -97,7 +97,9 @@ struct ConvertJob {
 
     /// The same voxels in another format.
     void image_to_image(Session& session) const {
-        if (!like.empty()) throw UsageError("--like: expected no image beside one whose voxels stay where they are");
+        if (!like.empty())
+            throw UsageError(
+                "--like: not applicable if an image is converted to an image, because the voxels are not resampled");
         const auto pixels = std::make_shared<const SameVoxels>(image.read(input, session.run()));
         session.report()["image"] = to_json(pixels->geometry());
         session.outputs().add(output, [pixels, this, &session](const std::string& path) {

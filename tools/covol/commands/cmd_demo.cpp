@@ -32,7 +32,7 @@ struct DemoJob {
         const std::string image = (fs::path(folder) / kImage).string(), marks = (fs::path(folder) / kMarks).string();
         session.note("wrote " + image + ", a C. elegans embryo with stained membranes, and " + marks +
                      ", marks on its envelope");
-        session.note("the same without a page: covol segment " + shell_quoted(image) + " --points " +
+        session.note("the same from the command line: covol segment " + shell_quoted(image) + " --points " +
                      shell_quoted(marks) + " --voxel-size 3 -o embryo.vdb --report embryo.html");
         run_mark(session, {image, {"embryo=" + marks}, without_browser, port});
     }
@@ -42,7 +42,7 @@ private:
     void copy_samples(const RunContext& run) const {
         std::error_code failed;
         fs::create_directories(folder, failed);
-        if (failed) throw Error(Errc::Io, folder + ": a folder cannot be made there: " + failed.message());
+        if (failed) throw Error(Errc::Io, folder + ": the folder cannot be created: " + failed.message());
         FileSet files;
         for (const char* const name : kFiles) {
             const fs::path from = folder_of_samples() / name, to = fs::path(folder) / name;
@@ -51,10 +51,9 @@ private:
                             from.string() + ": expected the sample that is installed with covol; install covol again");
             if (fs::exists(fs::symlink_status(to, failed))) {
                 if (fs::is_regular_file(to, failed) && digest_of(to.string()) == digest_of(from.string())) continue;
-                throw Error(Errc::InvalidInput,
-                            to.string() +
-                                ": expected the sample of covol demo, or nothing, got another file; "
-                                "name another folder, as in covol demo FOLDER");
+                throw Error(Errc::InvalidInput, to.string() +
+                                                    ": another file of this name exists already; "
+                                                    "choose another folder, as in covol demo FOLDER");
             }
             files.write(
                 to.string(),

@@ -63,8 +63,8 @@ struct DoctorJob {
         session.print(std::string("covol ") + version() + ", " + build_text());
         if (std::string(version()) != COVOL_VERSION_STRING)
             session.warn(
-                std::string("the program is of version " COVOL_VERSION_STRING ", the library that it found of ") +
-                version() + "; install covol again, and see LD_LIBRARY_PATH");
+                std::string("the program has version " COVOL_VERSION_STRING ", the library that it loaded has ") +
+                version() + "; install covol again, and check LD_LIBRARY_PATH");
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         session.print("program: " + program);
         report = {{"build", build_text()}, {"program", program}};
@@ -84,13 +84,13 @@ private:
         Json list = Json::array();
         for (const ReaderPart& part : check_reader_parts()) {
             if (part.problem.empty())
-                session.print("reader " + part.name + ": there (" + part.formats + ")");
+                session.print("reader " + part.name + ": found (" + part.formats + ")");
             else
                 session.warn("reader " + part.name + " (" + part.formats + "): " + part.problem);
             list.push_back(
                 {{"name", part.name}, {"formats", part.formats}, {"path", part.path}, {"problem", part.problem}});
         }
-        session.print("other formats need no part of their own: TIFF, NIfTI, OME-Zarr, MRC, OpenVDB, meshes, tables");
+        session.print("formats that need no separate reader: TIFF, NIfTI, OME-Zarr, MRC, OpenVDB, meshes, tables");
         return list;
     }
 
@@ -115,10 +115,10 @@ private:
     static Json memory(Session& session) {
         const std::optional<FreeMemory> free = find_free_memory();
         if (!free) {
-            session.print("memory: nobody says what is free");
+            session.print("memory: the free memory is unknown");
             return {{"free_bytes", nullptr}, {"where", ""}};
         }
-        session.print("memory: " + bytes_text(double(free->bytes)) + " free, says " + free->where);
+        session.print("memory: " + bytes_text(double(free->bytes)) + " free, limited by " + free->where);
         return {{"free_bytes", free->bytes}, {"where", free->where}};
     }
 
@@ -128,7 +128,7 @@ private:
         const fs::space_info space = failed ? fs::space_info{0, 0, 0} : fs::space(folder, failed);
         if (failed) {
             session.warn("temporary files: " + folder.string() + ": " + failed.message() +
-                         "; set TMPDIR to a folder that can be written");
+                         "; set TMPDIR to a writable folder");
             return {{"folder", folder.string()}, {"free_bytes", 0}};
         }
         session.print("temporary files: " + folder.string() + ", " + bytes_text(double(space.available)) + " free");
@@ -143,7 +143,7 @@ private:
             session.print(
                 std::string("browser: ") + (opener.empty() ? "no xdg-open, " : "no display, ") +
                 "so covol mark prints its address; from another machine: covol mark IMAGE --no-browser --port "
-                "9000 behind ssh -L 9000:127.0.0.1:9000");
+                "9000 through ssh -L 9000:127.0.0.1:9000");
         else
             session.print("browser: opened by " + opener);
         return {{"opener", opener}, {"display", display}};

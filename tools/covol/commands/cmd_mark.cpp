@@ -141,7 +141,7 @@ struct MarkJob {
         std::optional<BrowserLink> link;
         if (!without_browser) link.emplace(server->url());
         if (!link || !link->open()) std::cout << "open " << server->url() << std::endl;
-        session.note("the study is " + folder + "; every action is on the disk at once. Ctrl-C ends the program.");
+        session.note("the study is " + folder + "; every action is saved immediately. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
         server->stop();
         accept_interrupt();
@@ -218,7 +218,7 @@ private:
     static StudyId structure_of(Study& study, const std::string& flag, const Named& file) {
         const StudyState& all = study.state();
         if (file.name.empty() && all.size() > 1)
-            throw UsageError(flag + ": the study has several structures; say which one this is for, as in " +
+            throw UsageError(flag + ": the study has several structures; state which one this file belongs to, as in " +
                              all.front()->name + "=" + file.value);
         if (file.name.empty() && all.size() == 1) return all.front()->id;
         const std::string name = file.name.empty() ? "structure 1" : file.name;

@@ -43,7 +43,7 @@ Words values_of(const std::string& path, const std::string& name, const Json& va
     const auto is_one = [](const Json& one) { return one.is_string() || one.is_number() || one.is_boolean(); };
     const bool is_list = value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one);
     if (!is_one(value) && !is_list)
-        refuse(path, "its metadata is damaged: expected words or numbers of '" + name + "', got " + value.dump());
+        refuse(path, "its metadata is damaged: expected words or numbers for '" + name + "', got " + value.dump());
     Words words;
     for (const Json& one : is_list ? value : Json::array({value}))
         words.push_back(one.is_string() ? one.get<std::string>() : one.dump());
@@ -87,7 +87,7 @@ Provenance read_provenance(const std::string& path) {
     } catch (const std::out_of_range&) {
         refuse(path, "its metadata is damaged: options are missing in covol_options");
     }
-    if (all.job.command == "rerun") refuse(path, "a rerun made it: repeat the run that it repeated");
+    if (all.job.command == "rerun") refuse(path, "it was made by a rerun: rerun the original result instead");
     return all;
 }
 
@@ -111,8 +111,8 @@ public:
             }
         if (const std::string pattern = placed_frames(value, begin); !pattern.empty()) return pattern;
         if (!names_no_file(value))
-            refuse(source_,
-                   "'" + option + "' names " + value + ", which is none of the inputs that it lists (covol_inputs)");
+            refuse(source_, "'" + option + "' names " + value +
+                                ", which is not among the inputs that the file lists (covol_inputs)");
         return value;
     }
 
@@ -201,7 +201,7 @@ JobOptions job_here(const std::string& path, const JobOptions& given, const CLI:
         }
         if (!placed.empty()) job.values.emplace_back(name, placed);
     }
-    if (!makes_vdb) refuse(path, "the run of '" + given.command + "' that it tells of makes no .vdb");
+    if (!makes_vdb) refuse(path, "the run of '" + given.command + "' in its metadata makes no .vdb");
     return job;
 }
 
@@ -249,11 +249,12 @@ struct RerunJob {
     void run(Session& session) const {
         const Provenance made = read_provenance(path);
         if (made.version != version())
-            session.warn(path + ": covol " + made.version + " wrote it, this is " + version() + ": bits may differ");
+            session.warn(path + ": it was written by covol " + made.version + ", this is " + version() +
+                         ": results may differ");
         if (made.instruction_set != instruction_set())
             session.warn(path + ": it was made with " + made.instruction_set + ", this processor has " +
                          instruction_set() + ": values may differ by 1e-4 voxels (COVOL_SIMD=" + made.instruction_set +
-                         " chooses another where the processor has it)");
+                         " selects that one if the processor supports it)");
         std::vector<std::string> places = folders;
         const fs::path own = fs::path(path).parent_path();
         for (const fs::path& folder : {own.empty() ? fs::path(".") : own, fs::path(".")})
@@ -274,7 +275,7 @@ struct RerunJob {
         const Stopwatch watch;
         const int code = run_this_program(words, session.run());
         if (code != kDone)
-            throw Error(Errc::InvalidInput, path + ": its run ends with exit code " + std::to_string(code) + " now");
+            throw Error(Errc::InvalidInput, path + ": the repeated run ended with exit code " + std::to_string(code));
         session.add_seconds("run", watch.seconds());
         const std::string again = result_in(*scratch);
         report(again, session);
@@ -304,7 +305,7 @@ private:
         for (const fs::path& file : made)
             if (file.filename() == fs::path(path).filename()) return file.string();
         if (made.size() != 1)
-            refuse(path, "its run makes " + std::to_string(made.size()) + " .vdb files, none of this name");
+            refuse(path, "its run makes " + std::to_string(made.size()) + " .vdb files, none with this name");
         return made.front().string();
     }
 
@@ -325,10 +326,10 @@ private:
             session.print(safe_text(info.name) + ": " +
                           (found.same_layout ? std::to_string(found.voxels) + " voxels differ, by up to " +
                                                    std::to_string(found.largest)
-                                             : "other voxels are active than before"));
+                                             : "the sets of active voxels differ"));
         }
         facts["same"] = same;
-        if (same) return session.print("the same bits: " + std::to_string(voxels) + " active voxels");
+        if (same) return session.print("bit-identical: " + std::to_string(voxels) + " active voxels");
         session.set_exit_code(kBadInput);
     }
 };

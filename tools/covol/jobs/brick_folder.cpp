@@ -112,11 +112,11 @@ Domain domain_of_plan(const Json& json) {
     const Domain domain{real(json, "voxel_size"), place_of(json, "origin"), index_of(json, "min"),
                         index_of(json, "max")};
     for (int a = 0; a < 3; ++a)
-        if (domain.min[a] > domain.max[a]) throw std::out_of_range("min: expected voxels up to max, got none");
+        if (domain.min[a] > domain.max[a]) throw std::out_of_range("min: expected at most max");
     const Domain same = covering(domain, domain.world_box());
     if (same.min != domain.min || same.max != domain.max)
-        throw std::out_of_range("origin: expected one that " + std::to_string(domain.voxel_size) +
-                                " is not too small for");
+        throw std::out_of_range("origin: expected a position that is not too far from 0 for voxels of " +
+                                std::to_string(domain.voxel_size));
     return domain;
 }
 
@@ -150,7 +150,8 @@ BrickFacts read_facts(const std::string& path) {
         if (json.contains("stop_reason")) facts.stop_reason = json["stop_reason"].get<std::string>();
         return facts;
     } catch (const std::exception& error) {
-        throw Error(Errc::InvalidInput, path + ": expected what covol brick run says of a brick: " + error.what());
+        throw Error(Errc::InvalidInput,
+                    path + ": expected the state of a brick, written by covol brick run: " + error.what());
     }
 }
 
@@ -170,9 +171,9 @@ void check_inputs(const Json& plan, const std::string& path) {
         const std::uintmax_t bytes = bytes_of(name, status);
         if (status)
             throw Error(Errc::Io, name + ": cannot read; " + path +
-                                      " was planned with it: run covol brick where the plan was made");
+                                      " refers to it: run covol brick in the folder in which the plan was made");
         if (bytes != whole<std::uintmax_t>(input, "bytes", 0, std::numeric_limits<std::int64_t>::max()))
-            throw Error(Errc::InvalidInput, name + ": has another size than when " + path + " was made: plan again");
+            throw Error(Errc::InvalidInput, name + ": its size has changed since " + path + " was made: plan again");
     }
 }
 
@@ -226,9 +227,9 @@ BrickPlan BrickFolder::read_plan() const {
         if (const std::string why = why_invalid(plan.edge); !why.empty()) throw std::out_of_range(why);
     } catch (const Error& error) {
         if (error.code() == Errc::Io) throw;
-        throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
+        throw Error(Errc::InvalidInput, file + ": expected a plan written by covol brick plan: " + error.what());
     } catch (const std::exception& error) {
-        throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
+        throw Error(Errc::InvalidInput, file + ": expected a plan written by covol brick plan: " + error.what());
     }
     if (const std::string why = why_invalid(plan.options); !why.empty())
         throw Error(Errc::InvalidInput, file + ": " + why);

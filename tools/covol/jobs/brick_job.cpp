@@ -143,7 +143,7 @@ bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& s
     const auto refuse = [&](double bytes, const std::string& what) {
         throw Error(Errc::InvalidOptions, "bricks: " + what + " of a band of " + about_voxels(plan.active_voxels()) +
                                               " takes about " + bytes_text(bytes) + ", more than the " +
-                                              bytes_text(limit) + " of --memory-limit, or that are free");
+                                              bytes_text(limit) + " that are free or allowed by --memory-limit");
     };
     if (memory_of_joined(voxels) > limit)
         refuse(memory_of_joined(voxels), "the joined level set (covol brick can join it on another machine)");
@@ -203,7 +203,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
     const BrickCall& call = *session.brick();
     std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
     if (is_timelapse(job) || structures.size() != 1)
-        throw UsageError("brick: expected one structure in one image; plan each by itself");
+        throw UsageError("brick: expected one structure in one image; plan each separately");
     const BrickFolder folder(call.folder);
     if (call.step == BrickCall::Step::Join)
         return run_structures(
@@ -222,7 +222,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
             make_job(image, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
         folder.write_plan(plan, session.job(), session.provenance().inputs(), {});
         if (const std::string outputs = outputs_of_join(session); !outputs.empty())
-            session.note("the plan keeps settings and inputs alone; name what is to be written behind brick join: " +
+            session.note("the plan contains only settings and inputs; give the outputs to covol brick join: " +
                          outputs);
         return print_plan(plan, session);
     }
@@ -269,10 +269,9 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         return in_one();
     }
     if (run.checkpoints)
-        throw Error(
-            Errc::InvalidOptions,
-            "--checkpoint: the band is larger than --memory-limit allows at once, and bricks keep states of their "
-            "own: see covol brick");
+        throw Error(Errc::InvalidOptions,
+                    "--checkpoint: the band is larger than --memory-limit allows at once, and bricks store their own "
+                    "states: see covol brick");
     (void)streams_mesh(job, plan, session);  // to fail before the computation rather than after it
     run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");

@@ -36,8 +36,8 @@ Json page_facts(const Session& session) {
 void write_page(const std::string& path, const ReportPage& page, Session& session) {
     if (page.image != nullptr && shear_of(page.image->geometry()) > 0) {
         session.run().warn(
-            "the image's axes are sheared, and the page draws slices of perpendicular ones alone: it is "
-            "without slices");
+            "the image's axes are sheared, and the page can show slices of images with perpendicular axes only: "
+            "it has no slices");
         ReportPage bare = page;
         bare.image = nullptr;
         return write_page(path, bare, session);

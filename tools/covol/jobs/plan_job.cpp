@@ -172,8 +172,8 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     const std::vector<Vec3> given = positions_of(marks, geometry);
     if (given.empty())
         throw Error(Errc::InvalidInput,
-                    "plan: expected points or contours, got none: how far a surface moves that starts without marks "
-                    "is not known before");
+                    "plan: expected points or contours, got none: how far the surface moves cannot be predicted "
+                    "without marks");
     const double h = given_h > 0 ? given_h : job.resolve_voxel_size(nullptr, marks, geometry, session);
     const double coarse = std::max(h, longest_side(bounding_box(given)) / kPilotVoxels);
     const Pilot coarser = run_pilot(job, marks, geometry, 2 * coarse, quiet);
@@ -209,7 +209,8 @@ std::string size_text(const Index3& n) {
 }  // namespace
 
 void run_plan(const SegmentJob& job, Session& session) {
-    if (is_timelapse(job)) throw UsageError("plan: expected one image and one frame: every frame takes what one does");
+    if (is_timelapse(job))
+        throw UsageError("plan: expected one image and one frame: every frame needs as much as a single one");
     job.check_options();
     RunContext quiet = session.run();
     quiet.log = {};
@@ -271,7 +272,7 @@ void run_plan(const SegmentJob& job, Session& session) {
                   (held > 0 ? ", of which the image takes " + bytes_text(held) : "") +
                   (mapped > 0 ? ", of which " + bytes_text(mapped) + " are pages of the image's file" : ""));
     std::ostringstream time;
-    time << "time: about " << std::setprecision(2) << seconds << " s on this machine, without reading a packed image";
+    time << "time: about " << std::setprecision(2) << seconds << " s on this machine, without decompressing an image";
     session.print(time.str());
     session.report()["plan"] = plan;
 }

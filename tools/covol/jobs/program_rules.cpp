@@ -42,7 +42,9 @@ bool is_other_unit(const FileFacts& f) { return millimetres(f) > 0 && millimetre
 std::string wide(const FileFacts& f) {
     return "it is " + number(f.extent) + " units wide, and a unit is a metre there";
 }
-std::string other_unit(const FileFacts& f) { return "its coordinates are in " + f.unit + ", which are taken for mm"; }
+std::string other_unit(const FileFacts& f) {
+    return "its coordinates are in " + f.unit + ", which are interpreted as mm";
+}
 
 using Facts = const FileFacts&;
 using Text = std::string;
@@ -72,11 +74,11 @@ const std::vector<Rule>& rules() {
          },
          [](Facts) -> Text { return "import the mesh (--mesh OUT.ply), or move the object back"; }},
         {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.has_blosc; },
-         [](Facts) -> Text { return "it is packed by Blosc: builds without it do not open the file"; },
+         [](Facts) -> Text { return "it is compressed with Blosc: builds without Blosc cannot open the file"; },
          [](Facts) -> Text { return "--compression none, or covol convert IN.vdb OUT.vdb --compression none"; }},
         {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.extent > kFarClip; }, wide,
          [](Facts f) -> Text {
-             return "scale the object by " + number(1 / f.extent) + ", or End of the view's clipping beyond it";
+             return "scale the object by " + number(1 / f.extent) + ", or increase Clip End of the view";
          }},
         {Program::Blender, kRemark, [](Facts f) { return is_mesh(f) && f.extent > kFarClip; },
          [](Facts f) -> Text { return wide(f) + ": the view clips it"; },
@@ -94,17 +96,18 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "its importer drops normals: triangles are flat"; },
          [](Facts) -> Text { return "Object > Shade Smooth, or --mesh OUT.glb"; }},
         {Program::Blender, kRemark, [](Facts f) { return f.ending == ".glb"; },
-         [](Facts) -> Text { return "the importer of Blender 3.4 fails beside numpy 1.24 and later, as in Debian 12"; },
+         [](Facts) -> Text { return "the importer of Blender 3.4 fails with numpy 1.24 and later, as in Debian 12"; },
          [](Facts) -> Text { return "'import numpy; numpy.bool = bool' in its console first, or --mesh OUT.ply"; }},
         {Program::Blender, kProblem, [](Facts f) { return f.ending == ".off"; },
          [](Facts) -> Text { return "it has no importer of .off"; },
          [](Facts) -> Text { return "covol convert IN.off OUT.glb"; }},
-        {Program::Blender, kProblem, is_image, [](Facts) -> Text { return "it opens no stack as a volume"; },
+        {Program::Blender, kProblem, is_image,
+         [](Facts) -> Text { return "it cannot open an image stack as a volume"; },
          [](Facts) -> Text { return "covol convert IMAGE OUT.vdb"; }},
 
         {Program::Houdini, kRemark, [](Facts f) { return is_vdb(f) && f.has_blosc; },
          [](Facts) -> Text {
-             return "it is packed by Blosc: a host with another Blosc than its OpenVDB has may crash";
+             return "it is compressed with Blosc: a host whose Blosc differs from that of its OpenVDB may crash";
          },
          [](Facts) -> Text { return "--compression none, or covol convert IN.vdb OUT.vdb --compression none"; }},
         {Program::Houdini, kRemark, is_vdb,
@@ -117,7 +120,8 @@ const std::vector<Rule>& rules() {
          [](Facts f) -> Text {
              return is_mesh(f) ? "--unit-scale " + number(1 / f.extent) : "scale it by " + number(1 / f.extent);
          }},
-        {Program::Houdini, kProblem, is_image, [](Facts) -> Text { return "it opens no stack as a volume"; },
+        {Program::Houdini, kProblem, is_image,
+         [](Facts) -> Text { return "it cannot open an image stack as a volume"; },
          [](Facts) -> Text { return "covol convert IMAGE OUT.vdb"; }},
 
         {Program::Slicer, kProblem, is_vdb, [](Facts) -> Text { return "it does not open .vdb"; },
@@ -132,14 +136,16 @@ const std::vector<Rule>& rules() {
          [](Facts f) -> Text { return "--unit-scale " + number(millimetres(f)) + ", and the image in mm as well"; }},
         {Program::Slicer, kRemark, is_mesh,
          [](Facts) -> Text {
-             return "models are LPS since version 4.11; older ones take them for RAS, turned half round";
+             return "models are LPS since version 4.11; older ones interpret them as RAS, rotated by 180 degrees";
          },
          [](Facts) -> Text { return "choose LPS in the dialog Add Data, or harden a transform of -1, -1, 1"; }},
         {Program::Slicer, kRemark, [](Facts f) { return is_image(f) && is_other_unit(f); },
          [](Facts f) -> Text { return "lengths are in " + f.unit + ", and shown as mm"; },
          [](Facts) -> Text { return "read its numbers as that unit, or --spacing in mm"; }},
         {Program::Slicer, kProblem, [](Facts f) { return f.ending == ".seg.nrrd" && !f.has_segments; },
-         [](Facts) -> Text { return "no Segment0_ID and the others: the segments have no names and colours"; },
+         [](Facts) -> Text {
+             return "Segment0_ID and the other fields are missing: the segments have no names and colours";
+         },
          [](Facts) -> Text { return "covol mask IN.vdb --like IMAGE -o OUT.seg.nrrd"; }},
         {Program::Slicer, kProblem, is_tiff,
          [](Facts) -> Text { return "it reads neither spacing nor origin of TIFF: slices are 1 mm apart"; },
@@ -152,7 +158,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "write .nrrd or .nii.gz"; }},
         {Program::Slicer, kProblem, [](Facts f) { return is_image(f) && !f.has_spacing; },
          [](Facts) -> Text { return "without spacing voxels are cubes of 1 mm"; },
-         [](Facts) -> Text { return "--spacing SX,SY,SZ where it is read, and write .nrrd"; }},
+         [](Facts) -> Text { return "--spacing SX,SY,SZ when it is read, and write .nrrd"; }},
 
         {Program::Fiji, kProblem, is_vdb, [](Facts) -> Text { return "it does not open .vdb"; },
          [](Facts) -> Text { return "covol mask IN.vdb --like IMAGE -o OUT.tif, or covol convert IN.vdb OUT.tif"; }},
@@ -166,19 +172,19 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "labels without min and max are shown on the whole range of the type: black"; },
          [](Facts) -> Text { return "Image > Adjust > Brightness/Contrast > Auto, or write it by covol mask"; }},
         {Program::Fiji, kRemark, [](Facts f) { return f.is_big_tiff; },
-         [](Facts) -> Text { return "BigTIFF does not open by dropping it"; },
+         [](Facts) -> Text { return "BigTIFF cannot be opened by drag and drop"; },
          [](Facts) -> Text { return "File > Import > Bio-Formats"; }},
         {Program::Fiji, kRemark,
          [](Facts f) {
              return ends_in(f, {".ome.tif", ".ome.tiff"});
          },
-         [](Facts) -> Text { return "its own reader of TIFF passes OME's unit and spacing over"; },
+         [](Facts) -> Text { return "its own TIFF reader ignores OME's unit and spacing"; },
          [](Facts) -> Text { return "File > Import > Bio-Formats, or write .tif"; }},
         {Program::Fiji, kRemark, [](Facts f) { return is_image(f) && f.unit.empty(); },
          [](Facts) -> Text { return "no unit is stated: lengths are in pixels"; },
          [](Facts) -> Text { return "Image > Properties"; }},
         {Program::Fiji, kRemark, [](Facts f) { return is_image(f) && f.is_rotated; },
-         [](Facts) -> Text { return "the image is rotated, which is not kept there: points come back in voxels"; },
+         [](Facts) -> Text { return "the rotation of the image is lost there: points come back in voxels"; },
          [](Facts) -> Text { return "--points-space index"; }},
         {Program::Fiji, kProblem,
          [](Facts f) {
@@ -188,23 +194,21 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "covol mask -o OUT.tif; images by a plugin for their format"; }},
 
         {Program::Print, kProblem, [](Facts f) { return !is_mesh(f); },
-         [](Facts) -> Text { return "slicers take meshes"; },
+         [](Facts) -> Text { return "slicers require meshes"; },
          [](Facts) -> Text { return "covol mesh IN.vdb -o OUT.stl"; }},
         {Program::Print, kProblem, [](Facts f) { return is_mesh(f) && !f.is_closed; },
          [](Facts) -> Text { return "it is open: a slicer does not know what is inside"; },
-         [](Facts) -> Text { return "--repair, or --holes close where a cloud has holes"; }},
+         [](Facts) -> Text { return "--repair, or --holes close if a cloud has holes"; }},
         {Program::Print, kProblem, [](Facts f) { return is_mesh(f) && f.crossings > 0; },
-         [](Facts f) -> Text { return number(f.crossings) + " triangles cut each other"; },
+         [](Facts f) -> Text { return number(f.crossings) + " triangles intersect each other"; },
          [](Facts) -> Text { return "covol mesh --repair"; }},
         {Program::Print, kProblem, [](Facts f) { return is_mesh(f) && is_other_unit(f); }, other_unit,
-         [](Facts f) -> Text {
-             return "--unit-scale " + number(millimetres(f)) + ", times the size that it shall have";
-         }},
+         [](Facts f) -> Text { return "--unit-scale " + number(millimetres(f)) + ", times the desired enlargement"; }},
         {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && millimetres(f) == 0; },
-         [](Facts) -> Text { return "no unit is stated: lengths are taken for mm"; },
-         [](Facts) -> Text { return "--unit-scale F makes them so"; }},
+         [](Facts) -> Text { return "no unit is stated: lengths are interpreted as mm"; },
+         [](Facts) -> Text { return "--unit-scale F converts them to mm"; }},
         {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && (f.extent > kPrintBed || f.extent < kSmallPart); },
-         [](Facts f) -> Text { return "it is " + number(f.extent) + " mm wide as it stands"; },
+         [](Facts f) -> Text { return "it is " + number(f.extent) + " mm wide at its present size"; },
          [](Facts f) -> Text { return "--unit-scale " + number(100 / f.extent) + " makes it 100 mm"; }},
         {Program::Print, kRemark, [](Facts f) { return is_mesh(f) && f.wall >= 0 && f.wall < kNozzle; },
          [](Facts f) -> Text {

@@ -66,7 +66,7 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
         if (given.has(name)) flags += (flags.empty() ? "" : ", ") + flag_of(name);
     if (flags.empty()) return {};
     return flags +
-           " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
+           " had no effect: marks and image hold the surface at the guess, so there was no flow; --model paper has one";
 }
 
 void SegmentJob::sort_output(bool with_image) {
@@ -76,7 +76,7 @@ void SegmentJob::sort_output(bool with_image) {
     std::string& alone = is_mask ? mask_path : mesh_path;
     if (!alone.empty())
         throw UsageError("-o " + output + " and " + (is_mask ? "--mask " : "--mesh ") + alone +
-                         ": expected one of them; -o OUT.vdb goes with the others");
+                         ": expected only one of them; -o OUT.vdb can be combined with the others");
     alone = std::exchange(output, "");
 }
 
@@ -268,8 +268,8 @@ void SegmentJob::run(Session& session) const {
     if (session.is_planning()) return run_plan(*this, session);
     if (checkpoint.given() && (session.brick() || is_timelapse(*this)))
         throw UsageError(
-            "--checkpoint, --resume: bricks and the frames of a time-lapse are put in place one by one, and gone on "
-            "with");
+            "--checkpoint, --resume: not applicable to bricks and time-lapses, which are written one by one and "
+            "continued from there");
     if (session.brick()) return run_bricks(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);
     checkpoint.begin(session);

@@ -103,7 +103,7 @@ void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const
     std::ostringstream rounded;
     rounded << std::setprecision(2) << *ratio;
     run.warn("the marks lie inside the image, but with `points_space = index` they would lie where its edges are " +
-             rounded.str() + " times as strong: is it that they are voxels, not world units?");
+             rounded.str() + " times as strong: perhaps they are voxels, not world units");
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ std::string find_opener() {
 
 BrowserLink::BrowserLink(const std::string& url) {
     std::string name = (std::filesystem::temp_directory_path() / "covol-open-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw Error(Errc::Io, "mark: no folder can be made in " + name);
+    if (::mkdtemp(name.data()) == nullptr) throw Error(Errc::Io, "mark: cannot create the folder " + name);
     folder_ = name;
     std::ofstream page(folder_ / "open.html");
     page << "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\"><title>covol "

@@ -60,7 +60,7 @@ Export make_export(const std::string& format, const StudyState& wanted,
     static constexpr std::array kFormats{"mask.nii.gz", "mask.nrrd",   "mask.tif", "mesh.ply",
                                          "mesh.stl",    "surface.vdb", "table.csv"};
     if (std::find(kFormats.begin(), kFormats.end(), format) == kFormats.end())
-        throw Error(Errc::InvalidInput, "'format': there is no such one");
+        throw Error(Errc::InvalidInput, "'format': unknown value");
     StructuresResult all = results();
     const auto is_wanted = [&](const StructureResult& result) {
         return std::any_of(wanted.begin(), wanted.end(),

@@ -33,7 +33,7 @@ void require_ending(const std::string& ending, const std::array<const char*, N>&
     std::string list;
     for (const char* one : known) list += (list.empty() ? "" : ", ") + std::string(one);
     throw Error(Errc::InvalidInput, "import: expected a file whose name ends in one of " + list +
-                                        "; other kinds are named on the command line");
+                                        "; give files of other kinds on the command line");
 }
 
 std::uintmax_t bytes_in(const std::filesystem::path& folder) {
@@ -88,13 +88,14 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
     const std::size_t maximum = is_marks ? kMaxMarksBytes : kMaxFileBytes;
     if (bytes.size() > maximum)
         throw Error(Errc::InvalidInput, "import: expected at most " + std::to_string(maximum >> 20) +
-                                            " MiB; larger files are named on the command line");
+                                            " MiB; give larger files on the command line");
     const std::filesystem::path into = std::filesystem::path(folder) / kFolder;
     std::error_code failed;
     std::filesystem::create_directories(into, failed);
-    if (failed) throw Error(Errc::Io, "import: " + into.string() + ": cannot be made (" + failed.message() + ")");
+    if (failed) throw Error(Errc::Io, "import: " + into.string() + ": cannot be created (" + failed.message() + ")");
     if (bytes_in(into) + bytes.size() > kMaxFolderBytes)
-        throw Error(Errc::InvalidInput, "import: " + into.string() + ": holds 4 GiB; remove what no structure needs");
+        throw Error(Errc::InvalidInput,
+                    "import: " + into.string() + ": contains 4 GiB already; remove files that no structure uses");
     const std::string digest = digest_of_bytes(bytes);
     const std::filesystem::path path = into / (digest.substr(digest.find(':') + 1) + ending);
     // The file has been imported before, perhaps for another structure; it is not replaced.
@@ -110,7 +111,7 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
     if (!out) throw Error(Errc::Io, "import: " + path.string() + ": cannot be written");
     // Data from a page must not cause the program to read other files.
     if (!is_marks && kind_of_file(path.string()) == FileKind::Image && !list_image_files(path.string(), run).empty())
-        throw Error(Errc::InvalidInput, "import: expected an image in one file; this one names others");
+        throw Error(Errc::InvalidInput, "import: expected an image in one file; this one refers to others");
     return file;
 }
 
@@ -119,9 +120,9 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
     const KindedPoints given = read_kinded_points(file);
     const PointCloud& cloud = given.cloud;
     if (cloud.points.size() > kMaxImported)
-        throw Error(Errc::InvalidInput, "import: " + file + ": holds " + std::to_string(cloud.points.size()) +
-                                            " marks, a study takes " + std::to_string(kMaxImported) +
-                                            " of a file; covol segment --points takes all");
+        throw Error(Errc::InvalidInput, "import: " + file + ": contains " + std::to_string(cloud.points.size()) +
+                                            " marks, a study accepts at most " + std::to_string(kMaxImported) +
+                                            " from a file; covol segment --points uses all");
     check_inside(cloud, image, run);
     const std::vector<Vec3> world = to_world(cloud, image);
     StudyActions::AddMarks action{structure, MarkKind::Surface, {}};

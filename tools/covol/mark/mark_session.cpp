@@ -213,7 +213,7 @@ void MarkSession::act(serve::Client client, std::string_view text) {
             return suggest(client, requested["structure"].get<StudyId>());
     }
     const KeyedAction action = parse_study_action(text);
-    if (names_file(action.action)) throw Error(Errc::InvalidInput, "study: a page names no files");
+    if (names_file(action.action)) throw Error(Errc::InvalidInput, "study: a page cannot name files");
     const std::lock_guard lock(mutex_);
     const Study::Applied applied = apply(action);
     Json answer{{"done", action.key}, {"seq", study_.sequence()}};
@@ -306,7 +306,7 @@ serve::Response MarkSession::post(const serve::Request& request, const std::stri
         const auto text = [&](const char* name) {
             const auto found = request.query.find(name);
             if (found == request.query.end())
-                throw Error(Errc::InvalidInput, std::string("'") + name + "': expected one");
+                throw Error(Errc::InvalidInput, std::string("'") + name + "': expected a value, got none");
             return found->second;
         };
         const std::string key = text("key");
@@ -345,7 +345,7 @@ serve::Response MarkSession::mesh(const serve::Request& request) const {
         const auto found = solved_.find(id);
         if (found != solved_.end() && std::int64_t(found->second.version) == version) surface = mesh_of(found->second);
     }
-    if (!surface) return refused(404, "a newer surface takes its place");
+    if (!surface) return refused(404, "it was replaced by a newer surface");
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = make_page_mesh(*surface);
@@ -377,7 +377,7 @@ StructuresResult MarkSession::results() {
 
 serve::Response MarkSession::download(const serve::Request& request) {
     const auto format = request.query.find("format");
-    if (format == request.query.end()) throw Error(Errc::InvalidInput, "'format': expected one");
+    if (format == request.query.end()) throw Error(Errc::InvalidInput, "'format': expected a value, got none");
     StudyState state;
     {
         const std::lock_guard lock(mutex_);

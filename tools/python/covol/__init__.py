@@ -354,7 +354,7 @@ def _save_result(self, path):
 
 Result.report = _once(_result_report)
 Result.mask = _once(_result_mask)
-Result.warnings = property(lambda self: self.report["warnings"], doc="What a person has to look at, in plain words.")
+Result.warnings = property(lambda self: self.report["warnings"], doc="Warnings: what should be checked by eye, as texts.")
 Result.suggest = suggest
 Result.save = _save_result
 Result.__repr__ = lambda self: "<covol.Result: volume {volume:.5g}, area {area:.5g}>".format(**self.report["surface"])

@@ -15,7 +15,7 @@ from ._program import PROGRAM, Folder, read_json, run as run_program  # noqa: F4
 from ._values import Call, Image, LevelSet, Mesh, Points, list_options  # noqa: F401
 from ._version import __version__  # noqa: F401
 
-_WITHOUT = "%s: the package that runs the program covol does not have this; %s"
+_WITHOUT = "%s: not available in this package, which runs the program covol; %s"
 
 
 class Result:
@@ -45,7 +45,7 @@ class Result:
 
     def _mask(self, call):
         if self.image is None:
-            raise Error("mask: expected an image to lay it on, got points alone", "invalid_input")
+            raise Error("mask: expected an image, got points alone", "invalid_input")
         voxels = _files.read_nrrd(self._folder.file("mask.nrrd"))
         return voxels if not self.name else (voxels == self.label).astype(np.uint8)
 
@@ -175,7 +175,7 @@ def label_image(results, call):
     """The number of the result at each voxel, from 1; 0 outside of all."""
     first = results[0]
     if first.image is None:
-        raise Error("mask: expected an image to lay it on, got points alone", "invalid_input")
+        raise Error("mask: expected an image, got points alone", "invalid_input")
     voxels = _files.read_nrrd(first._folder.file("mask.nrrd"))
     numbers = np.zeros(max(256, int(voxels.max()) + 1), np.uint8)
     for n, result in enumerate(results):

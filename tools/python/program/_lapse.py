@@ -29,13 +29,13 @@ class Frames:
         for own in structures.values():
             for kind in _ALONE:
                 if own[kind] is not None and len(own[kind]):
-                    raise Error(f"{kind}: the package that runs the program takes points and contours alone for a time-lapse", "unsupported", kind)
+                    raise Error(f"{kind}: for a time-lapse, this package, which runs the program covol, accepts only points and contours", "unsupported", kind)
         flags = _values.flags_of("timelapse", options)
         number = len(self._frames)
         for n, own in enumerate(structures.values()):
             for kind in ("points", "contours"):
                 if number > 0 and len(own[kind]) > len(list(self._frames[0]["structures"].values())[n][kind]):
-                    raise Error(f"{kind}: expected marks of no more files than the first frame has", "unsupported", kind)
+                    raise Error(f"{kind}: expected at most as many files of marks as for the first frame", "unsupported", kind)
         path = image._path(self.folder, f"frame_{number}.nrrd")
         self._frames.append({"path": path, "image": image, "structures": structures, "call": call,
                              "flags": [*flags, *([] if start is None else [f"--init={start}"])]})

@@ -140,18 +140,17 @@ py::tuple make_test_shape(const std::string& kind, int size, int points, double 
 }  // namespace
 
 void add_image(py::module_& module) {
-    py::class_<Image>(module, "Image",
-                      "A 3D image and where it lies: Image(array, spacing=, origin=, direction=, unit=), as segment() "
-                      "takes them. The "
-                      "array is not copied where it need not be. Raises Error.")
+    py::class_<Image>(
+        module, "Image",
+        "A 3D image with its geometry: Image(array, spacing=, origin=, direction=, unit=), as for segment(). "
+        "The array is copied only if necessary. Raises Error.")
         .def(py::init([](const py::object& array, const py::object& spacing, const py::object& origin,
                          const py::object& direction, const std::string& unit) {
                  return to_image(array, make_geometry(spacing, origin, direction, unit));
              }),
              py::arg("array"), py::kw_only(), py::arg("spacing") = py::none(), py::arg("origin") = py::none(),
              py::arg("direction") = py::none(), py::arg("unit") = "")
-        .def_property_readonly("array", voxels_of,
-                               "(nz, ny, nx), read-only; the very memory of the image where it lies in memory.")
+        .def_property_readonly("array", voxels_of, "(nz, ny, nx), read-only; a view of the image if it is in memory.")
         .def(
             "__array__",
             [](const Image& image, const py::object& dtype) {
@@ -167,23 +166,23 @@ void add_image(py::module_& module) {
                 const std::string name = to_string(image.pixel_type());
                 return py::dtype(name == "float" ? "float32" : name == "double" ? "float64" : name);
             },
-            "Of the voxels.")
+            "Type of the voxels.")
         .def_property_readonly(
             "spacing", [](const Image& image) { return from_vec3(image.geometry().spacing); },
-            "(x, y, z), world units.")
+            "Spacing along (x, y, z) in world units.")
         .def_property_readonly(
             "origin", [](const Image& image) { return from_vec3(image.geometry().origin); },
-            "(x, y, z) of the centre of voxel 0, world units.")
+            "Position (x, y, z) of the centre of voxel 0 in world units.")
         .def_property_readonly(
             "direction", [](const Image& image) { return from_matrix(image.geometry().direction); },
             "3 x 3; its columns are the axes of i, j, k.")
         .def_property_readonly(
             "unit", [](const Image& image) { return image.geometry().unit; },
-            "Of the world, 'um' say; empty where nothing says it.")
+            "Unit of the world, for example 'um'; empty if it is not stated.")
         .def_property_readonly(
             "spacing_known", [](const Image& image) { return image.geometry().spacing_known; },
-            "False where a file states no spacing, and 1 stands in for it.")
-        .def_property_readonly("path", &Image::path, "Of the file; empty for an image in memory.")
+            "False along axes for which the file states no spacing, so that 1 is used.")
+        .def_property_readonly("path", &Image::path, "Path of the file; empty for an image in memory.")
         .def(
             "index_to_world",
             [](const Image& image, const py::object& zyx) {
@@ -208,7 +207,7 @@ void add_image(py::module_& module) {
 }
 
 void add_points(py::module_& module) {
-    py::class_<PointCloud>(module, "Points", "Marks or a cloud, as a file gives them: see read_points().")
+    py::class_<PointCloud>(module, "Points", "Marks or a cloud, as they are stored in a file: see read_points().")
         .def(py::init(&make_points))
         .def("__len__", [](const PointCloud& cloud) { return cloud.points.size(); })
         .def_property_readonly(
@@ -227,7 +226,7 @@ void add_points(py::module_& module) {
                 if (cloud.normals.empty()) return py::none();
                 return from_positions(cloud.normals);
             },
-            "(n, 3), unit vectors, 0 where there is none; None without normals.")
+            "(n, 3), unit vectors, 0 for points without one; None without normals.")
         .def_property_readonly(
             "lines",
             [](const PointCloud& cloud) {
@@ -239,21 +238,22 @@ void add_points(py::module_& module) {
                 }
                 return all;
             },
-            "Of contours: a list of arrays (n, 3).")
+            "Points of each contour: a list of arrays (n, 3).")
         .def_property_readonly(
             "space",
             [](const PointCloud& cloud) {
                 return cloud.space == PointSpace::Slices ? "slices" : to_string(cloud.space);
             },
             "'world', 'index', 'local' or 'slices'.")
-        .def_readonly("rule", &PointCloud::rule, "How the coordinates were understood.")
+        .def_readonly("rule", &PointCloud::rule, "How the coordinates were interpreted.")
         .def_readonly("source", &PointCloud::source, "The file.")
         .def(
             "to_world",
             [](const PointCloud& cloud, const Image* image) {
                 return from_positions(image != nullptr ? to_world(cloud, image->geometry()) : to_world(cloud));
             },
-            py::arg("image") = nullptr, "(n, 3), x, y, z in the world; those in voxels need the image. Raises Error.");
+            py::arg("image") = nullptr,
+            "(n, 3), x, y, z in the world; positions in voxels require the image. Raises Error.");
     module.def("read_points", [](const std::string& path, const py::object& space, const py::object& order,
                                  double scale, int channels) {
         const ReadPointsOptions reading = make_reading(space, order, scale, channels);

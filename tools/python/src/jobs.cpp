@@ -66,7 +66,7 @@ py::object report_of(const Result& r) {
 }
 
 const Image& image_of(const Result& r) {
-    if (!r.image) throw Error(Errc::InvalidInput, "mask: expected an image to lay it on, got points alone");
+    if (!r.image) throw Error(Errc::InvalidInput, "mask: expected an image, got points alone");
     return *r.image;
 }
 
@@ -125,22 +125,23 @@ void add_jobs(py::module_& module) {
             kNotNegative.require("threads", threads);
             return Call{std::move(progress), std::move(log), threads, memory_limit};
         }));
-    py::class_<Result, std::shared_ptr<Result>>(module, "Result", "What segment() and reconstruct() return.",
+    py::class_<Result, std::shared_ptr<Result>>(module, "Result", "The result of segment() and reconstruct().",
                                                 py::dynamic_attr())
         .def_property_readonly(
             "surface", [](const Result& r) { return LevelSet{r.result.surface}; },
             "The LevelSet: a signed distance, world units.")
         .def_property_readonly("mesh", mesh_of, "The Mesh: closed, manifold, outward.")
         .def_property_readonly(
-            "image", [](const Result& r) { return r.image; }, "The Image; None of points alone.")
+            "image", [](const Result& r) { return r.image; }, "The Image; None if there are only points.")
         .def_property_readonly(
-            "marks", [](const Result& r) { return from_positions(r.marks); }, "(n, 3), as they were used, world units.")
+            "marks", [](const Result& r) { return from_positions(r.marks); },
+            "(n, 3), the marks as they were used, in world units.")
         .def_property_readonly(
-            "log", [](const Result& r) { return r.log; }, "Choices and warnings, in their order.")
+            "log", [](const Result& r) { return r.log; }, "Choices and warnings, in the order in which they were made.")
         .def_property_readonly(
-            "name", [](const Result& r) { return r.name; }, "Of the structure; empty where it is the only one.")
+            "name", [](const Result& r) { return r.name; }, "Name of the structure; empty if it is the only one.")
         .def_property_readonly(
-            "label", [](const Result& r) { return r.label; }, "Of the structure in Structures.mask.")
+            "label", [](const Result& r) { return r.label; }, "Label of the structure in Structures.mask.")
         .def("_fields",
              [](const Result& r) {
                  return py::make_tuple(grid_of(r.result.u), grid_of(r.result.distance), grid_of(r.result.edge));

@@ -62,5 +62,5 @@ PYBIND11_MODULE(_covol, module) {
     add_points(module);
     add_surfaces(module);
     add_jobs(module);
-    module.def("list_options", list_options, "Of segment() and reconstruct(): name, type and default.");
+    module.def("list_options", list_options, "Options of segment() and reconstruct(): name, type and default.");
 }

@@ -34,7 +34,7 @@ public:
                       {std::make_shared<const PaintedImage>(make_painted(*problem_.painted, problem_.painting))});
             if (one && structures.size() > 1)
                 throw Error(Errc::InvalidInput,
-                            "painted: expected one label, got several; structures() takes each for a structure",
+                            "painted: expected one label, got several; structures() makes a structure of each",
                             "painted");
         }
         if (structures.empty()) throw Error(Errc::InvalidInput, "marks: expected a structure, got none", "marks");

@@ -162,8 +162,8 @@ void add_surfaces(py::module_& module) {
              py::arg("vertices"), py::arg("faces"))
         .def_property_readonly(
             "vertices", vertices_of,
-            "(n, 3) float32, x, y, z, world units; read-only. float64, and a copy, where they lie so far from 0 that "
-            "single precision would not hold them.")
+            "(n, 3) float32, x, y, z, world units; read-only. A copy in float64 if they are so far from 0 that "
+            "single precision is insufficient.")
         .def_property_readonly("faces", faces_of, "(m, 3) uint32, counter-clockwise seen from outside; read-only.")
         .def_property_readonly("normals", normals_of, "(n, 3) float32, unit vectors at the vertices.")
         .def_property_readonly("attributes", attributes_of, "Numbers at the vertices by name: dict of arrays (n,).")
@@ -173,10 +173,9 @@ void add_surfaces(py::module_& module) {
             "dict: volume, area (world units), components, genus, closed, manifold.")
         .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = py::none(),
              py::arg("unit_scale") = 1.0,
-             "Writes .ply, .obj, .stl, .off or .glb, which is y-up unless y_up says otherwise. Raises Error.");
-    py::class_<LevelSet>(
-        module, "LevelSet",
-        "A level set of OpenVDB, negative inside; what mesh(), mask(), compare(), init= and guess= take.")
+             "Writes .ply, .obj, .stl, .off or .glb, which is y-up by default; y_up overrides this. Raises Error.");
+    py::class_<LevelSet>(module, "LevelSet",
+                         "A level set of OpenVDB, negative inside, for mesh(), mask(), compare(), init= and guess=.")
         .def_property_readonly(
             "voxel_size", [](const LevelSet& s) { return domain_of(*s.grid).voxel_size; }, "World units.")
         .def_property_readonly(

@@ -127,7 +127,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
                 fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;
-            report.why_not = "parts of them are turned as a whole";
+            report.why_not = "in whole regions they point to the wrong side";
         }
         if (!report.used && !cloud.encloses && !choose_by_propagation(cloud, reach, run))
             choose_by_views(cloud, reach, run);

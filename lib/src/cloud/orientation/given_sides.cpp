@@ -146,7 +146,7 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
     result.report.predicted = held_out.predicted(result.report, is_outward);
     result.report.why_not.clear();
     if (result.report.predicted < kGivenSides.min_predicted) {
-        result.report.why_not = "half of them do not foresee the sides of the other half";
+        result.report.why_not = "one half of them does not predict the sides of the other half";
         return false;
     }
     held_out.resolve_contradictions();
@@ -210,7 +210,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     run.check();
     if (double(result.report.sensors) < minimum || result.report.sensors == 0) return result;
     if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_free_views) {
-        if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
+        if (result.report.normals == 0) result.report.why_not = "most points are not visible from the sensor";
         return result;
     }
     result.report.from_sensor =

@@ -82,7 +82,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     if (points.size() < 4)
         throw Error(Errc::InvalidInput, "points: expected at least 4, got " + std::to_string(points.size()));
     if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0))
-        throw Error(Errc::InvalidInput, "all points lie at one place");
+        throw Error(Errc::InvalidInput, "points: expected different positions, got the same one for all points");
     Orientation best;
     with_threads(run, [&] {
         // Noise is hard to distinguish from thin parts; if normals keep turning, a finer lattice may resolve them.

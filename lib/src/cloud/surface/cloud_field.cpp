@@ -167,11 +167,12 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
     LeafList list(domain);
     indicator.crossed([&](const WorldBox& box) {
         if ((crossed += in_a_cell) > kMaxLeaves)
-            throw Error(Errc::InvalidInput,
-                        "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
-                            std::to_string(std::int64_t(across)) +
-                            " voxels wide; take the parts one by one, or a larger `voxel_size`",
-                        "voxel_size");
+            throw Error(
+                Errc::InvalidInput,
+                "reconstruct: the points form small parts, far apart: the finest cells that cover all of them are " +
+                    std::to_string(std::int64_t(across)) +
+                    " voxels wide; reconstruct each part separately, or use a larger `voxel_size`",
+                "voxel_size");
         add_crossed(indicator, box, 8 * h, [&](const WorldBox& part) {
             list.add(domain.world_to_index(part.min), domain.world_to_index(part.max));
         });

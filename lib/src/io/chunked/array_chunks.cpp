@@ -77,10 +77,12 @@ ArrayAxes describe_axes(const std::string& path, const std::string& letters, con
     info.type = array.type;
     info.geometry.size = require_3d(path, size);
     for (std::size_t d = 0; d < letters.size(); ++d) {
-        if (array.shape[d] == 0) throw read_error(Errc::InvalidInput, path, "expected elements, got an axis of none");
+        if (array.shape[d] == 0)
+            throw read_error(Errc::InvalidInput, path,
+                             "expected at least one element along each axis, got an axis of length 0");
         if (letters[d] == '?' && array.shape[d] != 1)
             throw read_error(Errc::Unsupported, path,
-                             "expected the axes t, c, z, y and x, got another one of " +
+                             "expected only the axes t, c, z, y and x, got another axis of " +
                                  std::to_string(array.shape[d]) + " elements");
         if (letters[d] == 'c') axes.channel = d;
         if (letters[d] == 't') axes.frame = d;

@@ -223,8 +223,8 @@ private:
         }
         info_.fields.emplace_back("level_shift", "probably " + text + ": the level states no translation");
         run.warn(path_ + ": level " + ome_->levels[level_].path +
-                 " states no translation: where its voxels are means of those of level " + ome_->levels[0].path +
-                 ", it lies off them by " + text + " along x, y, z; `correct_level_shift` moves it there");
+                 " states no translation: if its voxels are means of those of level " + ome_->levels[0].path +
+                 ", it is displaced from them by " + text + " along x, y, z; `correct_level_shift` corrects this");
     }
 
     std::string path_;

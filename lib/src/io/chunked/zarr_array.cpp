@@ -140,14 +140,15 @@ void ArrayReader::set_fill(const Json& value) {
         return array_.fill >= double(Limits::lowest()) && array_.fill <= double(Limits::max());
     });
     if (std::isfinite(array_.fill) && !fits)
-        throw wrong("its fill_value " + std::to_string(array_.fill) + " is no " + to_string(array_.type));
+        throw wrong("its fill_value " + std::to_string(array_.fill) + " is not a valid " + to_string(array_.type));
 }
 
 /// A chunk is unpacked as a whole, including its channels and frames, so its size is limited.
 void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
-        if (n == 0) throw wrong("expected chunks of elements, got one with a side of 0");
+        if (n == 0)
+            throw wrong("expected chunks with at least one element along each axis, got a chunk with a side of 0");
         if (bytes > kMaxChunkBytes / n)
             throw unsupported("expected chunks of 1 GiB at most, got larger ones; write it with smaller chunks");
         bytes *= n;
@@ -161,7 +162,8 @@ void ArrayReader::read_2() {
         throw wrong("expected zarr_format 2, got " + quote(format.dump()));
     array_.shape = sizes(member(json_, "shape"), "shape");
     array_.chunk = sizes(member(json_, "chunks"), "chunks");
-    if (array_.chunk.size() != array_.shape.size()) throw wrong("its chunks have not as many dimensions as its shape");
+    if (array_.chunk.size() != array_.shape.size())
+        throw wrong("its chunks and its shape differ in their number of dimensions");
     const Json& dtype = member(json_, "dtype");
     const std::string type = text_of(dtype);
     if (dtype.is_array()) throw unsupported("expected one number in each element, got records");
@@ -205,7 +207,7 @@ void ArrayReader::read_3() {
         throw unsupported("expected a regular grid of chunks, got " + quote(codec_name(grid)));
     array_.chunk = sizes(member(member(grid, "configuration"), "chunk_shape"), "chunk_shape");
     if (array_.chunk.size() != array_.shape.size())
-        throw wrong("its chunk_shape has not as many dimensions as its shape");
+        throw wrong("its chunk_shape and its shape differ in their number of dimensions");
     const std::string type = codec_name(member(json_, "data_type"));
     const std::size_t digits = type.find_first_of("0123456789");
     const std::string kind = type.substr(0, digits), width = digits == std::string::npos ? "" : type.substr(digits);
@@ -287,7 +289,7 @@ void ArrayReader::read_codecs(const Json& codecs) {
             throw unsupported("expected the codecs transpose, bytes or sharding_indexed, got " + quote(name));
         }
         if (name == "sharding_indexed" && &codec != &codecs.back())
-            throw unsupported("expected shards that are not packed themselves, got " +
+            throw unsupported("expected shards that are not compressed themselves, got " +
                               quote(codec_name(codecs.back())));
     }
     if (!has_bytes) throw wrong("expected the codec bytes or sharding_indexed among its codecs");
@@ -299,7 +301,8 @@ void ArrayReader::read_codecs(const Json& codecs) {
 void ArrayReader::read_shards(const Json& sharding) {
     const std::vector<std::uint64_t> outer = array_.chunk;
     array_.chunk = sizes(member(sharding, "chunk_shape"), "sharding's chunk_shape");
-    if (array_.chunk.size() != outer.size()) throw wrong("its chunks have not as many dimensions as its shards");
+    if (array_.chunk.size() != outer.size())
+        throw wrong("its chunks and its shards differ in their number of dimensions");
     std::vector<std::uint64_t> counts;
     std::uint64_t total = 1;
     for (std::size_t d = 0; d < outer.size(); ++d) {
@@ -323,7 +326,7 @@ void ArrayReader::read_shards(const Json& sharding) {
     const Json& codecs = member(sharding, "codecs");
     for (const Json& codec : codecs)
         if (codec_name(codec) == "sharding_indexed")
-            throw unsupported("expected shards that hold no shards themselves");
+            throw unsupported("expected shards that contain no shards themselves");
     read_codecs(codecs);
     array_.shards.counts = std::move(counts);
 }
@@ -359,7 +362,7 @@ ZarrArray read_zarr_array(const std::string& folder) {
         array.version = 2;
         json = read_json(array.metadata);
     }
-    if (!json) throw read_error(Errc::Io, folder, "expected an array, which .zarray or zarr.json describes");
+    if (!json) throw read_error(Errc::Io, folder, "expected an array described by .zarray or zarr.json");
     ArrayReader reader(array, *json);
     array.version == 3 ? reader.read_3() : reader.read_2();
     return array;

@@ -99,9 +99,9 @@ private:
         constexpr std::uint64_t kMissing = std::numeric_limits<std::uint64_t>::max();
         if (entry.begin == kMissing && entry.bytes == kMissing) return std::nullopt;
         if (entry.begin > file->size() || entry.bytes > file->size() - entry.begin)
-            throw read_error(
-                Errc::InvalidInput, path,
-                "damaged or truncated: its index says that chunk " + std::to_string(number) + " lies beyond its end");
+            throw read_error(Errc::InvalidInput, path,
+                             "damaged or truncated: according to its index, chunk " + std::to_string(number) +
+                                 " lies beyond its end");
         check_packed(path, entry.bytes);
         return file->read(entry.begin, entry.bytes);
     }
@@ -112,14 +112,14 @@ private:
         if (bytes > maximum)
             throw read_error(Errc::InvalidInput, path,
                              "expected a chunk of " + std::to_string(expected) + " bytes, got " +
-                                 std::to_string(bytes) + (array_.codecs.empty() ? "" : " that are packed"));
+                                 std::to_string(bytes) + (array_.codecs.empty() ? "" : " compressed ones"));
     }
 
     /// A missing file means that the chunk has the fill value, unless the array itself no longer exists.
     void check_missing(const std::string& path) const {
         std::error_code status;
         if (!std::filesystem::exists(array_.metadata, status))
-            throw read_error(Errc::Io, path, "the store is gone: " + array_.metadata + " is not there any more");
+            throw read_error(Errc::Io, path, "the store was removed: " + array_.metadata + " no longer exists");
         if (!std::isfinite(array_.fill))
             throw read_error(Errc::InvalidInput, path,
                              "expected finite values, got a chunk that is missing and a fill_value that is not finite");

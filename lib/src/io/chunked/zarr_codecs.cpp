@@ -59,7 +59,7 @@ Bytes unpack_blosc(const Packed& packed) {
     // The functions of Blosc read the header without checking that it is complete.
     if (in.size() < BLOSC_MIN_HEADER_LENGTH) throw packed.damaged("blosc", "its header is truncated");
     if (blosc_cbuffer_validate(in.data(), in.size(), &claimed) != 0)
-        throw packed.damaged("blosc", "its header does not fit " + std::to_string(in.size()) + " bytes");
+        throw packed.damaged("blosc", "its header does not match its size of " + std::to_string(in.size()) + " bytes");
     packed.check_claim("blosc", claimed);
     Bytes out(claimed);
     const int got = blosc_decompress_ctx(in.data(), out.data(), out.size(), 1);
@@ -89,7 +89,7 @@ Bytes unpack_deflate(const Packed& packed) {
     constexpr int kAnyHeader = 15 + 32;
     constexpr std::uint64_t kPiece = 1U << 30;
     z_stream stream{};
-    if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib does not start");
+    if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib could not be initialised");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
     Bytes out(packed.maximum);
     char more = 0;  // one more byte, to detect excess output
@@ -111,7 +111,7 @@ Bytes unpack_deflate(const Packed& packed) {
         if (status == Z_STREAM_END) {
             // gzip files may be several streams in a row
             ended = read == in.size();
-            if (!ended && inflateReset(&stream) != Z_OK) throw packed.damaged("zlib", "zlib does not go on");
+            if (!ended && inflateReset(&stream) != Z_OK) throw packed.damaged("zlib", "zlib could not continue");
         } else if (status != Z_OK || (taken == 0 && made == 0)) {
             throw packed.damaged("zlib", stream.msg != nullptr ? stream.msg : "the stream is truncated");
         }
@@ -124,7 +124,8 @@ Bytes unpack_lz4(const Packed& packed) {
     const Bytes& in = packed.bytes;
     constexpr std::uint64_t kHeader = 4;
     if (in.size() < kHeader || in.size() > std::uint64_t(std::numeric_limits<int>::max()))
-        throw packed.damaged("lz4", "got " + std::to_string(in.size()) + " bytes");
+        throw packed.damaged(
+            "lz4", "expected a header of 4 bytes and at most 2 GiB, got " + std::to_string(in.size()) + " bytes");
     const std::uint64_t claimed = little_endian_32(in.data());
     packed.check_claim("lz4", claimed);
     Bytes out(claimed);
@@ -157,7 +158,7 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
     if (own == "lz4") return ZarrCodec::Lz4;
     if (own == "crc32c") return ZarrCodec::Crc32c;
     throw read_error(Errc::Unsupported, path,
-                     "expected chunks that are packed by blosc, zstd, zlib, gzip or lz4, or not at all, got " +
+                     "expected uncompressed chunks, or chunks compressed with blosc, zstd, zlib, gzip or lz4, got " +
                          quote(name) + "; write it with one of these");
 }
 
@@ -186,7 +187,7 @@ void take_crc32c(const std::string& path, const std::string& what, Bytes& bytes)
     if (bytes.size() < kWidth) throw read_error(Errc::InvalidInput, path, what + " is too short for its crc32c");
     bytes.shrink(bytes.size() - kWidth);
     if (crc32c(bytes.data(), bytes.size()) != little_endian_32(bytes.data() + bytes.size()))
-        throw read_error(Errc::InvalidInput, path, what + " is damaged: its crc32c does not fit");
+        throw read_error(Errc::InvalidInput, path, what + " is damaged: its crc32c does not match");
 }
 
 Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Bytes packed, std::uint64_t expected) {
@@ -204,7 +205,8 @@ Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Byte
     if (packed.size() != expected)
         throw read_error(Errc::InvalidInput, path,
                          "expected a chunk of " + std::to_string(expected) + " bytes, got " +
-                             std::to_string(packed.size()) + "; it is damaged, or its metadata is another array's");
+                             std::to_string(packed.size()) +
+                             "; it is damaged, or its metadata belongs to another array");
     return packed;
 }
 

@@ -86,9 +86,9 @@ Json parse_json(const std::string& path, std::string_view text) {
         return json;
     } catch (const Json::exception& error) {
         const auto* parsing = dynamic_cast<const Json::parse_error*>(&error);
-        throw read_error(
-            Errc::InvalidInput, path,
-            "it is no JSON" + (parsing != nullptr ? ", from byte " + std::to_string(parsing->byte) + " on" : ""));
+        throw read_error(Errc::InvalidInput, path,
+                         "it is not valid JSON" +
+                             (parsing != nullptr ? ", from byte " + std::to_string(parsing->byte) + " on" : ""));
     }
 }
 

@@ -30,9 +30,9 @@ bool holds_no_image(const std::string& path) {
 
 std::string kind_of_object(const std::string& sop_class) {
     if (sop_class == kSegmentationStorage)
-        return "a segmentation (SEG), which is written and not read; export it as .nrrd or .nii.gz from the program "
-               "that made it";
-    if (sop_class == kRtStructureSet) return "an RT structure set, whose contours are marks: `contours`";
+        return "a segmentation (SEG), which covol writes but does not read; export it as .nrrd or .nii.gz from the "
+               "program that made it";
+    if (sop_class == kRtStructureSet) return "an RT structure set, whose contours are marks: give it with `contours`";
     return "SOP class " + sop_class;
 }
 
@@ -57,9 +57,9 @@ std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folde
     }
     // A gap between slices is an error, but a missing slice at an end would shorten the volume without a warning.
     if (passed_over > 0)
-        run.warn(why + "; passed over" +
-                 (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " others of the folder" : "") +
-                 ": if it is a slice at an end of the series, the image is without it");
+        run.warn(why + "; skipped" +
+                 (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " other files of the folder" : "") +
+                 ": if it is a slice at an end of the series, it is missing from the image");
     return series;
 }
 
@@ -92,7 +92,7 @@ public:
         constexpr std::size_t kMaxListed = 20;
         for (std::size_t n = 0; volumes.size() > 1 && n < std::min(kMaxListed, volumes.size()); ++n)
             info_.fields.emplace_back("frame " + std::to_string(n),
-                                      volumes[n].name + (n == chosen ? ", whose geometry is told" : ""));
+                                      volumes[n].name + (n == chosen ? ", whose geometry is reported" : ""));
     }
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
@@ -110,8 +110,8 @@ private:
     void check_depth(const std::vector<DicomVolume>& volumes) const {
         if (volumes.size() < 2 || volumes.front().slices.size() > 1) return;
         throw read_error(Errc::InvalidInput, path_,
-                         "expected slices at several places, got " + std::to_string(volumes.size()) +
-                             " planes of which none lies beside another: times of one plane, or planes of several "
+                         "expected slices at several positions, got " + std::to_string(volumes.size()) +
+                             " planes that form no stack: time points of one plane, or planes of several "
                              "orientations");
     }
 
@@ -229,7 +229,7 @@ std::vector<DicomSlice> read_dicom_series(const std::string& path, const RunCont
         throw read_error(
             Errc::InvalidInput, path,
             "expected a DICOM series, or a Zarr store (.zarray, .zgroup, .zattrs or zarr.json), got a folder "
-            "that holds no DICOM image and none of these files");
+            "that contains neither a DICOM image nor any of these files");
     if (series.size() > 1) {
         std::string list;
         for (const auto& [uid, slices] : series)
@@ -237,7 +237,7 @@ std::vector<DicomSlice> read_dicom_series(const std::string& path, const RunCont
                     slices.front().description + " (" + fs::path(slices.front().path).filename().string() + ")";
         throw read_error(Errc::Unsupported, path,
                          "expected one DICOM series, got " + std::to_string(series.size()) + ": " + list +
-                             "; give the file of the one that is wanted");
+                             "; give a file of the series that is to be read");
     }
     return series.begin()->second;
 }

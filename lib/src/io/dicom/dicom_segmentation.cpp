@@ -199,7 +199,7 @@ void check_size(const std::string& path, const PixelSource& source) {
     const Index3 size = source.geometry().size;
     if (!source.is_labels())
         throw Error(Errc::Unsupported, path +
-                                           ": DICOM is written of label images alone, as a segmentation; write "
+                                           ": only label images can be written as DICOM (a segmentation); write "
                                            ".nrrd, .nii.gz or .mha");
     if (size[0] > kMax || size[1] > kMax)
         throw Error(Errc::Unsupported, path + ": expected at most 65535 columns and rows, got " + size_text(size) +

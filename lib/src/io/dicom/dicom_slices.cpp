@@ -76,7 +76,8 @@ void fill_plain(const DicomHeader& header, std::size_t frames, const std::string
     place.intercept = own.intercept;
     slice.type = slice.decoded_type = rescaled_type(place.type, own.slope, own.intercept, stored);
     if (slice.components > 1 && header.integer(kPlanar).value_or(0) != 0)
-        throw Error(Errc::Unsupported, slice.path + ": colour planes behind each other");
+        throw Error(Errc::Unsupported,
+                    slice.path + ": expected interleaved colours (RGBRGB...), got separate colour planes");
 }
 
 /// Compressed pixels. GDCM rescales all frames with the slope and intercept in `image`.

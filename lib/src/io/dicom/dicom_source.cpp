@@ -202,13 +202,13 @@ ImageGeometry in_millimetres(const std::string& path, const ImageGeometry& geome
     if (std::abs(along(0, 1)) > kMax)
         throw Error(Errc::Unsupported,
                     path +
-                        ": expected rows and columns that are perpendicular, as DICOM has them, got axes that lean "
-                        "towards each other; write .nrrd, .mha or .nii.gz, which keep them");
+                        ": expected perpendicular rows and columns, as DICOM requires, got sheared axes; write .nrrd, "
+                        ".mha or .nii.gz, which can store them");
     const double metres = unit_in_metres(geometry.unit);
     constexpr double kMillimetre = 1e-3;
     if (metres == 0)
         run.warn(path +
-                 ": the image's unit is not known, and DICOM has its lengths in mm: the numbers are taken as mm");
+                 ": the image's unit is not known, and DICOM stores lengths in mm: the numbers are interpreted as mm");
     const double scale = metres == 0 ? 1 : metres / kMillimetre;
     ImageGeometry scaled = geometry;
     if (metres != kMillimetre)

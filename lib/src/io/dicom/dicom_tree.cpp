@@ -37,9 +37,9 @@ public:
         bool with_vr = syntax != "1.2.840.10008.1.2";
         if (syntax.empty() && at_ + 6 <= bytes_.size()) with_vr = bytes_[at_ + 4] >= 'A' && bytes_[at_ + 4] <= 'Z';
         if (syntax == "1.2.840.10008.1.2.2" || syntax == "1.2.840.10008.1.2.1.99")
-            throw Error(Errc::Unsupported, path_ + ": this DICOM file is " +
-                                               (syntax.ends_with("99") ? "deflated" : "big-endian") +
-                                               "; write it again in Explicit VR Little Endian, with dcmconv +te say");
+            throw Error(Errc::Unsupported,
+                        path_ + ": this DICOM file is " + (syntax.ends_with("99") ? "deflated" : "big-endian") +
+                            "; write it again in Explicit VR Little Endian, for example with dcmconv +te");
         DicomTree tree;
         elements(tree, bytes_.size(), with_vr, false, 0);
         return tree;
@@ -53,7 +53,7 @@ private:
 
     [[noreturn]] void damaged(const std::string& what) const {
         throw Error(Errc::InvalidInput,
-                    path_ + ": damaged, truncated, or no DICOM file: byte " + std::to_string(at_) + ": " + what);
+                    path_ + ": damaged, truncated, or not a DICOM file: byte " + std::to_string(at_) + ": " + what);
     }
     template <typename T>
     [[nodiscard]] T number(std::size_t at) const {
@@ -70,7 +70,8 @@ private:
         return value;
     }
     std::string_view take(std::uint32_t length) {
-        if (length > bytes_.size() - at_) damaged("an element of " + std::to_string(length) + " bytes ends beyond");
+        if (length > bytes_.size() - at_)
+            damaged("an element of " + std::to_string(length) + " bytes ends beyond the file");
         const std::string_view value = bytes_.substr(at_, length);
         at_ += length;
         return value;
@@ -85,7 +86,7 @@ private:
         }
         head.vr = take(2);
         if (!std::all_of(head.vr.begin(), head.vr.end(), [](char c) { return c >= 'A' && c <= 'Z'; }))
-            damaged("expected two capital letters that say what an element holds");
+            damaged("expected two capital letters, the type of an element's value (VR)");
         if (is_long_vr(head.vr)) {
             at_ += 2;
             head.length = next<std::uint32_t>();
@@ -96,14 +97,15 @@ private:
     }
     /// Reads elements up to `end`, or up to the delimiter of an item.
     void elements(DicomTree& tree, std::size_t end, bool with_vr, bool up_to_mark, int depth) {
-        if (depth > kDeepestItem) damaged("more than 16 sequences in each other");
+        if (depth > kDeepestItem) damaged("sequences are nested more than 16 deep");
         while (at_ < end) {
             const Head head = read_head(with_vr);
             if (head.tag == kItemEndTag && up_to_mark) return;
-            if (at_ > end) damaged("an element begins where what holds it ends");
+            if (at_ > end) damaged("an element begins beyond the end of its item");
             const bool is_wanted = std::find(wanted_.begin(), wanted_.end(), head.tag) != wanted_.end();
             const bool is_sequence = head.vr == "SQ" || head.length == kNoLength || (head.vr.empty() && is_wanted);
-            if (head.length != kNoLength && head.length > end - at_) damaged("an element ends beyond what holds it");
+            if (head.length != kNoLength && head.length > end - at_)
+                damaged("an element ends beyond the end of its item");
             if (!is_sequence) {
                 tree.values[head.tag] = take(head.length);
             } else if (head.length != kNoLength && !is_wanted) {
@@ -123,10 +125,10 @@ private:
         while (at_ < end) {
             const Head head = read_head(with_vr);
             if (head.tag == kSequenceEndTag && up_to_mark) return items;
-            if (at_ > end) damaged("an item begins where its sequence ends");
+            if (at_ > end) damaged("an item begins beyond the end of its sequence");
             if (head.tag != kItemTag) damaged("expected an item of a sequence");
             const bool has_mark = head.length == kNoLength;
-            if (!has_mark && head.length > end - at_) damaged("an item ends beyond its sequence");
+            if (!has_mark && head.length > end - at_) damaged("an item ends beyond the end of its sequence");
             elements(items.emplace_back(), has_mark ? end : at_ + head.length, with_vr, has_mark, depth);
         }
         if (up_to_mark) damaged("a sequence has no end");

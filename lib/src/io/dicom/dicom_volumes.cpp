@@ -104,7 +104,7 @@ std::vector<DicomVolume> split_by_order(const std::vector<DicomVolume>& volumes)
             if (rank == ranks.size())
                 ranks.push_back({{},
                                  volume.name + (volume.name.empty() ? "" : ", ") + "no. " + std::to_string(rank) +
-                                     " at each place, in the file's order"});
+                                     " at each position, in the order of the file"});
             ranks[rank].slices.push_back(sorted[n]);
         }
         parts.insert(parts.end(), ranks.begin(), ranks.end());
@@ -122,8 +122,8 @@ void check_gaps(const std::string& path, const Slices& slices) {
     for (std::size_t k = 0; k < gaps.size(); ++k) {
         if (std::abs(gaps[k] - usual) <= 0.02 * usual && usual > 0) continue;
         throw read_error(Errc::InvalidInput, path,
-                         "expected slices at even distances, got " + number(gaps[k]) + " between " +
-                             name_of(slices[k]) + " and " + name_of(slices[k + 1]) + " where the others have " +
+                         "expected equidistant slices, got a distance of " + number(gaps[k]) + " between " +
+                             name_of(slices[k]) + " and " + name_of(slices[k + 1]) + ", but for the others " +
                              number(usual) +
                              (gaps[k] > 0 ? ": a slice is missing"
                                           : ": several volumes in one series; put one into a folder of its own"));
@@ -142,9 +142,9 @@ void check_straight(const std::string& path, const Slices& slices, const Vec3& s
         }
         if (square > maximum * maximum)
             throw read_error(Errc::InvalidInput, path,
-                             "expected slices along one line, got " + name_of(slices[k]) + " " +
+                             "expected slices along a straight line, got " + name_of(slices[k]) + " " +
                                  number(std::sqrt(square)) +
-                                 " mm beside it: the image is bent or was moved; resample it");
+                                 " mm away from it: the image is bent or was moved; resample it");
     }
 }
 

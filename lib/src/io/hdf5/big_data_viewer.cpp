@@ -188,8 +188,8 @@ private:
             const Setup setup = setup_of(name);
             if (setup.voxel && own.voxel && *setup.voxel != *own.voxel)
                 throw read_error(Errc::Unsupported, file_.path(),
-                                 "expected setups of one voxel size, which " + xml +
-                                     " says they have not; give the path of one: " +
+                                 "expected setups of one voxel size, but according to " + xml +
+                                     " they differ; give the path of one: " +
                                      file_.path_of("/" + choice_.time + "/" + setups_.front()) + ", ...");
             info.channel_names.push_back(setup.name);
             all_named = all_named && !setup.name.empty();

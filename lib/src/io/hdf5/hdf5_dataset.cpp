@@ -175,11 +175,12 @@ void Hdf5Dataset::read_filters(hid_t properties) {
                                           H5Zget_filter_info(H5Z_filter_t(filter.id), &config) >= 0 &&
                                           (config & H5Z_FILTER_CONFIG_DECODE_ENABLED) != 0);
         if (!known)
-            throw read_error(Errc::Unsupported, path_,
-                             "its chunks are packed by the filter " + std::to_string(filter.id) +
-                                 (filter.name.empty() ? "" : " (" + quote(filter.name) + ")") +
-                                 ", which this HDF5 library does not have; pack them with gzip, LZF, Blosc, Zstandard "
-                                 "or LZ4 (h5repack -f GZIP=5)");
+            throw read_error(
+                Errc::Unsupported, path_,
+                "its chunks are compressed by the filter " + std::to_string(filter.id) +
+                    (filter.name.empty() ? "" : " (" + quote(filter.name) + ")") +
+                    ", which this HDF5 library does not have; compress them with gzip, LZF, Blosc, Zstandard "
+                    "or LZ4 (h5repack -f GZIP=5)");
     }
 }
 
@@ -225,7 +226,8 @@ void Hdf5Dataset::read_layout(hid_t properties) {
     if (layout == H5D_CHUNKED) {
         std::array<hsize_t, kMaxDimensions> chunk{};
         const int count = H5Pget_chunk(properties, kMaxDimensions, chunk.data());
-        if (count != int(array_.shape.size())) throw damaged("its chunks have other dimensions");
+        if (count != int(array_.shape.size()))
+            throw damaged("its chunks and its shape differ in their number of dimensions");
         array_.chunk.assign(chunk.begin(), chunk.begin() + count);
     } else if (layout == H5D_CONTIGUOUS || layout == H5D_COMPACT) {
         as_packed_ = false;

@@ -21,7 +21,7 @@ bool is_packer(unsigned id) {
 }
 
 Error damaged(const std::string& path, const char* codec) {
-    return read_error(Errc::InvalidInput, path, std::string("a chunk is damaged: it is no ") + codec + " data");
+    return read_error(Errc::InvalidInput, path, std::string("a chunk is damaged: it is not valid ") + codec + " data");
 }
 
 /// Reverses the shuffle filter, which stores byte b of all elements together, for each b. The bytes of an incomplete

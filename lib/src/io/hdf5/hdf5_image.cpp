@@ -30,7 +30,7 @@ public:
             for (int a = 0; a < 3; ++a)
                 if ((*layout_.size)[a] > info_.geometry.size[a])
                     throw read_error(Errc::InvalidInput, first.path(),
-                                     "expected " + size_text(*layout_.size) + " voxels, as its attributes say, got " +
+                                     "expected " + size_text(*layout_.size) + " voxels, as its attributes state, got " +
                                          size_text(info_.geometry.size));
             info_.geometry.size = *layout_.size;
         }
@@ -88,7 +88,7 @@ private:
         if (!same)
             throw read_error(Errc::InvalidInput, dataset.path(),
                              "expected " + size_text(info_.geometry.size) + " voxels of type " + to_string(info_.type) +
-                                 ", as the first channel and frame has them");
+                                 ", as in the first channel and frame");
         return dataset;
     }
 

@@ -203,16 +203,16 @@ public:
             if (!by_qform)
                 throw read_error(Errc::InvalidInput, path_,
                                  "sform_code is " + std::to_string(scode) +
-                                     ", but the sform's rows are no invertible matrix; correct srow_x, y, z, or set "
+                                     ", but the sform's rows form no invertible matrix; correct srow_x, y, z, or set "
                                      "sform_code to 0");
             run_.warn(path_ + ": sform_code is " + std::to_string(scode) +
-                      ", but the sform's rows are no invertible matrix: the qform is used");
+                      ", but the sform's rows form no invertible matrix: the qform is used");
         }
         use(by_sform ? sform : by_qform ? qform : base_of(header_, info_.geometry.size), by_sform);
-        info_.fields.emplace_back("place of the voxels", by_sform ? "the sform, for sform_code > 0"
-                                                         : by_qform
-                                                             ? "the qform, for sform_code is 0"
-                                                             : "pixdim, the image's middle at 0, for both codes are 0");
+        info_.fields.emplace_back("place of the voxels",
+                                  by_sform   ? "the sform, because sform_code > 0"
+                                  : by_qform ? "the qform, because sform_code is 0"
+                                             : "pixdim, with the image's centre at 0, because both codes are 0");
         if (by_sform && qcode > 0) compare(sform, qform);
         if (by_sform) compare_steps();
     }
@@ -279,7 +279,7 @@ std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext&
     const std::optional<PixelPlace> place = nifti_pixels(header, begin, info);
     const std::array<std::uint64_t, 7> sizes = header.sizes();
     if (!place || sizes[4] > 1)
-        throw read_error(Errc::Unsupported, path, "expected a NIfTI file in one piece with grey values");
+        throw read_error(Errc::Unsupported, path, "expected a single-file NIfTI image with grey values");
     info.type = rescaled_nifti_type(*place);
     info.geometry.size = require_3d(path, {sizes[0], sizes[1], sizes[2]});
     info.geometry.unit = header.unit_name();

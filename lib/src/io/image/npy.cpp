@@ -40,7 +40,7 @@ NpyHeader read_header(const std::string& path) {
     std::array<unsigned char, kVersion2> first{};
     if (file_bytes < kVersion2 || !read_bytes(begin, kVersion2, first.data()) ||
         std::memcmp(first.data(), "\x93NUMPY", 6) != 0)
-        throw damaged("expected NumPy's mark in the first bytes");
+        throw damaged("expected NumPy's signature in the first bytes");
     const bool is_first = first[6] == 1;
     std::uint64_t length = first[8] | unsigned(first[9]) << 8;
     if (!is_first) length |= std::uint64_t(first[10]) << 16 | std::uint64_t(first[11]) << 24;
@@ -49,7 +49,7 @@ NpyHeader read_header(const std::string& path) {
     header.end = begin.skip + length;
     std::string text(length <= kMaxText ? length : 0, '\0');
     if (length > kMaxText || header.end > file_bytes || !read_bytes(begin, length, text.data()))
-        throw damaged("a header of " + std::to_string(length) + " bytes");
+        throw damaged("its header claims " + std::to_string(length) + " bytes");
     header.descr = value_of(text, "descr");
     header.order = value_of(text, "fortran_order");
     header.shape = value_of(text, "shape");
@@ -111,8 +111,9 @@ public:
         std::swap(turned.box.max[0], turned.box.max[2]);
         Pixels pixels = file_->read(turned, run);
         if (pixels.chunks)
-            throw read_error(Errc::Unsupported, path_,
-                             "a large array in Fortran's order; save numpy.ascontiguousarray");
+            throw read_error(
+                Errc::Unsupported, path_,
+                "expected C order for an array of this size, got Fortran order; save numpy.ascontiguousarray(array)");
         std::swap(pixels.stride[0], pixels.stride[2]);
         return pixels;
     }

@@ -121,7 +121,7 @@ void restore_nrrd_space(const std::string& path, const TextHeader& header, Image
         if (unknown[a])
             run.warn(path + ": expected units of length, got " + quote(units[a]) + " for axis " +
                      std::to_string(a + 1) + " beside " + quote(units[0]) +
-                     ": its spacing is not known; `spacing = sx,sy,sz` gives it");
+                     ": its spacing is not known; set it with `spacing = sx,sy,sz`");
     }
 
     bool complete = directions.size() > axes[2];

@@ -22,8 +22,8 @@ public:
         info_ = file_->info();
         if (segment_.layer >= info_.channels)
             throw read_error(Errc::InvalidInput, path_,
-                             "segment '" + segment_.name + "' is said to lie in layer " +
-                                 std::to_string(segment_.layer) + ", the file has " + std::to_string(info_.channels));
+                             "segment '" + segment_.name + "' refers to layer " + std::to_string(segment_.layer) +
+                                 " (from 0), the number of layers in the file is " + std::to_string(info_.channels));
         info_.type = PixelType::UInt8;
         info_.channels = 1;
         info_.channel_names.clear();
@@ -84,8 +84,8 @@ std::unique_ptr<ImageFile> open_segment(const std::string& path, std::unique_ptr
 std::string advice_on_segments(const std::string& path) {
     const std::vector<NrrdSegment> segments = read_nrrd_segments(path);
     if (segments.size() < 2) return {};
-    return "; its segments (" + names_of(segments) + ") overlap, and lie in layers: choose one by its name, " + path +
-           ":" + segments.front().name;
+    return "; its segments (" + names_of(segments) + ") overlap and are stored in layers: choose one by its name, " +
+           path + ":" + segments.front().name;
 }
 
 }  // namespace covol::detail

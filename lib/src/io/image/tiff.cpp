@@ -72,7 +72,7 @@ public:
         refer_to(std::move(files));
         fill_info(axes);
         for (const std::string& warning : stack_.warnings)
-            run.warn(path + ": " + warning + "; `spacing = sx,sy,sz` gives it");
+            run.warn(path + ": " + warning + "; set it with `spacing = sx,sy,sz`");
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
@@ -136,16 +136,16 @@ private:
         throw read_error(Errc::InvalidInput, path_,
                          "expected a 3D image, got " + std::to_string(kind_.width) + " x " +
                              std::to_string(kind_.height) + " x 1 with " + list + "; if these are slices, give " +
-                             path_ + ":" + axes + "YX, which takes them as such");
+                             path_ + ":" + axes + "YX, which reads them as slices");
     }
 
     void fill_info(const std::string& axes) {
         const bool colour = kind_.samples > 1;
         // In colour images the samples are the channels; OME counts them in SizeC too.
         if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
-            throw read_error(Errc::Unsupported, path_, "channels of several samples each");
+            throw read_error(Errc::Unsupported, path_, "expected one sample for each pixel of a channel, got several");
         if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
-            throw read_error(Errc::Unsupported, path_, "channels of several samples each");
+            throw read_error(Errc::Unsupported, path_, "expected one sample for each pixel of a channel, got several");
         if (colour) stack_.channels = 1;
         rename_axes(path_, axes, stack_);
         info_.channels = static_cast<int>(colour ? kind_.samples : stack_.channels);

@@ -449,8 +449,8 @@ void rename_axes(const std::string& path, const std::string& axes, TiffStack& st
         list += (list.empty() ? "" : ", ") + std::string(1, axis) + " of " + std::to_string(count_of(axis));
     if (!is_sound || (wanted.size() != there.size() && wanted.size() != 1))
         throw read_error(Errc::InvalidInput, path,
-                         "expected ZYX, which makes slices of all planes, or a letter of C, T and Z for each of the "
-                         "file's axes of planes (" +
+                         "expected ZYX, which reads all planes as slices, or one of the letters C, T and Z for each of "
+                         "the file's axes of planes (" +
                              (list.empty() ? "none" : list) + ") before YX, such as ZCYX; got '" + axes + "'");
     if (stack.slices == 1) {
         // Discards the default for a distance between slices that the file does not state.
@@ -471,7 +471,7 @@ void rename_axes(const std::string& path, const std::string& axes, TiffStack& st
     for (const char axis : {'Z', 'C', 'T'})
         if (stack.order.find(axis) == std::string::npos) stack.order += axis;
     if (stack.channels == 1 || wanted != there) stack.channel_names.clear();
-    stack.fields.emplace_back("axes", word + ", as asked for, where the file says " + there + "YX");
+    stack.fields.emplace_back("axes", word + ", as requested; the file states " + there + "YX");
 }
 
 }  // namespace covol::detail

@@ -17,8 +17,9 @@ void add_marks(Marks& marks, const std::string& path, const KindedPoints& points
                 (kind == MarkKind::Inside ? marks.inside : marks.outside).push_back(std::move(seeds));
     if (cloud.points.empty()) return;
     if (!cloud.lines.empty())
-        run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
-                 " lines, and are taken as loose points here; `contours` joins them along the lines");
+        run.warn(
+            path + ": its marks form " + std::to_string(cloud.lines.size()) +
+            " lines, but are used as separate points here; give the file with `contours` to join them along the lines");
     add_points(marks, cloud, image, run);
     run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
              (cloud.rule.empty() ? "" : ", " + cloud.rule));

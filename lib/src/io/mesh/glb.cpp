@@ -91,8 +91,8 @@ private:
         const Json value = member(object, key, otherwise);
         if (!value.is_number_unsigned() ||
             value.get<std::uint64_t>() > std::max<std::uint64_t>(binary_.size(), 1 << 16))
-            source_.fail(std::string(key) + ": expected at most the " + std::to_string(binary_.size()) +
-                         " bytes there are, got " + value.dump().substr(0, 40));
+            source_.fail(std::string(key) + ": expected at most " + std::to_string(binary_.size()) +
+                         " bytes, the size of the data, got " + value.dump().substr(0, 40));
         return value.get<std::uint64_t>();
     }
 
@@ -120,7 +120,7 @@ private:
             if (!node.contains("mesh")) continue;
             static_cast<void>(item("meshes", node.at("mesh")));
             const auto n = node.at("mesh").get<std::size_t>();
-            if (is_placed[n] && translations[n] != moved) refuse("a mesh that another node has elsewhere");
+            if (is_placed[n] && translations[n] != moved) refuse("a mesh that another node places elsewhere");
             is_placed[n] = true;
             translations[n] = moved;
         }
@@ -151,14 +151,14 @@ private:
 
     /// Meshes may use the same data, but only a few times, because otherwise a small file could yield a huge mesh.
     void take(const Accessor& data, std::uint64_t width) {
-        if (data.count * width > unread_) source_.fail("its meshes use the same data over and over");
+        if (data.count * width > unread_) source_.fail("its meshes use the same data too often");
         unread_ -= data.count * width;
     }
 
     /// @return the index of the accessor's first vertex, and their number; primitives may use the same accessor
     std::pair<std::uint64_t, std::uint64_t> vertices(const Json& number) {
         const Accessor data = accessor(number, "VEC3", 3);
-        if (data.component != 5126) unsupported("positions that are not floats");
+        if (data.component != 5126) unsupported("a mesh whose positions are not floats");
         const auto [known, is_new] = first_vertex_.try_emplace(number.get<std::uint64_t>(), builder_.vertex_count());
         if (is_new) {
             take(data, 12);

@@ -109,8 +109,8 @@ void mesh_io::report_origin(const std::string& path, const Vec3& origin, const W
     if (origin == Vec3{0, 0, 0} || detail::extension(path) != ".stl" || !options.binary || !options.warn) return;
     std::ostringstream text;
     text << std::setprecision(15) << origin[0] << ", " << origin[1] << ", " << origin[2];
-    options.warn(path + ": STL holds single precision alone, so coordinates are relative to (" + text.str() +
-                 "); .ply, .obj and .glb hold the whole ones");
+    options.warn(path + ": STL stores single precision only, so coordinates are relative to (" + text.str() +
+                 "); .ply, .obj and .glb store the full coordinates");
 }
 
 void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of(path)); }

@@ -42,7 +42,7 @@ public:
     /// From here on messages do not name a line.
     std::string_view bytes(std::size_t count) {
         is_text_ = false;
-        if (count > bytes_left()) fail("the file is cut off");
+        if (count > bytes_left()) fail("the file is truncated");
         const std::string_view result = lines_.rest().substr(0, count);
         lines_.skip(count);
         return result;

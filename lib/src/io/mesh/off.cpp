@@ -33,8 +33,7 @@ std::size_t read_count(const Source& source, std::string_view& line, const std::
         source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
     // One more is accepted here: the error is then reported at the end of the file.
     if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / min_bytes + 1))
-        source.fail("expected no more than the file has room for, a file of this size cannot hold " + quote(word) +
-                    " " + what);
+        source.fail("the file is truncated: a file of this size cannot contain " + quote(word) + " " + what);
     return std::size_t(*count);
 }
 
@@ -56,7 +55,8 @@ void read_off(Source& source, Receiver& receiver) {
     for (std::size_t i = 0; i < faces; ++i) {
         line = source.content_line();
         const auto count = source.number<std::uint64_t>(line, "the number of a face's vertices");
-        if (count > line.size()) source.fail("a face of " + std::to_string(count) + " vertices in a shorter line");
+        if (count > line.size())
+            source.fail("a face of " + std::to_string(count) + " vertices cannot fit into its line");
         corners.clear();
         for (std::uint64_t k = 0; k < count; ++k)
             corners.push_back(to_index(source, source.number<double>(line, "the number of a vertex")));

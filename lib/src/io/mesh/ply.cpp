@@ -215,7 +215,7 @@ private:
                         source_.fail("the last of " + std::to_string(element.count) + " of element " +
                                      quote(element.name) + " ends early; the file is truncated");
                     if (p < wanted)
-                        source_.fail("a list of " + quote(words_[at]) + " entries, its line has " +
+                        source_.fail("a list of " + quote(words_[at]) + " entries, but its line has only " +
                                      std::to_string(left) + " left");
                 }
                 place = {at + 1, std::size_t(std::clamp(*count, 0.0, double(left)))};

@@ -33,8 +33,8 @@ const Module& load(const std::string& name, const char* formats) {
     void* const entry = library == nullptr ? nullptr : dlsym(library, ("covol_" + name).c_str());
     if (entry == nullptr) {
         const char* const why = dlerror();
-        throw Error(Errc::Io, path.string() + ": expected covol's module for " + formats +
-                                  " beside libcovol.so, got: " + (why == nullptr ? "no reason" : why) +
+        throw Error(Errc::Io, path.string() + ": covol's module for " + formats +
+                                  " could not be loaded: " + (why == nullptr ? "unknown error" : why) +
                                   "; install covol again, with all the libraries that it depends on");
     }
     return *static_cast<const Module*>(reinterpret_cast<const void* (*)()>(entry)());

@@ -31,10 +31,10 @@ std::vector<std::uint64_t> begins_of(const std::vector<Piece>& files) {
 }  // namespace
 
 ReaderPart check_reader_program() {
-    ReaderPart part{"covol-reader", "DICOM, HDF5, NRRD, MetaImage, apart from this program", reader_program(), {}};
+    ReaderPart part{"covol-reader", "DICOM, HDF5, NRRD, MetaImage, in a separate process", reader_program(), {}};
     if (::access(part.path.c_str(), X_OK) != 0)
-        part.problem = part.path + ": expected a program beside covol's library, got: " + std::strerror(errno) +
-                       "; install covol again";
+        part.problem =
+            part.path + ": expected covol's reader program, got: " + std::strerror(errno) + "; install covol again";
     return part;
 }
 

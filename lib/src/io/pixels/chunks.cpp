@@ -203,7 +203,7 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
     missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
     require_memory(
         double(missing.size()) * double(voxel_count(source_->chunk_size())) * double(pixel_bytes(source_->type())),
-        source_->path() + ": what is asked for of it", "choose a part with `roi`", run);
+        source_->path() + ": the requested part", "choose a part with `roi`", run);
     std::vector<std::vector<std::uint64_t>> groups;
     const std::uint64_t in_layer = std::uint64_t(counts_[0]) * counts_[1];
     for (const std::uint64_t number : missing) {

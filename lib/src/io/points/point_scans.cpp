@@ -59,7 +59,10 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
         if (words.size() < 2 || (per_field && words.size() != header.fields.size() + 1))
             fail(path, lines.number(), "not a line of a PCD header: " + quote(line));
         if (key == "FIELDS" || key == "COLUMNS") {
-            if (words.size() > kMaxFields) fail(path, lines.number(), "expected fewer fields");
+            if (words.size() > kMaxFields)
+                fail(path, lines.number(),
+                     "expected at most " + std::to_string(kMaxFields - 1) + " fields, got " +
+                         std::to_string(words.size() - 1));
             header.fields.assign(words.size() - 1, {});
             for (std::size_t n = 1; n < words.size(); ++n) header.fields[n - 1].name = lower(words[n]);
         } else if (per_field) {
@@ -79,7 +82,9 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
             header.data = lower(words[1]);
             header.points = points.value_or(width * height);
             header.is_organised = height > 1;
-            if (header.points > kMaxPoints) fail(path, "expected fewer points");
+            if (header.points > kMaxPoints)
+                fail(path, "expected at most " + std::to_string(kMaxPoints) + " points, got " +
+                               std::to_string(header.points));
             return header;
         } else if (key == "VIEWPOINT" && words.size() >= 4) {
             Vec3 at;
@@ -360,7 +365,7 @@ PointTable parse_ptx(const std::string& path, const std::string& text) {
     table.space = PointSpace::World;
     table.order = PointOrder::XYZ;
     table.rule = "points of " + std::to_string(scans) + (scans == 1 ? " PTX scan" : " PTX scans") +
-                 ", by the matrix of its header, " + std::to_string(empty) + " without an echo passed over";
+                 ", by the matrix of its header, " + std::to_string(empty) + " without an echo skipped";
     return table;
 }
 

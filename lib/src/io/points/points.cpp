@@ -117,7 +117,7 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
         cloud.unit = table.unit;
         cloud.rule += "; lengths in " + table.unit;
     } else if (has_lengths) {
-        cloud.rule += ", times a scale that is given, not in " + table.unit + " as the file says";
+        cloud.rule += ", times the given scale, which overrides the file's unit " + table.unit;
     }
     return cloud;
 }

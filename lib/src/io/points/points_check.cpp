@@ -54,7 +54,7 @@ std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
             default:
                 add(now.space == PointSpace::Ras ? "they are in LPS, not in RAS" : "they are world units, not voxels");
         }
-    if (reading.options.scale != now.scale) add("their unit is another than the image's");
+    if (reading.options.scale != now.scale) add("their unit differs from the image's");
     if (reading.options.channels != now.channels) add("their slices count the channels of a hyperstack");
     return text;
 }
@@ -262,8 +262,8 @@ std::string advice_of(const Checker& checker, const std::vector<Reading>& remedi
     for (const Reading& reading : remedies)
         text += (text.empty() ? "; `" : ", or `") + reading.advice + "` would bring them inside (" +
                 checker.name(reading) + ")";
-    if (remedies.size() > 1) text += "; more than one reading fits: look which one is meant";
-    if (!spacing_known) text += "; the image states no spacing, `spacing = sx,sy,sz` gives it";
+    if (remedies.size() > 1) text += "; several interpretations are possible: check which one is right";
+    if (!spacing_known) text += "; the image states no spacing: set it with `spacing = sx,sy,sz`";
     return text;
 }
 
@@ -283,11 +283,11 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
     }
     if (!geometry.spacing_known && cloud.space != PointSpace::Index)
         run.warn(cloud.source +
-                 ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
-                 "`spacing = sx,sy,sz` gives it, or `points_space = index` if the points are voxels");
+                 ": the points are in world units, but the image states no spacing, so 1 is used: set it with "
+                 "`spacing = sx,sy,sz`, or use `points_space = index` if the points are voxels");
     for (const Reading& reading : checker.more_plausible())
         run.warn(cloud.source + ": the points lie inside the image, but `" + reading.advice +
-                 "` would put them on voxel centres: is it that " + checker.name(reading) + "?");
+                 "` would put them on voxel centres: perhaps " + checker.name(reading));
 }
 
 }  // namespace covol

@@ -86,7 +86,7 @@ std::optional<Columns> find_napari(const Header& header) {
     const bool shapes = index && (columns.shape || columns.vertex);
     if (shapes) columns.line = {*index};
     columns.rule = header.names(columns.at) + (shapes ? " of napari shapes" : " of napari points");
-    if (axes.size() > 3) columns.rule += ", the axes before them (time, channel) passed over";
+    if (axes.size() > 3) columns.rule += ", the axes before them (time, channel) ignored";
     return columns;
 }
 

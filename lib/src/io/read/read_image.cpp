@@ -101,7 +101,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
         if (!info.spacing_known[a]) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[a]);
     if (axes.empty()) return;
     run.warn(path + ": the file states no spacing along " + axes +
-             ": 1 stands in for it, and lengths, volumes and shapes may be wrong; `spacing = sx,sy,sz` gives it");
+             ": 1 is used instead, so lengths, volumes and shapes may be wrong; set it with `spacing = sx,sy,sz`");
 }
 
 /// Applies the user's corrections, and makes the last checks.

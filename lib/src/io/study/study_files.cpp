@@ -31,8 +31,8 @@ public:
         const std::string path = (fs::path(folder_) / guess.path).lexically_normal().string();
         if (digest_of(path) != guess.digest)
             throw Error(Errc::InvalidInput, "study: " + path +
-                                                ": this file has changed since it became a guess; put the old one "
-                                                "back, or name the guess again");
+                                                ": this file has changed since it was chosen as the guess; restore the "
+                                                "old file, or choose the guess again");
         ReadMarksOptions options;
         options.guess_label = guess.label;
         GivenGuess given = kind_of_file(path) == FileKind::Image

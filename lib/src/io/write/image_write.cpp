@@ -85,10 +85,10 @@ double moved_by_rounding(const ImageGeometry& geometry) {
 void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
     constexpr double kMaxReported = 0.01, kMax = 0.5;  // voxels
     const double moved = moved_by_rounding(geometry);
-    const std::string what = path + ": NIfTI-1 keeps places in single precision, which moves voxels by up to " +
-                             detail::number(moved) + " of their size so far from 0";
-    if (moved > kMax) throw Error(Errc::Unsupported, what + "; write .nrrd or .mha, which keep them");
-    if (moved > kMaxReported) run.warn(what + "; .nrrd and .mha keep them");
+    const std::string what = path + ": NIfTI-1 stores positions in single precision, which displaces voxels by up to " +
+                             detail::number(moved) + " of their size at this distance from 0";
+    if (moved > kMax) throw Error(Errc::Unsupported, what + "; write .nrrd or .mha, which store double precision");
+    if (moved > kMaxReported) run.warn(what + "; .nrrd and .mha store double precision");
 }
 
 /// Warns about properties of the geometry that the format cannot store.
@@ -96,19 +96,19 @@ void warn_of_losses(const std::string& path, const ImageGeometry& geometry, cons
     const std::string extension = detail::extension(path);
     const bool is_tiff = extension == ".tif" || extension == ".tiff";
     if ((is_tiff || extension == ".zarr") && !geometry.is_axis_aligned())
-        run.warn(path + ": the image's axes are turned, and " +
+        run.warn(path + ": the image is rotated, and " +
                  (!is_tiff            ? "OME-Zarr 0.4"
                   : is_ome_tiff(path) ? "OME-TIFF"
                                       : "TIFF") +
-                 " has no place for that: the labels lie on its voxels, but elsewhere in the world; write .nrrd or "
+                 " cannot store that: the labels match its voxels, but their world coordinates differ; write .nrrd or "
                  ".nii.gz to keep the direction");
     if (extension == ".nii" || extension == ".nii.gz") check_precision(path, geometry, run);
     if (is_ome_tiff(path) && geometry.origin != Vec3{0, 0, 0})
         run.warn(path +
-                 ": OME-TIFF has no place for the image's origin: its first voxel lies at 0 there; .tif, .nrrd "
-                 "and others keep it");
+                 ": OME-TIFF cannot store the image's origin: the first voxel is placed at 0; .tif, .nrrd "
+                 "and others keep the origin");
     if (extension == ".npy")
-        run.warn(path + ": NumPy's format has the voxels alone: neither spacing nor unit, origin and direction");
+        run.warn(path + ": NumPy's format stores only the voxels, without spacing, unit, origin and direction");
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ void deflate_into(std::string& out, const std::string& bytes, BlockPacking packi
     z_stream stream{};
     if (deflateInit2(&stream, kLevel, Z_DEFLATED, packing == BlockPacking::Zlib ? kWindow : -kWindow, kMemory,
                      runs ? Z_RLE : Z_DEFAULT_STRATEGY) != Z_OK)
-        throw Error(Errc::Io, "zlib does not start");
+        throw Error(Errc::Io, "zlib could not be initialised");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, deflateEnd);
     constexpr std::uint64_t kFlush = 64;
     out.resize(deflateBound(&stream, bytes.size()) + kFlush);
@@ -30,7 +30,7 @@ void deflate_into(std::string& out, const std::string& bytes, BlockPacking packi
     const bool whole = packing == BlockPacking::Zlib;
     const int status = deflate(&stream, whole ? Z_FINISH : Z_SYNC_FLUSH);
     if (status != (whole ? Z_STREAM_END : Z_OK) || stream.avail_in != 0 || stream.avail_out == 0)
-        throw Error(Errc::Io, "zlib does not pack the voxels");
+        throw Error(Errc::Io, "zlib could not compress the voxels");
     out.resize(stream.total_out);
 }
 

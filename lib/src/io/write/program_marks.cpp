@@ -75,8 +75,8 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
         }
     constexpr double kFarthest = 32766;  // pixels: the range of a signed 16-bit number, minus one
     if (high[0] > kFarthest || high[1] > kFarthest)
-        throw Error(Errc::Unsupported, path + ": a selection of Fiji reaches 32766 pixels, got (" + shortest(high[0]) +
-                                           ", " + shortest(high[1]) + "); write .csv or .mrk.json");
+        throw Error(Errc::Unsupported, path + ": coordinates of a Fiji selection are at most 32766 pixels, got (" +
+                                           shortest(high[0]) + ", " + shortest(high[1]) + "); write .csv or .mrk.json");
     if (low[0] < -0.5 || low[1] < -0.5 || low[2] < -0.5)
         throw Error(Errc::InvalidInput, path + ": expected marks within the image, got voxel (" + shortest(low[0]) +
                                             ", " + shortest(low[1]) + ", " + shortest(low[2]) + ")");

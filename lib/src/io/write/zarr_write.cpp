@@ -258,7 +258,7 @@ private:
         std::string out(values.size() + BLOSC_MAX_OVERHEAD, '\0');
         const int size = blosc_compress_ctx(kCodecLevel, BLOSC_SHUFFLE, width_, values.size(), values.data(),
                                             out.data(), out.size(), kCodec, 0, 1);
-        if (size <= 0) throw Error(Errc::Unsupported, "this libblosc cannot pack by zstd");
+        if (size <= 0) throw Error(Errc::Unsupported, "this libblosc does not support zstd");
         out.resize(std::size_t(size));
         return out;
     }

@@ -61,7 +61,7 @@ struct Maker {
         made.mesh_report = relax_mesh(made.mesh, *made.level_set, {options().extract.isovalue}, run());
         if (creases == nullptr || options().extract.isovalue != 0) return;
         if (const std::size_t divided = cloud::sharpen(made.mesh, *creases, domain.voxel_size); divided > 0)
-            run().info("mesh: " + std::to_string(divided) + " edges divided along creases");
+            run().info("mesh: " + std::to_string(divided) + " edges split along creases");
     }
 
     void take_mesh() {
@@ -147,8 +147,8 @@ struct Maker {
             lengths += (n > 0 ? ", " : "") + number(holes.loops[n].length);
         made.report.remarks.choose(
             "holes", to_string(holes.policy),
-            (options().holes.policy == Holes::Auto ? "the points hold one side of something; " : std::string()) +
-                (holes.loops.empty() ? "none: all of the surface is within " + number(holes.distance) + " of points"
+            (options().holes.policy == Holes::Auto ? "the points cover only one side of an object; " : std::string()) +
+                (holes.loops.empty() ? "none: the whole surface is within " + number(holes.distance) + " of points"
                                      : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
                                            (holes.loops.size() > kMaxReportedLoops ? ", ..." : "") +
                                            (holes.policy == Holes::Open ? "; the level set stays closed" : "")),

@@ -31,17 +31,18 @@ std::vector<std::string> compare_with_marks(SegmentReport& report, const FloatGr
     if (image != nullptr) found.farthest_index = image->geometry().world_to_index(found.farthest_world);
     if (found.count > 0)
         lines.push_back(std::to_string(found.count) + " of " + std::to_string(marks.size()) + " marks lie more than " +
-                        number(beyond) + " off the surface, the farthest " + number(found.farthest) + " " +
+                        number(beyond) + " from the surface, the farthest " + number(found.farthest) + " " +
                         place_of(image, found.farthest_world) +
-                        ": look there whether the mark is wrong, or mark more beside it");
+                        ": check whether that mark is wrong, or add marks near it");
     const auto count = double(marks.size());
     const double h = surface.voxelSize()[0], bias = sum / count;
     const double error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
     report.fit.bias = bias;
     if (std::abs(bias) >= kDoubts.bias_voxels * std::max(h, report.cloud.noise) &&
         std::abs(bias) >= kDoubts.bias_errors * error)
-        lines.push_back("the marks lie " + number(std::abs(bias) / h) + " voxels " + (bias > 0 ? "outside" : "inside") +
-                        " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
+        lines.push_back("on average the marks lie " + number(std::abs(bias) / h) + " voxels " +
+                        (bias > 0 ? "outside" : "inside") + " the surface: it is too " +
+                        (bias > 0 ? "small" : "large"));
     return lines;
 }
 

@@ -88,9 +88,9 @@ private:
         const double fraction = double(beyond) / double(std::max<std::size_t>(1, places.size()));
         report_.surface_beyond_marks = fraction;
         if (fraction > kDoubts.far_fraction)
-            warn(number(std::round(100 * fraction)) + " % of the surface lie farther than " + number(far) +
-                 ", half of what the marks measure across, from every mark: it goes on where nothing is marked; mark "
-                 "more there, or give a place outside the body (`outside`)");
+            warn(number(std::round(100 * fraction)) + " % of the surface is farther than " + number(far) +
+                 " (half of the extent of the marks) from every mark: it extends beyond the marked region; add marks "
+                 "there, or give a position outside the body (`outside`)");
     }
 
     /// Noise fills space within its range. If the nearest points lie on sheets although the smoothing was that for
@@ -99,10 +99,10 @@ private:
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
             cloud.near_noise < kDoubts.sheet * cloud.near_reach)
-            warn("the surface is smoothed as if the points had noise of " + number(cloud.noise) +
-                 ", but the nearest of them lie on sheets (" + number(cloud.near_noise) + " off them within " +
+            warn("the surface is smoothed for a noise of " + number(cloud.noise) +
+                 ", but neighbouring points lie on sheets (" + number(cloud.near_noise) + " from them within " +
                  number(cloud.near_reach) +
-                 "): folds or walls closer together than two or three points are lost; sample more densely there");
+                 "): folds or walls that are only two or three points apart are lost; sample more densely there");
     }
 
     /// Values are processed in single precision.
@@ -112,7 +112,7 @@ private:
         const double step = largest * std::numeric_limits<float>::epsilon();
         if (high > low && step > kDoubts.lost_precision * (high - low))
             warn("the image's values lie between " + number(low) + " and " + number(high) +
-                 ", where single precision has steps of " + number(step) + ": subtract an offset first");
+                 ", where single precision resolves only steps of " + number(step) + ": subtract an offset first");
     }
 
     /// Some of the marks, and the surface's normals there.
@@ -153,22 +153,22 @@ private:
             *problem_.image, at.places, at.normals, h_,
             is_line(feature) ? detail::BorderKind::Line : detail::BorderKind::Slope, problem_.run);
         report_.image_border = {border.at, border.fraction, border.errors};
-        const char* const look = ": look whether the marks belong to this image, channel and space";
+        const char* const look = ": check whether the marks belong to this image, channel and coordinate system";
         if (support.fraction + kDoubts.support_errors * support.error < kDoubts.image_support)
-            warn("the image varies more five voxels beside the marks than where they lie (in " +
+            warn("the image varies more at five voxels from the marks than at the marks (in " +
                  number(std::round(100 * (1 - support.fraction))) + " of 100 pairs)" + look);
         else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
-            warn("what the image shows at some marks hardly foretells where the others lie (gain " +
-                 number(guidance.gain) + " nats a mark)" + look);
+            warn("the image at some marks hardly predicts where the others lie (a gain of " + number(guidance.gain) +
+                 " nats per mark)" + look);
         else if (border.fraction < kDoubts.border_fraction && border.errors > kDoubts.border_errors)
             warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
-                 (border.at < 0 ? "inside" : "outside") + " the marks, all along (where they lie it has " +
-                 number(std::round(100 * border.fraction)) + " % of that)" + look + ", and are of its size");
+                 (border.at < 0 ? "inside" : "outside") + " the marks, everywhere (at the marks they have " +
+                 number(std::round(100 * border.fraction)) + " % of that steepness)" + look + ", and have its scale");
     }
 
     void find_silent_image() {
         if (solution_.was_requested && !solution_.guidance.used && !solution_.start.inference.used)
-            warn("the image had no say between the marks: " + solution_.guidance.reason);
+            warn("the image was not used between the marks: " + solution_.guidance.reason);
     }
 
     void find_wrong_marks() {
@@ -181,7 +181,7 @@ private:
         if (wrong.size() > kNamed) places += "; and " + std::to_string(wrong.size() - kNamed) + " more";
         warn(std::to_string(wrong.size()) + " of " + std::to_string(wrong.size() + marks_.size()) +
              " marks are likely wrong and were left out (" + places +
-             "): correct or delete them, or mark more beside them if the body lacks a part there");
+             "): correct or delete them, or add marks near them if a part of the body is missing there");
     }
 
     void find_doubtful_body() {
@@ -189,24 +189,23 @@ private:
         if (!expected || expected->value >= kDoubts.min_expected_dice) return;
         const auto percent = [](double value) { return number(std::round(100 * value) / 100); };
         warn(
-            "the body is likely not found well: by marks that were left out, its Dice coefficient with the truth is "
+            "the body is probably inaccurate: cross-validation on held-out marks predicts a Dice coefficient of "
             "about " +
             percent(expected->value) + " (" + percent(expected->low) + " to " + percent(expected->high) +
-            " with a probability of 90 %); mark more, above all where it is thin or branches");
+            " with a probability of 90 %); add marks, especially where the body is thin or branches");
     }
 
     void find_pieces() {
         if (solution_.start.origin != StartOrigin::Guess) return;
         const std::size_t marks = solution_.start.guess.marks;
         if (surface_.measures.components > 1)
-            warn(
-                "the surface through the marks falls into " + std::to_string(surface_.measures.components) +
-                " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
+            warn("the surface through the marks has " + std::to_string(surface_.measures.components) +
+                 " pieces: if they are one body, add marks between them; mark several bodies as separate structures");
         if (const int genus = surface_.measures.genus;
             genus > 1 && double(marks) < kFinal.marks_of_handle * double(genus))
-            warn("the surface has " + std::to_string(genus) + " handles on " + std::to_string(marks) +
-                 " marks: where the body has no holes its walls are thinner than the marks are off; more marks there, "
-                 "or better ones, close them");
+            warn("the surface has " + std::to_string(genus) + " handles with " + std::to_string(marks) +
+                 " marks: if the body has no holes, its walls are thinner than the errors of the marks; more "
+                 "marks there, or more precise ones, close the holes");
     }
 
     void find_seeds() {
@@ -220,9 +219,9 @@ private:
         const HolesReport& holes = surface_.holes;
         // A surface that ends where the points end is correct, and its choice is reported elsewhere.
         if (surface_.fraction_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
-        warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface lie farther than " +
+        warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface is farther than " +
              number(holes.distance) + " from every point: " +
-             (holes.policy == Holes::Flat ? "there flat patches close it" : "there curvature alone closes it"));
+             (holes.policy == Holes::Flat ? "flat patches close it there" : "only curvature determines it there"));
     }
 
     const Problem& problem_;

@@ -80,7 +80,7 @@ CoarsePass pass(const Problem& problem, const StartSurface& start, const EdgeOpt
     const double h = kCoarse.refinement * start.h();
     const EdgeOptions edge = coarsened(fine_edge, h);
     StartSurface coarse = coarsened(problem, start, h);
-    SegmentReport::CoarseLevel level{h, 0, 0, "nothing of the start is left on so coarse a lattice"};
+    SegmentReport::CoarseLevel level{h, 0, 0, "the start is too small for such a coarse lattice"};
     if (coarse.u) {
         const FloatGridPtr before = coarse.u->deepCopy();
         if (levels > 1) {
@@ -89,7 +89,7 @@ CoarsePass pass(const Problem& problem, const StartSurface& start, const EdgeOpt
             if (coarser.u) coarse = from_coarse_level(std::move(coarse), coarser.u);
         }
         const Solution solution = flow(problem, std::move(coarse), edge);
-        level = {h, solution.solve.steps, solution.solve.active_voxels, "the surface vanished there"};
+        level = {h, solution.solve.steps, solution.solve.active_voxels, "the surface vanished on it"};
         if (!solution.has_vanished()) {
             level.why_not.clear();
             if (!start.facts.tag_distance) step_back(*solution.u, *before, h);

@@ -109,8 +109,8 @@ FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u,
         largest = std::max(largest, double(d_at.getValue(openvdb::Coord::round(where))));
     }
     const double radius = largest + kFields.coarse_factor * h + slack;
-    report.remarks.choose("distance_tube", number(radius),
-                          "the attraction is unlimited: it covers the way from the start", run);
+    report.remarks.choose("distance_tube", number(radius), "the attraction is unlimited: the tube extends to the start",
+                          run);
     return find_distance(points, start.domain, radius, 0, report, run);
 }
 

@@ -70,11 +70,11 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
         if (problem.image == nullptr)
             return detail::why_nothing_held(start.marks.attracting, start.tag_distance.value_or(0), start.encloses);
         if (!start.encloses)
-            return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end "
-                   "mark the cut too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose "
-                   "another start (`init`)";
+            return "the points enclose nothing, and neither points nor edges stopped it; if the structure is cut off "
+                   "at the image's end, mark the cut too, or give a `tag_distance` larger than its radius; or "
+                   "draw `contours`, or choose another start (`init`)";
     }
-    return "nothing held it; lower `delta`, or start closer to the edges (`init`)";
+    return "nothing stopped it; lower `delta`, or start closer to the edges (`init`)";
 }
 
 /// Moves a surface through the marks so that the image's intensity profile between the marks matches the one at them.

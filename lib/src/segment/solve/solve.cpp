@@ -20,8 +20,8 @@ Solution flow_by_levels(const Problem& problem, StartSurface start, const EdgeOp
     if (coarse.u) {
         solution = flow(problem, from_coarse_level(start, coarse.u), edge, reached);
         if (solution.has_vanished()) {
-            coarse.reports.back().why_not = "the surface vanished after it";
-            problem.run.info("coarse level left out: the surface vanished after it");
+            coarse.reports.back().why_not = "the surface vanished on the finer level";
+            problem.run.info("coarse level left out: the surface vanished on the finer level");
             solution = flow(problem, std::move(start), edge, reached);
         }
     } else {
@@ -53,15 +53,18 @@ Solution start_instead(const Problem& problem, const Solution& lost, const Float
         kept.u = u;
         kept.solve = steady_report(*u);
         kept.solve.stop_reason = StopReason::NotRun;
-        kept.report.remarks.warn("the flow closed what had grown to the image's edges: this is that start itself",
-                                 problem.run);
+        kept.report.remarks.warn(
+            "the flow lost the start that was grown to the image's edges: the result is that start itself",
+            problem.run);
         return kept;
     }
     EdgeOptions edge = lost.edges.options;
     edge.feature = EdgeFeature::Slope;
     StepReport report;
-    report.remarks.choose("edge_feature", to_string(edge.feature),
-                          "along lines the surface left the marks: the body between them rests instead", problem.run);
+    report.remarks.choose(
+        "edge_feature", to_string(edge.feature),
+        "with lines as edges the surface moved away from the marks: the body between the contours is kept instead",
+        problem.run);
     Solution rested = flow(problem, {lost.start, u, lost.distance, nullptr, nullptr}, edge, reached);
     report.add(rested.report);
     rested.report = report;
@@ -79,7 +82,7 @@ std::optional<StartSurface> find_better_guess(const Problem& problem, const Choi
         return guess;
     } catch (const Error& error) {
         if (error.code() != Errc::InvalidInput) throw;
-        problem.run.info(std::string("no guess instead: ") + error.what());
+        problem.run.info(std::string("no guess as a replacement: ") + error.what());
         return {};
     }
 }
@@ -103,7 +106,7 @@ Solution guess_instead(const Problem& problem, const Choices& choices, Solution 
     solution.report.remarks.warn(
         std::string("the surface ") +
             (vanished ? "vanished" : "left more than " + number(100 * kDoubts.missed_fraction) + " % of the marks") +
-            ": this is the one through the marks that bends least instead",
+            ": the result is the surface of minimum bending energy through the marks instead",
         problem.run);
     Solution guessed = flow(problem, std::move(*guess), solution.edges.options, reached);
     return after(solution, std::move(guessed));

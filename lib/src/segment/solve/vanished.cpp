@@ -35,7 +35,7 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     std::ostringstream text;
     text.precision(3);
     if (encloses && !is_flat) {
-        text << "the points hold it too loosely at the tag distance " << tag_distance
+        text << "the points are too sparse to hold the surface at the tag distance " << tag_distance
              << "; try `tag_distance = " << kVanished.wider_tag * tag_distance << "`, a lower `delta`, or more points";
         return text.str();
     }
@@ -47,12 +47,12 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     text << (is_line   ? "the points lie on a line"
              : is_flat ? "the points lie in a plane"
                        : "the points enclose nothing")
-         << " and nothing held it; add points on the sides that are missing";
+         << " and keep no surface from vanishing; add points on the sides that are missing";
     if (!is_flat) text << ", or try `init = cloud`";
     const double hull = kVanished.hull * *std::max_element(side.begin(), side.end());
     if (!is_flat && tag_distance < hull)
         text << "; if they surround a body on all sides, try `tag_distance = " << hull << "`";
-    text << "; for a closed layer around them give `max_steps = 0, tag_distance = " << layer
+    text << "; for a closed layer around them set `max_steps = 0, tag_distance = " << layer
          << ", voxel_size = " << layer / kVanished.layer_voxels << "`";
     return text.str();
 }

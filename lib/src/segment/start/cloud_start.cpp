@@ -25,51 +25,56 @@ void report_hints(const HintsReport& hints, Remarks& remarks, const RunContext& 
     if (hints.normals + hints.sensors == 0) return;
     const bool normals = hints.normals > 0 && !hints.from_sensor;
     if (!hints.used)
-        return remarks.warn(std::string(normals ? "the normals" : "the sensor") + " of the points' file not used: " +
+        return remarks.warn(std::string(normals ? "the normals" : "the sensor positions") +
+                                " in the points' file are not used: " +
                                 (hints.why_not.empty() ? "most points have none" : hints.why_not),
                             run);
     remarks.choose("normals", normals ? "as given" : "by the sensor",
                    number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
-                       (hints.inward ? ", after all were turned over, for they pointed inwards" : ""),
+                       (hints.inward ? ", after all were flipped, because they pointed inwards" : ""),
                    run);
     if (1 - hints.agree > kStarts.warn_disagreeing)
-        remarks.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the normals that are " +
-                         (normals ? "given" : "made by the sensor") + " point to the wrong side",
+        remarks.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the " +
+                         (normals ? "given normals" : "normals computed from the sensor positions") +
+                         " point to the wrong side",
                      run);
 }
 
 void report_cloud(const CloudReport& report, std::size_t points, Remarks& remarks, const RunContext& run) {
-    const std::string how = report.fills      ? "; they fill a solid: it ends where their density is half of its median"
+    const std::string how = report.fills
+                                ? "; they fill a solid: its surface is where their density falls to half of its median"
                             : report.encloses ? "; averaged within " + number(report.radius)
-                                              : "; they enclose nothing: inside is what they hide";
+                                              : "; they enclose nothing: the region that they hide from view is inside";
     remarks.choose(
         "start", "cloud",
         std::to_string(points) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how,
         run);
     if (report.fills)
         remarks.warn(
-            "the points fill a solid, they do not lie on a surface: the surface is where their density falls "
-            "to half of its median; if they do lie on one, there are too few of them for their noise",
+            "the points fill a solid instead of lying on a surface: the result is where their density falls "
+            "to half of its median; if they do lie on a surface, there are too few of them for their noise",
             run);
     report_hints(report.hints, remarks, run);
     if (report.stray > 0)
-        remarks.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out",
+        remarks.choose("stray_points", std::to_string(report.stray), "far from all others and not on a sheet: left out",
                        run);
     if (report.enclosed > 0)
         remarks.choose("enclosed_points", std::to_string(report.enclosed),
-                       "inside on both sides by the normals, as where walls touch or cross: left out", run);
+                       "inside on both sides according to the normals, as at walls that touch or cross: left out", run);
     if (report.layered > 0)
         remarks.choose("layered_points", std::to_string(report.layered),
-                       "of layers below others, as of scans that do not quite fit: not passed", run);
+                       "in layers below others, as from scans that are not aligned exactly: the surface does not pass "
+                       "through them",
+                       run);
     if (report.dropped_pieces > 0)
         run.info("cloud: " + std::to_string(report.dropped_pieces) +
-                 " pieces of the surface that hardly a point rested on left out");
+                 " pieces of the surface left out because hardly any points lie on them");
     if (report.joined_pieces > 0)
         run.info("cloud: " + std::to_string(report.joined_pieces) +
-                 " small pieces of the surface joined to what is nearest, points lie between");
+                 " small pieces of the surface joined to the nearest one, because points lie between them");
     if (report.held_voxels > 0)
-        run.info("cloud: its handles and pieces are those of the points' indicator function, which has fewer; " +
-                 std::to_string(report.held_voxels) + " voxels held");
+        run.info("cloud: the surface has the handles and pieces of the points' indicator function, which are fewer; " +
+                 std::to_string(report.held_voxels) + " voxels constrained");
 }
 
 }  // namespace
@@ -100,7 +105,7 @@ StartSurface start_from_cloud(const Problem& problem, const Choices& choices, Ma
             const double range = kStarts.reach_spacings * std::max(report.spacing, choices.h);
             facts.flow.attraction_range = range;
             remarks.choose("attraction_range", number(range),
-                           "the start touches the points, and where there are none nothing should pull", run);
+                           "the start touches the points, and parts without points should not be attracted", run);
         }
         if (!report.encloses) start.obstacle = raised(*start.u, kFlow.hold_depth * choices.h);
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);

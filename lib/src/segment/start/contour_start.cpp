@@ -60,8 +60,8 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
     }
     if (problem.options.contours->flat && loose.empty())
         throw Error(Errc::InvalidInput,
-                    "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a "
-                    "second slice, or give its `contour_thickness`",
+                    "segment: all contours lie on one slice, so the thickness of the body is unknown; mark a "
+                    "second slice, or give `contour_thickness`",
                     "contour_thickness");
     StartSurface start = follow(StartOrigin::Contours, choices, std::move(marks));
     StartFacts& facts = start.facts;

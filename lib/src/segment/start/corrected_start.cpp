@@ -41,18 +41,19 @@ GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, 
     const CorrectionReport& report = start.facts.correction_report = made.report();
     if (report.before_max > kDoubts.far_from_guess * report.depth)
         start.facts.report.remarks.warn(
-            "a mark lies " + number(report.before_max) + " from the guess, whose largest ball inside has a radius of " +
-                number(report.depth) +
-                ": so far from it the guess says little, and its correction may be worse than the guess itself; mark "
-                "more there, or begin from the marks alone",
+            "a mark lies " + number(report.before_max) +
+                " from the guess, whose largest inscribed ball has a radius of " + number(report.depth) +
+                ": at that distance the guess contains little information, and its correction may be worse than the "
+                "guess itself; add marks there, or start from the marks alone",
             run);
     start.u = made.start(run);
     return made;
 }
 
 std::string distances(const CorrectionReport& report) {
-    return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) +
-           ", corrected " + number(report.after_mean) + ", " + number(report.after_max);
+    return "distance of the marks from the surface: mean " + number(report.before_mean) + ", max " +
+           number(report.before_max) + ", after correction " + number(report.after_mean) + ", " +
+           number(report.after_max);
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ StartSurface start_from_corrected_guess(const Problem& problem, const Choices& c
                                 "corrected within " + number(report.min_radius) + " to " +
                                     number(report.largest_radius) + " of " + std::to_string(report.marks) +
                                     " marks and " + std::to_string(report.seeds) +
-                                    " seeds that it had on the wrong side; " + distances(report),
+                                    " seeds that were on the wrong side; " + distances(report),
                                 problem.run);
     return start;
 }

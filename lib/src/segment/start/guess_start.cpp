@@ -80,9 +80,10 @@ void take_sections(const Problem& problem, const std::vector<Vec3>& marks, Start
     if (after >= before) return;
     start.u = u;
     facts.on_surface = marks;
-    facts.guess.summary = std::to_string(marks.size()) + " marks; " + std::to_string(before) +
-                          " places of their sections contradict the surface through them that bends least: the "
-                          "harmonic function between the sections is taken";
+    facts.guess.summary =
+        std::to_string(marks.size()) + " marks; " + std::to_string(before) +
+        " positions in their sections contradict the surface of minimum bending energy through them: the "
+        "harmonic function between the sections is used";
     facts.guess.wrong_seeds = after;
 }
 

@@ -46,7 +46,8 @@ struct GridOf {
     }
     template <typename Marked>
     FloatGridPtr operator()(const Marked&) const {
-        throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own", "init");
+        throw Error(Errc::InvalidOptions, "segment: expected a start that defines a grid by itself, such as a mesh",
+                    "init");
     }
 };
 
@@ -93,8 +94,8 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
         correct_start(problem, start);
         facts.on_surface = facts.marks.trusted;
         facts.origin = StartOrigin::Guess;
-        facts.report.remarks.choose("start", "near its marks", "it is a guess that they correct, and nothing flows",
-                                    run);
+        facts.report.remarks.choose("start", "near its marks",
+                                    "it is used as a guess that the marks correct, without a flow", run);
         return start;
     }
     start.u = carried_beyond_turned_image(problem, facts.domain, start.u);

@@ -18,7 +18,7 @@ StartSurface start_from_seeds(const Problem& problem, const Choices& choices, Ma
     }
     facts.report.remarks.choose("start", "seeds",
                                 options.outside.empty()
-                                    ? "there are no marks, and no seeds outside: a little around the seeds inside"
+                                    ? "there are no marks, and no seeds outside: a small region around the seeds inside"
                                     : "there are no marks: halfway between seeds inside and outside",
                                 problem.run);
     if (options.outside.empty()) grow_to_edges(problem, choices, start);

@@ -116,14 +116,14 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
     if (std::any_of(points.begin(), points.end(), is_at_end)) {
         std::optional<CutBody> body =
             tag_with(tagger, points, domain, detail::carried_on(points, faces, kStarts.tagged_beyond_voxels * tagger.h),
-                     "their section on the image's end slices goes on beyond it");
+                     "the marks' section on the image's end slices is continued beyond it");
         if (body) return body;
     }
     std::vector<Vec3> images =
         detail::mirrored(points, faces, kStarts.mirror_spacings * measure_spacing(points).median);
     if (images.empty() || encloses_alone(tagger, points, domain)) return {};
     return tag_with(tagger, points, domain, std::move(images),
-                    "with their mirror image beyond the image's end they enclose a body");
+                    "together with their mirror image beyond the image's end, the marks enclose a body");
 }
 
 /// Marks within the section on an end slice, and the points that continue them, show that the body extends beyond it;
@@ -145,8 +145,10 @@ MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSu
         std::erase_if(*set, caps);
     }
     if (dropped > 0)
-        remarks.choose("cap_marks", std::to_string(dropped),
-                       "marks within the section on the image's end slices close the body there and do not pull", run);
+        remarks.choose(
+            "cap_marks", std::to_string(dropped),
+            "marks within the section on the image's end slices close the body there and do not attract the surface",
+            run);
     return marks;
 }
 
@@ -239,7 +241,7 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
         start.u = closed;
         facts.flow.follow = true;
         remarks.choose("start", "closing",
-                       "of the tagged surface by a ball of radius D, for D is wider than " +
+                       "of the tagged surface by a ball of radius D, because D exceeds " +
                            number(kStarts.close_from_voxels) + " voxels",
                        run);
     }

@@ -84,8 +84,8 @@ TEST_CASE("NumPy's arrays that are none, or no volumes") {
         CHECK_THAT(message_of([&] { (void)read_image(scratch.write("a.npy", bytes)); }), Catch::Contains(part));
     };
     const std::string good = npy<std::uint16_t>("<u2", "False", "(2, 3, 4)", 24);
-    is_refused("this is no array", "expected NumPy's mark");
-    is_refused(good.substr(0, 60), "a header of 118 bytes");
+    is_refused("this is no array", "expected NumPy's signature");
+    is_refused(good.substr(0, 60), "its header claims 118 bytes");
     is_refused(good.substr(0, good.size() - 1), "a.npy");
     is_refused(npy<std::uint16_t>("<u2", "None", "(2, 3, 4)", 24), "expected descr, fortran_order and shape");
     is_refused(npy<double>("<c8", "False", "(2, 3, 4)", 24), "got values of the type '<c8'");

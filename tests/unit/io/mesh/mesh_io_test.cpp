@@ -194,8 +194,8 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.obj", "v 0 0 0\nf 1 2 3\n"), "refers to vertex 1");
     check_refused(folder.file("a.obj", "v 0 0 0\nf 1 -2 1\n"), "number of a vertex");
     check_refused(folder.file("a.obj", "v 0 0 0\n"), "no triangle");
-    check_refused(folder.file("a.off", "OFF\n1000000000000 1 0\n0 0 0\n"), "room");
-    check_refused(folder.file("a.off", "OFF\n1 1 0\n0 0 0\n4000000000 0 0 0\n"), "shorter line");
+    check_refused(folder.file("a.off", "OFF\n1000000000000 1 0\n0 0 0\n"), "a file of this size");
+    check_refused(folder.file("a.off", "OFF\n1 1 0\n0 0 0\n4000000000 0 0 0\n"), "cannot fit into its line");
     check_refused(folder.file("a.off", "OFF\n3 1 0\n0 0 0\n1.5 0 0\n# padding\n"), "end of the file");
     check_refused(folder.file("a.stl", "abc"), "too short");
     check_refused(folder.file("a.stl", std::string(80, 'x') + "\xff\xff\xff\xff"), "too short");
@@ -430,7 +430,7 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     // The same indices many times.
     std::string many;
     for (int n = 0; n < 200; ++n) many += R"({"attributes":{"POSITION":0},"indices":1},)";
-    refused(R"("primitives":[)", R"("primitives":[)" + many, "over and over");
+    refused(R"("primitives":[)", R"("primitives":[)" + many, "the same data too often");
     const std::string whole = glb_of(json, binary);
     for (std::size_t size = 0; size < whole.size(); ++size)
         CHECK_THROWS_AS(read_mesh(folder.file("d.glb", whole.substr(0, size))), Error);

@@ -571,7 +571,7 @@ TEST_CASE("archives that lie are refused before memory is taken") {
     contains(read_error(scratch, "a.zip", secret), "is encrypted");
     std::string broken = archive;
     broken[entry + 16] ^= 1;  // its checksum
-    contains(read_error(scratch, "a.zip", broken), "does not agree with its checksum");
+    contains(read_error(scratch, "a.zip", broken), "does not match its checksum");
 }
 
 TEST_CASE("damaged files of every format end in an Error, never in a crash") {

@@ -98,7 +98,7 @@ TEST_CASE("readings that fit equally well are all told") {
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
     contains(message, "; `points_order = zyx` would");
     contains(message, "or `points_space = index` would");
-    contains(message, "more than one reading fits");
+    contains(message, "several interpretations are possible");
 }
 
 TEST_CASE("an image without spacing is asked for it where points are lengths") {
@@ -107,7 +107,7 @@ TEST_CASE("an image without spacing is asked for it where points are lengths") {
     geometry.spacing_known = false;
     contains(verdict(cloud_of({{500, 90, 90}, {-3000, 3, 3}}), geometry), "`spacing = sx,sy,sz`");
     contains(verdict(cloud_of({{5, 9, 9}}), geometry),
-             "[cloud.csv: the points are in world units, and the image states no spacing");
+             "[cloud.csv: the points are in world units, but the image states no spacing");
     CHECK(verdict(cloud_of({{5, 9, 9}}, PointSpace::Index), geometry).empty());
 }
 

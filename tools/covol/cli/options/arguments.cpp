@@ -121,7 +121,7 @@ FrameChoice parse_frames(const std::string& flag, const std::string& text) {
     const std::size_t dash = text.find('-');
     choice.first = number(std::string_view(text).substr(0, dash));
     choice.last = dash == std::string::npos ? choice.first : number(std::string_view(text).substr(dash + 1));
-    if (choice.last < choice.first) bad_text(flag, "a range that ascends", text);
+    if (choice.last < choice.first) bad_text(flag, "an ascending range", text);
     return choice;
 }
 

@@ -160,7 +160,7 @@ private:
         }
         ++at_;
         if (std::string_view(" \t\r\n,]=#").find(peek()) == std::string_view::npos)
-            fail("expected a blank or the end of the line behind a text in quotes");
+            fail("expected a blank or the end of the line after a text in quotes");
         return value;
     }
 
@@ -180,8 +180,8 @@ private:
             digits > 0 && number.size() == digits && error == std::errc() && end == number.data() + number.size();
         if (!whole || code == 0 || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000))
             fail(
-                "a backslash in double quotes begins an escape of TOML such as \\\\ or \\u00b5; a text in 'single "
-                "quotes' has none");
+                "a backslash in double quotes begins a TOML escape such as \\\\ or \\u00b5; use 'single quotes' for a "
+                "text without escapes");
         add_utf8(code, value);
         at_ += digits;
     }

@@ -75,8 +75,9 @@ const CLI::Option& option_of_job(const CLI::App& command, const std::string& nam
         throw Error(Errc::Unsupported,
                     source + ": this covol has no option '" + name + "' of '" + command.get_name() + "'");
     if (role_of(*option) == OptionRole::Conduct)
-        throw Error(Errc::Unsupported, source + ": it asks for --" + name +
-                                           ", which says how a run goes on and is for the command line alone");
+        throw Error(Errc::Unsupported,
+                    source + ": it contains --" + name +
+                        ", which controls how a run continues and is allowed on the command line only");
     return *option;
 }
 

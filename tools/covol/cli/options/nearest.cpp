@@ -75,7 +75,7 @@ std::string unknown_name(const CLI::App& program, const std::vector<std::string>
     };
     const auto chosen = std::find_if(words.begin(), words.end(), is_command);
     if (chosen == words.end() && !words.empty() && !words[0].starts_with('-'))
-        return with_hint("'" + words[0] + "' is no command of covol", nearest(words[0], commands), "covol --help");
+        return with_hint("'" + words[0] + "' is not a command of covol", nearest(words[0], commands), "covol --help");
     std::vector<std::string> names = names_of_options(program);
     std::string help = "covol --help";
     if (chosen != words.end()) {
@@ -91,7 +91,7 @@ std::string unknown_name(const CLI::App& program, const std::vector<std::string>
             return known == name || (known.size() == 2 && known[1] != '-' && name[1] != '-' && name.starts_with(known));
         };
         if (std::none_of(names.begin(), names.end(), is_given))
-            return with_hint(name + " is no option of covol" + (chosen != words.end() ? " " + *chosen : ""),
+            return with_hint(name + " is not an option of covol" + (chosen != words.end() ? " " + *chosen : ""),
                              nearest(name, names), help);
     }
     return {};

@@ -118,7 +118,7 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
     if (!fs::exists(target, status)) return;
     if (!is_zarr_store(target.string()))
         throw Error(Errc::Io, flag + ": " + path +
-                                  ": cannot write: something that is no Zarr store is there; choose "
+                                  ": cannot write: it exists and is not a Zarr store; choose "
                                   "another name");
     for (const std::string& input : inputs_) {
         std::vector<std::string> files =

@@ -230,7 +230,7 @@ std::string one_line(const MeshDeviation& d) {
 }
 
 std::string plain_mesh_line(std::uint64_t triangles) {
-    return std::to_string(triangles) + " triangles, as marching cubes leave them";
+    return std::to_string(triangles) + " triangles, as produced by marching cubes";
 }
 
 std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation) {

@@ -85,7 +85,7 @@ int run_this_program(const std::vector<std::string>& words, const RunContext& ru
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     run.check();
-    if (ended < 0) throw Error(Errc::Io, self + ": lost: " + std::strerror(errno));
+    if (ended < 0) throw Error(Errc::Io, self + ": its exit code cannot be read: " + std::strerror(errno));
     return WIFEXITED(status) ? WEXITSTATUS(status) : kDefect;
 }
 

@@ -16,7 +16,7 @@ struct ThreadCount {
 /// Messages for a lack of memory, or of threads.
 constexpr const char* kOutOfMemory = "out of memory; use a larger --voxel-size or a --roi";
 constexpr const char* kNoThread =
-    "the system makes no more threads or processes; see ulimit -u, and pids.max of the control group, or use fewer "
+    "the system allows no more threads or processes; see ulimit -u, and pids.max of the control group, or use fewer "
     "(--threads 1)";
 
 /// Whether this was thrown because a thread cannot be created: by the standard library, or by TBB.

@@ -35,7 +35,7 @@ public:
             fail(path, "ROI " + quote(name) + ": expected a Fiji ROI, got " + quote(data.substr(0, 4)));
         version_ = bytes_.at<std::int16_t>(4);
         type_ = bytes_.at<std::uint8_t>(6);
-        if (type_ > kPoint) fail(path, "ROI " + quote(name) + ": there is no type " + std::to_string(type_));
+        if (type_ > kPoint) fail(path, "ROI " + quote(name) + ": unknown type " + std::to_string(type_));
         subtype_ = bytes_.at<std::int16_t>(48);
         sub_pixel_ = version_ >= 222 && (bytes_.at<std::int16_t>(50) & kSubPixel) != 0;
         second_ = bytes_.at<std::uint32_t>(60);
@@ -116,9 +116,10 @@ private:
     }
     [[nodiscard]] double required_slice() const {
         if (const auto z = slice()) return *z;
-        fail(path_, "ROI " + quote(name_) + " (" + kind() +
-                        "): expected a slice, it has none or lies on all; give it one in Fiji (ROI Manager > "
-                        "Properties > Position, or draw it with its slice in view and Add)");
+        fail(path_,
+             "ROI " + quote(name_) + " (" + kind() +
+                 "): expected a slice, but it has none or belongs to all slices; assign one in Fiji (ROI Manager > "
+                 "Properties > Position, or draw it while its slice is shown and click Add)");
     }
 
     [[nodiscard]] std::uint64_t vertex_count() const {
@@ -204,7 +205,7 @@ private:
                 fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " +
                                 std::to_string(segment));
             const std::uint64_t points = segment < 2 ? 1 : std::uint64_t(segment);
-            if (2 * points > count - n) fail(path_, "ROI " + quote(name_) + ": its path is cut short");
+            if (2 * points > count - n) fail(path_, "ROI " + quote(name_) + ": its path is truncated");
             std::vector<Vec3> given;
             for (std::uint64_t i = 0; i < points; ++i, n += 2)
                 given.push_back({real(kHeader + 4 * n) - 0.5, real(kHeader + 4 * n + 4) - 0.5, z});
@@ -242,7 +243,7 @@ public:
         : path_(path), structures_by_(structures_by) {}
     void add(const std::string& name, std::string_view data) {
         const Roi roi(path_, name, data);
-        ++kinds_[roi.add_to(table_, structures_by_) ? roi.kind() : "without marks, passed over"];
+        ++kinds_[roi.add_to(table_, structures_by_) ? roi.kind() : "without marks, skipped"];
     }
     [[nodiscard]] PointTable finish() {
         table_.space = PointSpace::Index;

@@ -29,7 +29,7 @@ std::uint64_t find_end(const Bytes& bytes, const std::string& path) {
             const std::uint64_t at = bytes.size() - kEndSize - back;
             if (bytes.at<std::uint32_t>(at) == kEndSignature) return at;
         }
-    fail(path, "expected a ZIP archive, found no directory at its end; it is truncated or none");
+    fail(path, "expected a ZIP archive, found no directory at its end; it is truncated, or not a ZIP archive");
 }
 
 Entry read_entry(const Bytes& bytes, std::uint64_t at, const std::string& path) {
@@ -48,7 +48,7 @@ Entry read_entry(const Bytes& bytes, std::uint64_t at, const std::string& path) 
 std::string inflate(const Entry& entry, std::string_view packed, const std::string& path) {
     std::string content(entry.size, '\0');
     z_stream stream{};
-    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(Errc::Io, path + ": zlib does not start");
+    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(Errc::Io, path + ": zlib could not be initialised");
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
     stream.avail_in = static_cast<uInt>(packed.size());
     stream.next_out = reinterpret_cast<Bytef*>(content.data());
@@ -66,8 +66,10 @@ std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::
         throw Error(Errc::Unsupported, path + ": entry " + quote(entry.name) + " is " + what);
     };
     if ((entry.flags & 1) != 0) unsupported("encrypted");
-    if (entry.method != 0 && entry.method != 8) unsupported("neither stored nor deflated; pack the archive anew");
-    if (entry.size == 0xFFFFFFFF || entry.packed == 0xFFFFFFFF) unsupported("in the ZIP64 form");
+    if (entry.method != 0 && entry.method != 8)
+        unsupported("neither stored nor deflated; create the archive again with one of these methods");
+    if (entry.size == 0xFFFFFFFF || entry.packed == 0xFFFFFFFF)
+        unsupported("in the ZIP64 format, which is not supported");
     if (bytes.at<std::uint32_t>(entry.local) != kLocalSignature) fail(path, "the ZIP archive's directory is damaged");
     const std::uint64_t begin = entry.local + kLocalSize + bytes.at<std::uint16_t>(entry.local + 26) +
                                 bytes.at<std::uint16_t>(entry.local + 28);
@@ -81,7 +83,7 @@ std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::
 std::string unpack(const Entry& entry, std::string_view packed, const std::string& path) {
     const std::string content = entry.method == 0 ? std::string(packed) : inflate(entry, packed, path);
     if (crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())) != entry.checksum)
-        fail(path, "entry " + quote(entry.name) + " does not agree with its checksum; the archive is damaged");
+        fail(path, "entry " + quote(entry.name) + " does not match its checksum; the archive is damaged");
     return content;
 }
 
@@ -107,8 +109,8 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
         unpacked += entry.size;
         if (unpacked > maximum)
             throw Error(Errc::Unsupported, path + ": an archive of " + std::to_string(bytes.size()) +
-                                               " bytes claims to hold more than " + std::to_string(maximum) +
-                                               ", which no marks do; unpack it, and give its files");
+                                               " bytes claims to contain more than " + std::to_string(maximum) +
+                                               " bytes, which is implausible for marks; unpack it, and give its files");
         use(entry.name, unpack(entry, packed, path));
     }
 }
