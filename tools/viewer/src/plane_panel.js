@@ -5,11 +5,11 @@ import {AXIS_COLORS, dominant, planeName} from './space.js';
 import {icon} from './icons.js';
 import {PictureLayer} from './picture_layer.js';
 
-const MOST_STEP = 1024, LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
+const MAX_STEP = 1024, LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
 const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom', 'marks'];
 
 /** The number of voxels per value that matches the pixels of the screen. */
-const stepFor = (voxels) => Math.min(MOST_STEP, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
+const stepFor = (voxels) => Math.min(MAX_STEP, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
 
 export class PlanePanel {
   /**
@@ -123,7 +123,7 @@ export class PlanePanel {
     this.layer.draw(plane, width, height, ratio, this.hasPicture);
     if (!this.hasPicture) this.drawNoPicture(context, width, height);
     this.drawOverlay(this, context);
-    if (this.input.spot && !this.input.gesture) this.tellCursor?.(this, this.input.spot);
+    if (this.input.spot && !this.input.gesture) this.showCursor?.(this, this.input.spot);
     plane.drawScale(context, this.unitText);
     plane.drawLetters(context);
     return undefined;
@@ -137,7 +137,7 @@ export class PlanePanel {
   }
 
   /** The number of voxels per value that matches the pixels of the screen, and the displayed part of the slice. */
-  wish(ratio) {
+  requestFor(ratio) {
     const {plane, axis, slices} = this, step = stepFor(1 / (Math.max(plane.scaleX, plane.scaleY) * ratio));
     const {viewWidth: width, viewHeight: height} = plane, corners = [[0, 0], [width, 0], [0, height], [width, height]].map(([x, y]) => plane.unplace(x, y));
     const [low, high] = [Math.min, Math.max].map((of) => [0, 1].map((a) => of(...corners.map((corner) => corner[a]))));
@@ -145,7 +145,7 @@ export class PlanePanel {
   }
 
   takeSlice(ratio) {
-    const {axis, at, slices} = this, {step, part} = this.wish(ratio), wanted = `${at} ${step} ${JSON.stringify(part)}`, failed = slices.hasFailed(axis, at, step, part);
+    const {axis, at, slices} = this, {step, part} = this.requestFor(ratio), wanted = `${at} ${step} ${JSON.stringify(part)}`, failed = slices.hasFailed(axis, at, step, part);
     if (this.wanted !== wanted || (this.hadFailed && !failed) || this.generation !== slices.generation) slices.want(axis, at, step, this.travel, part);
     this.wanted = wanted;
     this.generation = slices.generation;

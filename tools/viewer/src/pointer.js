@@ -70,7 +70,7 @@ export class PlanePointer {
   move(event) {
     const {panel, gesture} = this, spot = this.spotOf(event);
     this.spot = spot;
-    panel.tellCursor?.(panel, spot);
+    panel.showCursor?.(panel, spot);
     if (!gesture) return this.hover(spot);
     const before = this.fingers.get(event.pointerId);
     if (gesture.what === 'pinch') return this.pinch(event.pointerId, before, spot);
@@ -115,7 +115,7 @@ export class PlanePointer {
   leave() {
     if (this.gesture) return;
     this.spot = null;
-    this.panel.tellCursor?.(this.panel, null);
+    this.panel.showCursor?.(this.panel, null);
   }
 
   hover() { this.panel.canvas.style.cursor = keys.space ? 'grab' : ''; }

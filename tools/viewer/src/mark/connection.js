@@ -1,8 +1,8 @@
 // The WebSocket: sends queued actions in order, and reconnects when the connection is lost.
 import {Store} from '../store.js';
 
-const MOST_ON_THE_WAY = 64;
-const PATIENCE = 15000;  // ms without an answer, after which the connection is considered lost
+const MAX_IN_FLIGHT = 64;
+const ANSWER_TIMEOUT = 15000;  // ms without an answer, after which the connection is considered lost
 const WAITS = [200, 400, 800, 1500, 2500, 4000];
 
 export class Connection {
@@ -11,8 +11,8 @@ export class Connection {
     Object.assign(this, {study, queue, state, number: 0, tries: 0, isOpen: false});
     study.on('action', () => { this.flush(); this.count(); });
     study.on('gap', () => this.socket?.close());
-    addEventListener('online', () => this.hurry());
-    document.addEventListener('visibilitychange', () => { if (!document.hidden) this.hurry(); });
+    addEventListener('online', () => this.reconnectNow());
+    document.addEventListener('visibilitychange', () => { if (!document.hidden) this.reconnectNow(); });
     setInterval(() => this.checkPatience(), 2000);
   }
 
@@ -66,7 +66,7 @@ export class Connection {
     } catch { /* no server is running */ }
   }
 
-  hurry() {
+  reconnectNow() {
     if (!this.timer) return;
     this.tries = 0;
     this.open();
@@ -74,7 +74,7 @@ export class Connection {
 
   checkPatience() {
     const oldest = this.queue.items.find((item) => item.seq === null && item.sentOn === this.number);
-    if (this.isOpen && oldest && performance.now() - oldest.sentAt > PATIENCE) this.socket.close();
+    if (this.isOpen && oldest && performance.now() - oldest.sentAt > ANSWER_TIMEOUT) this.socket.close();
   }
 
   count() { this.state.set({waiting: this.queue.waiting}); }
@@ -86,7 +86,7 @@ export class Connection {
       if (item.seq !== null) continue;
       if (item.sentOn !== this.number) {
         // Later actions must not overtake one that waits for an ID.
-        if (onTheWay >= MOST_ON_THE_WAY || !this.queue.isReady(item)) return;
+        if (onTheWay >= MAX_IN_FLIGHT || !this.queue.isReady(item)) return;
         item.sentOn = this.number;
         item.sentAt = performance.now();
         this.socket.send(JSON.stringify(item.action));

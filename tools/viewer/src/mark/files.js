@@ -2,8 +2,8 @@
 import {el} from '../dom.js';
 
 const MARKS = /\.(csv|tsv|txt|xyz|pts|asc|roi|zip|json|fcsv|annot)$/i;
-const MOST_BYTES = 256 * 2 ** 20;  // limit of the program
-const PATIENCE = 5000;  // maximum time in ms until a structure has its number
+const MAX_BYTES = 256 * 2 ** 20;  // limit of the program
+const ANSWER_TIMEOUT = 5000;  // maximum time in ms until a structure has its number
 
 export class Files {
   constructor({study, tools, toast, queue}) {
@@ -33,7 +33,7 @@ export class Files {
   async structure() {
     const own = this.tools.open();
     if (!own) return null;
-    const end = performance.now() + PATIENCE;
+    const end = performance.now() + ANSWER_TIMEOUT;
     for (let id = own.id; performance.now() < end; id = this.study.resolve(own.id)) {
       if (typeof id === 'number') return id;
       await new Promise((done) => { setTimeout(done, 50); });
@@ -42,7 +42,7 @@ export class Files {
   }
 
   async send(file, as) {
-    if (file.size > MOST_BYTES) return this.toast(`\u201c${file.name}\u201d is larger than 256 MiB: name it on the command line, covol mark IMAGE STUDY --guess FILE.`, 'failed');
+    if (file.size > MAX_BYTES) return this.toast(`\u201c${file.name}\u201d is larger than 256 MiB: name it on the command line, covol mark IMAGE STUDY --guess FILE.`, 'failed');
     const id = as === 'labels' ? 0 : await this.structure();
     if (id === null || id === undefined) return undefined;
     const query = new URLSearchParams({key: this.queue.nextKey(), as, structure: String(id), name: file.name});

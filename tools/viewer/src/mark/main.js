@@ -105,7 +105,7 @@ async function start() {
   view?.addOblique(codesOf());
   view?.takeCamera(store.get('camera'));
   for (const panel of panels) {
-    panel.tellCursor = status.tell;
+    panel.showCursor = status.tell;
     panel.onPicture = (axis) => view?.movePlane(axis);
     panel.onShown = (mesh) => timing.drawn(mesh);
     panel.draw();

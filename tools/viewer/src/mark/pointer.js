@@ -54,7 +54,7 @@ export class PointerInput extends MarkPointer {
   drag(gesture, spot, event) {
     if (gesture.what === 'outline') this.beginFreehand(gesture, spot);
     else if (gesture.what === 'freehand') this.freehand(gesture, event);
-    else if (gesture.what === 'stroke') this.goOnPainting(gesture, event);
+    else if (gesture.what === 'stroke') this.continueStroke(gesture, event);
     else super.drag(gesture, spot, event);
   }
 
@@ -98,7 +98,7 @@ export class PointerInput extends MarkPointer {
   }
 
   /** Adds corners a third of the brush radius apart; between them the stroke is a straight line. */
-  goOnPainting(gesture, event) {
+  continueStroke(gesture, event) {
     const {panel} = this, places = [], apart = Math.max(2, panel.state.get('brush').radius * panel.plane.scale / 3);
     for (const one of event.getCoalescedEvents?.() ?? [event]) {
       const spot = this.spotOf(one), index = panel.indexAt(...spot);

@@ -1,19 +1,19 @@
 // Slices of the image from the server: a cache of the last ones, which also fetches the next ones ahead, and cancels
 // requests for slices that are not needed any more.
 
-const MOST_SLICES = 200, MOST_BYTES = 48 * 2 ** 20, MOST_AT_ONCE = 4, AHEAD = 6;
-const MOST_STEP = 1024;
+const MAX_SLICES = 200, MAX_BYTES = 48 * 2 ** 20, MAX_CONCURRENT = 4, AHEAD = 6;
+const MAX_STEP = 1024;
 const BUSY = 503, PAUSE = 200;  // ms
 const SLOW = 400;  // ms: slower slices are not fetched ahead
-const MOST_LATE = 12;  // maximum distance in slices of a late slice that is shown instead of the requested one
-const MOST_PIXELS = 1.5 * 2 ** 20, OVERVIEW = 2 ** 19, GRID = 256;
+const MAX_LATE_DISTANCE = 12;  // maximum distance in slices of a late slice that is shown instead of the requested one
+const MAX_PIXELS = 1.5 * 2 ** 20, OVERVIEW = 2 ** 19, GRID = 256;
 
 const partKey = (part) => part ? ` ${part.x} ${part.y} ${part.width} ${part.height}` : '';
 
 /** The displayed part of a slice between two voxels, rounded to whole squares; null if the slice is small. */
 function partOf([across, rows], step, [x0, y0], [x1, y1]) {
   const width = Math.ceil(across / step), height = Math.ceil(rows / step);
-  if (width * height <= MOST_PIXELS) return null;
+  if (width * height <= MAX_PIXELS) return null;
   const span = (a, b, most) => {
     const first = Math.max(0, Math.floor(Math.min(a, b) / step / GRID) * GRID), last = Math.min(most, Math.ceil((Math.max(a, b) / step + 1) / GRID) * GRID);
     return first < last ? [first, last - first] : [0, Math.min(most, GRID)];
@@ -55,7 +55,7 @@ export class SliceStore {
   best(axis, at, step) {
     const own = this.get(axis, at, step);
     if (own) return own;
-    for (let other = 1; other <= MOST_STEP; other *= 2) {
+    for (let other = 1; other <= MAX_STEP; other *= 2) {
       const found = other === step ? null : this.get(axis, at, other);
       if (found) return found;
     }
@@ -64,7 +64,7 @@ export class SliceStore {
 
   /** The position of the cached slice that is nearest to the requested one, if it is nearer than the displayed one; or null. */
   late(axis, at, step, shownAt) {
-    const limit = Math.min(MOST_LATE * this.thickness(axis, step), Math.abs(shownAt - at) - 1), towards = Math.sign(shownAt - at);
+    const limit = Math.min(MAX_LATE_DISTANCE * this.thickness(axis, step), Math.abs(shownAt - at) - 1), towards = Math.sign(shownAt - at);
     for (let n = 1; n <= limit; ++n) if (this.slices.has(this.key({axis, at: at + n * towards, step}))) return at + n * towards;
     return null;
   }
@@ -85,7 +85,7 @@ export class SliceStore {
   coarse(axis, step, most = OVERVIEW) {
     const [right, down] = this.space.planeAxes(axis), {size} = this.space;
     let coarse = step * 2;
-    while (coarse < MOST_STEP && Math.ceil(size[right] / coarse) * Math.ceil(size[down] / coarse) > most) coarse *= 2;
+    while (coarse < MAX_STEP && Math.ceil(size[right] / coarse) * Math.ceil(size[down] / coarse) > most) coarse *= 2;
     return coarse;
   }
 
@@ -94,7 +94,7 @@ export class SliceStore {
     const own = {axis, at, step, part}, list = [own];
     // For chunks, which have to be decompressed, a coarse slice arrives first; a part is always shown on top of a whole slice.
     const coarse = part ? this.coarse(axis, step) : 4 * step;
-    if ((part || (this.image.in_chunks && !this.has(own))) && coarse <= MOST_STEP && !this.best(axis, at, step)) list.unshift({axis, at, step: coarse, part: null});
+    if ((part || (this.image.in_chunks && !this.has(own))) && coarse <= MAX_STEP && !this.best(axis, at, step)) list.unshift({axis, at, step: coarse, part: null});
     this.wanted[axis] = list.filter((one) => !this.has(one) && !this.failed.has(this.key(one)));
     this.ahead = this.ahead.filter((one) => one.axis !== axis);
     const thick = this.thickness(axis, step), first = Math.floor(at / thick) * thick, count = this.took[axis] > SLOW ? 0 : AHEAD;
@@ -139,10 +139,10 @@ export class SliceStore {
   }
 
   work() {
-    while (this.underWay.size < MOST_AT_ONCE) {
+    while (this.underWay.size < MAX_CONCURRENT) {
       const list = this.wanted.find((one) => one.length > 0);
       // One request is kept free for the slice that is displayed next.
-      if (!list && this.underWay.size >= MOST_AT_ONCE - 1) return;
+      if (!list && this.underWay.size >= MAX_CONCURRENT - 1) return;
       const next = list ? list.shift() : this.ahead.shift();
       if (!next) return;
       if (!this.has(next)) this.fetch(next);
@@ -186,7 +186,7 @@ export class SliceStore {
     const bytesOf = ({values, others}) => values.byteLength * (1 + others.size);
     this.bytes += bytesOf(slice);
     for (const [old, stale] of this.slices) {
-      if (old === key || (this.slices.size <= MOST_SLICES && this.bytes <= MOST_BYTES)) break;
+      if (old === key || (this.slices.size <= MAX_SLICES && this.bytes <= MAX_BYTES)) break;
       this.slices.delete(old);
       this.bytes -= bytesOf(stale);
     }

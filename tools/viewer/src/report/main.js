@@ -32,13 +32,13 @@ import {ReportScene} from './scene.js';
 import {saveTable, structureTable} from './table.js';
 import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
-const MOST_MARKS = 10000;  // more marks are hidden at first, because they would hide the surface
+const MAX_MARKS = 10000;  // more marks are hidden at first, because they would hide the surface
 const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity', 'oblique'];
 
 const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
 
 function firstState(image, space, data, kept) {
-  const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), cuts: data.image ? [0, 1, 2, OBLIQUE] : [0, 1, 2]});
+  const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MAX_MARKS), cuts: data.image ? [0, 1, 2, OBLIQUE] : [0, 1, 2]});
   return new State({...view, grey: greyTable(image, view.window, view.colors), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
     active: data.structures[kept.active - 1] ? kept.active : 1, coloring: colorings(data.structures).some(([name]) => name === kept.coloring) ? kept.coloring : 'structure',
     oblique: keptOblique(kept.oblique), opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
@@ -121,7 +121,7 @@ async function start() {
     otherwise: volume ? 'The slices beside it work.' : 'The figures below work.'}, (canvas) => new ReportScene(canvas, app));
   view?.takeCamera(app.kept.get('camera'));
   for (const panel of panels) {
-    panel.tellCursor = status.tell;
+    panel.showCursor = status.tell;
     panel.onPicture = (axis) => view?.movePlane(axis);
     panel.draw();
   }
