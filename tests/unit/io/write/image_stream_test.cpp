@@ -288,7 +288,7 @@ TEST_CASE("metadata that gets shorter is filled up, and what a format cannot hol
 TEST_CASE("voxels are spread over a larger lattice") {
     std::vector<std::uint8_t> values{1, 2, 3, 4, 5, 6, 7, 8};
     values.resize(3 * 3 * 3, 0);
-    detail::spread({2, 2, 2}, {3, 3, 3}, 1, reinterpret_cast<char*>(values.data()));
+    detail::pad_rows({2, 2, 2}, {3, 3, 3}, 1, reinterpret_cast<char*>(values.data()));
     const std::vector<std::uint8_t> expected{1, 2, 0, 3, 4, 0, 0, 0, 0, 5, 6, 0, 7, 8,
                                              0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     CHECK(values == expected);
