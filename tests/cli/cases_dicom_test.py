@@ -131,7 +131,7 @@ class Frames(Case):
         frames = [frame(k + (k >= 5)) for k in range(len(self.data))]
         self.enhanced(range(len(self.data)), frames)
         message = self.refused("info", "frames.dcm")
-        self.assertIn("got 2 between frames.dcm, frame 5, and frames.dcm, frame 6,", message)
+        self.assertIn("got a distance of 2 between frames.dcm, frame 5, and frames.dcm, frame 6, instead of 1", message)
 
     def test_each_frame_by_its_own_slope(self):
         frames = [frame(k) for k in range(len(self.data))]
@@ -256,7 +256,7 @@ class Slices(Case):
         np.testing.assert_allclose(np.asarray(image["direction"])[:, 2] * image["spacing"][2], (0, 0.25, 1), atol=1e-9)
         self.assertIn("differ from 90 degrees by up to 14", self.run_covol("info", "series").stdout)
         self.series(ImagePositionPatient=lambda k: [3 + (k == 4), -4, 5 + k])
-        self.assertIn("1 mm beside it", self.refused("info", "series"))
+        self.assertIn("1 mm away from it", self.refused("info", "series"))
 
     def test_without_positions_by_number(self):
         self.series(ImagePositionPatient=None, SpacingBetweenSlices=2.0, InstanceNumber=lambda k: k + 1)

@@ -99,8 +99,8 @@ class Programs(Folder):
                             "space: left-posterior-superior", "space origin: (0,0,0)",
                             "space directions: (0.8,0.6,0) (-0.6,0.8,0) (0,0,1)", "", ""])
         (self.out / "turned.nrrd").write_bytes(turned.encode() + bytes(range(256)) * 2)
-        self.expect_finding("turned.nrrd", "fiji", "remark", "rotated", "--points-space index")
-        self.silent("x.nrrd", "fiji", "rotated")
+        self.expect_finding("turned.nrrd", "fiji", "remark", "rotation of the image", "--points-space index")
+        self.silent("x.nrrd", "fiji", "rotation")
 
     def test_print(self):
         self.expect_finding("s.vdb", "print", "problem", "covol mesh")

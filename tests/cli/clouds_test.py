@@ -593,7 +593,7 @@ class Normals(Clouds):
         report, output = self.report("p.xyz", self.rows(points, noise))
         self.assertFalse(report["cloud"]["normals"]["used"])
         self.assertAlmostEqual(report["cloud"]["normals"]["agree"], 0.5, delta=0.05)
-        self.assertIn("file not used: half of them", output)
+        self.assertIn("file are not used: one half of them", output)
         self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
 
     def test_normals_of_narrow_folds(self):

@@ -315,7 +315,7 @@ class Guess(KindsCase):
         labels[:, :, :4] = 8
         mask = self.labels("mask.nrrd", labels)
         common = ("segment", self.image, "--guess", mask, "--points", self.marks, "-o", "s.vdb", "--mask", "m.nrrd")
-        self.assertIn("expected one label, got 3, 8; choose one by --guess-label", self.run_covol(*common, code=3).stderr)
+        self.assertIn("expected one label, got 3, 8; choose one with --guess-label", self.run_covol(*common, code=3).stderr)
         self.assertIn("expected one of the labels", self.run_covol(*common, "--guess-label", 5, code=3).stderr)
         self.report(*common, "--guess-label", 3)
         new = read_labels(self.out / "m.nrrd")

@@ -55,10 +55,11 @@ public:
     Contours go(const std::vector<PointCloud>& clouds) {
         for (const PointCloud& cloud : clouds) read(cloud);
         if (lines_.empty())
-            throw Error(Errc::InvalidInput,
-                        (clouds.empty() ? std::string("no file") : clouds.front().source) +
-                            ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
-                            "give them as points instead of contours");
+            throw Error(
+                Errc::InvalidInput,
+                (clouds.empty() ? std::string("no file") : clouds.front().source) +
+                    ": expected lines of marks (slice, contour, x, y; shapes; selections), got separate points; "
+                    "give them as points instead of contours");
         choose_plane();
         if (lies_in_slices() || choose_tilted_plane()) {
             join_lines();

@@ -160,7 +160,7 @@ TEST_CASE("unusable phantom options are named") {
     PhantomOptions options;
     CHECK(why_invalid(options).empty());
     options.kind = "cube";
-    CHECK(why_invalid(options).find("kind: expected one that") != std::string::npos);
+    CHECK(why_invalid(options).find("kind: expected one of list_phantom_kinds()") != std::string::npos);
     CHECK_THROWS_WITH(make_phantom(options), Catch::Contains("kind: expected one of sphere, torus"));
     CHECK_THROWS_AS(make_phantom(options), Error);
     options = {};

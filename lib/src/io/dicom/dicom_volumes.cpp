@@ -123,8 +123,7 @@ void check_gaps(const std::string& path, const Slices& slices) {
         if (std::abs(gaps[k] - usual) <= 0.02 * usual && usual > 0) continue;
         throw read_error(Errc::InvalidInput, path,
                          "expected equidistant slices, got a distance of " + number(gaps[k]) + " between " +
-                             name_of(slices[k]) + " and " + name_of(slices[k + 1]) + ", but for the others " +
-                             number(usual) +
+                             name_of(slices[k]) + " and " + name_of(slices[k + 1]) + " instead of " + number(usual) +
                              (gaps[k] > 0 ? ": a slice is missing"
                                           : ": several volumes in one series; put one into a folder of its own"));
     }

@@ -270,7 +270,7 @@ TEST_CASE("errors name the file, the line, what was expected and what was found"
     contains(read_error(scratch, "a.obj", "v 1 2\n"), "a.obj:1: expected 3 numbers, got 2");
     contains(read_error(scratch, "a.obj", "hello\n"), "expected at least one point");
     contains(read_error(scratch, "a.off", "OFF\n2 0 0\n1 2 3\n"), "got 1; the file is truncated");
-    contains(read_error(scratch, "a.off", "OFF\n1e15 0 0\n1 2 3\n"), "cannot hold '1e15' vertices");
+    contains(read_error(scratch, "a.off", "OFF\n1e15 0 0\n1 2 3\n"), "cannot contain '1e15' vertices");
     contains(read_error(scratch, "a.ply", "plot\n"), "expected 'ply'");
     contains(read_error(scratch, "a.ply",
                         "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n"
