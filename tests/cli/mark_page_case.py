@@ -129,7 +129,7 @@ class PageCase(unittest.TestCase):
     def js(self, script, *arguments):
         return self.driver.execute_script("const mark = window.covolMark;" + script, *arguments)
 
-    def wait(self, script, *arguments, seconds=20):
+    def wait(self, script, *arguments, seconds=60):  # many times what it takes, for busy machines
         return WebDriverWait(self.driver, seconds, 0.05).until(lambda _: self.js(script, *arguments))
 
     def settled(self):
