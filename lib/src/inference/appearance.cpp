@@ -104,7 +104,7 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
     using Matrix = Eigen::MatrixXd;
     using Vector = Eigen::VectorXd;
     const auto count = Eigen::Index(used.size());
-    Matrix Z(count, kTerms);  // the gradient and so the optimum in double; the Hessian only directs the steps
+    Matrix Z(count, kTerms);
     Vector y(count), weight(count);
     for (Eigen::Index n = 0; n < count; ++n) {
         std::array<float, kTerms> terms;
@@ -116,17 +116,15 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
         // samples.
         weight[n] = double(used[std::size_t(n)]->weight) * 0.5 * sum / std::max(total[inside ? 1 : 0], 1e-9);
     }
-    const Eigen::MatrixXf single = Z.cast<float>();
     Vector w = Vector::Zero(kTerms), penalty = Vector::Constant(kTerms, ridge);
     penalty[0] = 1e-6;
     for (int round = 0; round < kRounds; ++round) {
         const Vector odds = (Z * w).cwiseMax(-30).cwiseMin(30);
         const Vector p = (1 / (1 + (-odds.array()).exp())).matrix();
         const Vector curvature = (weight.array() * p.array() * (1 - p.array())).matrix();
-        const Eigen::MatrixXf scaled = curvature.cwiseSqrt().cast<float>().asDiagonal() * single;
-        Eigen::MatrixXf products = Eigen::MatrixXf::Zero(kTerms, kTerms);
-        products.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
-        Matrix H = products.cast<double>();
+        Matrix H = Matrix::Zero(kTerms, kTerms);
+        const Matrix scaled = curvature.cwiseSqrt().asDiagonal() * Z;
+        H.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
         H.diagonal() += penalty;
         const Vector gradient = Z.transpose() * (weight.array() * (y - p).array()).matrix() - penalty.cwiseProduct(w);
         const Vector step = H.selfadjointView<Eigen::Lower>().llt().solve(gradient);
