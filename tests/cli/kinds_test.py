@@ -303,7 +303,7 @@ class Guess(KindsCase):
         points = np.loadtxt(self.marks)
         nearest = np.min([np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2) for p in points], axis=0)
         self.assertFalse(np.any(changed & (nearest >= reported["radius"]["largest"])))
-        # All parts are supported by marks, except if those of the missing cap are left out.
+        # With all marks every part is supported; without those of the missing cap, that part is not.
         some = self.inputs / "some.xyz"
         write_points(some, points[5:])
         half = self.report("segment", self.image, "--guess", mask, "--points", some, "-o", "h.vdb", "--suggest", 2)

@@ -473,7 +473,7 @@ class Evidence(Case):
             self.assertLess(abs(math.dist(s["world"], self.CENTER) - self.RADIUS), 0.3 * H)
             for axis in range(3):
                 self.assertAlmostEqual(s["world"][axis], ORIGIN[axis] + H * s["index"][axis], places=4)
-        # The chord of length `reach` from the equator upwards.
+        # The marked half supports the sphere up to one `reach`, as a chord, beyond the equator: this is the latitude there.
         angle = 2 * math.asin(report["reach"] / (2 * self.RADIUS))
         self.assertAlmostEqual(report["unsupported_area"] / report["area"], (1 - math.sin(angle)) / 2, delta=0.02)
 

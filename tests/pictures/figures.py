@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "tests/cli"), str(ROOT / "tools/napari")]
 
 BLUE, YELLOW, WHITE = (68, 119, 170), (255, 220, 60), (255, 255, 255)
 COLORS = (BLUE, (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119))
-# The font is named explicitly: the width of the default sans-serif depends on the installed fonts, and so would the width of a picture.
+# The font is named explicitly: the width of the default one, and with it that of a picture, depends on the installed fonts.
 STYLE = """body { margin: 0; padding: 10px; font: 13px/1.35 "DejaVu Sans", sans-serif; color: #222; background: #fff; width: max-content }
 .row { display: flex; gap: 8px; align-items: flex-start } .column { display: flex; flex-direction: column; gap: 8px }
 figure { margin: 0 } figcaption { padding: 2px 0 } img { display: block } pre { margin: 0; font: 12px/1.4 "DejaVu Sans Mono", monospace }

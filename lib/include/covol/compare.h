@@ -28,7 +28,8 @@ struct Solid {
 /// The form is chosen by the file extension: images, meshes, .vdb (the grid is chosen as in read_vdb_level_set()).
 [[nodiscard]] COVOL_API Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
-/// Overlap on the finer of both lattices (a mask's own voxels if one is a mask), and distances between the surfaces.
+/// Measures the overlap on the finer of the two lattices (if only one is a mask, on its voxels), and the distances
+/// between the surfaces.
 [[nodiscard]] COVOL_API CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
 
 }  // namespace covol

@@ -91,7 +91,7 @@ SolidMeasures measure_solid(const FloatGrid& surface, const RunContext& run) {
     });
     run.check();
     if (!(all.volume > 0) || all.low[0] > all.high[0])
-        throw Error(Errc::InvalidInput, "measures of a solid: expected a surface with an inside, got none");
+        throw Error(Errc::InvalidInput, "measures of a solid: expected a surface that encloses a volume");
     const auto to_world = [&](const Vec3d& at) {
         const Vec3d world = surface.indexToWorld(at);
         return Vec3{world[0], world[1], world[2]};

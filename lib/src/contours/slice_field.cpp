@@ -78,7 +78,8 @@ private:
         }
     }
 
-    /// Propagates from row j + before, and along the row in both directions.
+    /// Improves the nearest edges of row j by those of row j + before (before: -1 or 1), then along row j in both
+    /// directions.
     void row(int j, int before) {
         const int other = j + before;
         const bool has_other = other >= 0 && other < grid_.ny;

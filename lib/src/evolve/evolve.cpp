@@ -146,11 +146,11 @@ private:
         const double step = tau_ * strongest;
         if (strongest == 0 || (step >= kSmallestStep && step <= kLargestStep)) return;
         throw Error(Errc::InvalidOptions,
-                    std::string("evolve: ") + (options_.tau ? "`tau`" : "`delta`") +
-                        ": expected a step (tau in voxels, times the largest of theta, rho, and delta in voxels) of " +
+                    std::string("evolve: ") + (options_.tau ? "`tau`" : "`delta`") + ": expected a step of " +
                         detail::number(kSmallestStep) + " to " + detail::number(kLargestStep) + ", got " +
                         detail::number(step) +
-                        ": outside of this range, 16 bits cannot represent the coefficients of the scheme",
+                        "; it is tau times the largest of theta, rho and delta, with lengths in voxels, and outside of "
+                        "this range 16 bits cannot represent the coefficients of the scheme",
                     options_.tau ? "tau" : "delta");
     }
 

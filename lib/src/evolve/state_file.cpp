@@ -79,7 +79,7 @@ void StateFile::expect(std::uint64_t bytes, std::uint64_t count) const {
 }
 
 void StateFile::fail() const {
-    throw Error(Errc::InvalidInput, path_ + ": expected a state of a flow of this version; the file is damaged");
+    throw Error(Errc::InvalidInput, path_ + ": expected a checkpoint of this version of covol; the file is damaged");
 }
 
 }  // namespace covol::detail

@@ -8,8 +8,9 @@
 // share a face agree. On a face with two inside corners on a diagonal, both are cut off: inside is 6-connected, outside
 // 18-connected. Tracing the segments around a cube gives loops; each is filled by a fan of triangles around one of its
 // vertices. The surface is a closed manifold without self-intersection for every input because:
-// - a vertex lies strictly inside its edge, belongs to one loop in each of the four cubes around the edge, and a face
-//   segment to the two cubes around its face: closed, one umbrella for each vertex;
+// - a vertex lies strictly inside its edge, belongs to one loop in each of the four cubes around its edge, and a face
+//   segment belongs to the two cubes that share its face. So the surface is closed, and the triangles around each
+//   vertex form a single umbrella;
 // - an apex is used only if none of its diagonals lies in a face. Then the fan meets the faces only in its segments,
 //   and because the faces of a cube that do not contain the apex are seen from it without overlap, a fan does not
 //   intersect itself;

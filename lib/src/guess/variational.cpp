@@ -51,7 +51,9 @@ public:
         const Index rest = size_ - kPolynomial;
         factor_.compute(projected.bottomRightCorner(rest, rest));
         if (factor_.info() != Eigen::Success)
-            throw Error(Errc::Numerical, "guess: the marks' system is singular: do several marks coincide?");
+            throw Error(
+                Errc::Numerical,
+                "guess: the equations for the marks have no unique solution; remove marks that nearly coincide");
         whiten();
     }
 

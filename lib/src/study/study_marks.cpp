@@ -32,11 +32,11 @@ Marks marks_of(const StudyStructure& structure, const StudySite& site) {
     Marks marks;
     marks.name = safe_text(structure.name);
     std::vector<Vec3> inside, outside;
-    for (const StudyMark& mark : structure.marks)
-        (mark.kind == MarkKind::Surface  ? marks.points
-         : mark.kind == MarkKind::Inside ? inside
-                                         : outside)
-            .push_back(mark.world);
+    for (const StudyMark& mark : structure.marks) switch (mark.kind) {
+            case MarkKind::Surface: marks.points.push_back(mark.world); break;
+            case MarkKind::Inside: inside.push_back(mark.world); break;
+            case MarkKind::Outside: outside.push_back(mark.world); break;
+        }
     marks.count = marks.points.size();
     if (!inside.empty()) marks.inside.push_back(stated_cloud(std::move(inside)));
     if (!outside.empty()) marks.outside.push_back(stated_cloud(std::move(outside)));

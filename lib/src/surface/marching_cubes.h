@@ -245,7 +245,7 @@ private:
         for (const auto& some : found) needed.insert(needed.end(), some.begin(), some.end());
     }
 
-    /// Whether a voxel on the side of a block in the direction `step` has another sign than `inside`.
+    /// Whether any voxel on the face of the block towards `step` has a sign other than `inside`.
     static bool rim_differs(const LeafMask& mask, const Coord& step, bool inside) {
         std::uint64_t facing = ~std::uint64_t(0);
         if (step.y() != 0) facing &= step.y() < 0 ? 0xff : std::uint64_t(0xff) << 56;

@@ -235,7 +235,7 @@ TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
     const auto views = [](const Label& label, const ImageGeometry& geometry = lattice({40, 40, 40})) {
         return understood(painting(geometry, label)).labels[0].views;
     };
-    // The middle eight slices of a ball of 14, half of a ball of 20, and an oblique tube.
+    // The middle eight slices of a ball 14 slices across, half of a ball 20 slices across, and an oblique tube.
     const Label both = [&](int i, int j, int k) {
         return of(i, j, k) > 15 && of(i, j, k) < 24 && in_ball(i, j, k, 19.5, 7) ? 1 : 0;
     };

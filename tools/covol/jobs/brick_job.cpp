@@ -169,8 +169,8 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
     result.report.seconds.solve += spent.seconds;
     if (spent.unsteady > 0) {
         result.report.solve.stop_reason = StopReason::MaxSteps;
-        session.warn("not steady after " + std::to_string(spent.steps) + " steps: " + std::to_string(spent.unsteady) +
-                     " of " + std::to_string(plan.bricks.size()) + " bricks");
+        session.warn(std::to_string(spent.unsteady) + " of " + std::to_string(plan.bricks.size()) +
+                     " bricks are not steady after " + std::to_string(spent.steps) + " steps");
     }
     return result;
 }

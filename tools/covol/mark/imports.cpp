@@ -136,11 +136,11 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
     }
     for (std::size_t n = 0; n < world.size(); ++n) {
         if (is_in_outline[n]) continue;
-        const MarkKind kind = given.kinds.empty() ? MarkKind::Surface : given.kinds[n];
-        (kind == MarkKind::Surface  ? action.world
-         : kind == MarkKind::Inside ? action.inside
-                                    : action.outside)
-            .push_back(world[n]);
+        switch (given.kinds.empty() ? MarkKind::Surface : given.kinds[n]) {
+            case MarkKind::Surface: action.world.push_back(world[n]); break;
+            case MarkKind::Inside: action.inside.push_back(world[n]); break;
+            case MarkKind::Outside: action.outside.push_back(world[n]); break;
+        }
     }
     return action;
 }

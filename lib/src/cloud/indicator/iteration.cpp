@@ -28,7 +28,8 @@ std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     return off;
 }
 
-/// The sign of each cell's deviation; 0 if it is too small for the cell to be turned.
+/// For each patch, the sign of the deviation of its mean indicator from 1/2; 0 if the deviation is too small for the
+/// normals of the patch to be turned.
 std::vector<int> sides_of(const std::vector<double>& off) {
     std::vector<int> side;
     for (const double x : off) side.push_back(std::abs(x) < kIteration.patch_off ? 0 : x < 0 ? -1 : 1);

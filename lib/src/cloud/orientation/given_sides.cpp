@@ -223,8 +223,9 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
 PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
     for (const auto* list : {&hints.normals, &hints.to_sensor})
         if (!list->empty() && list->size() != from.size())
-            throw Error(Errc::InvalidInput, "expected a hint for each of " + std::to_string(from.size()) +
-                                                " points, got " + std::to_string(list->size()));
+            throw Error(Errc::InvalidInput, "expected a normal or a direction to the sensor for each of " +
+                                                std::to_string(from.size()) + " points, got " +
+                                                std::to_string(list->size()));
     if (hints.normals.empty() && hints.to_sensor.empty()) return {};
     std::vector<std::pair<Vec3, std::size_t>> places;
     places.reserve(from.size());

@@ -35,7 +35,8 @@ struct FitPoints {
     void fill_up();
 };
 
-/// Appends those of the cloud's points begin..end-1 that lie in the ball and whose normals are on the frame's side.
+/// Appends to `near` those of the cloud's points begin..end-1 that lie within frame.radius of its origin and whose
+/// normals point to the same side as the frame's normal.
 /// @pre clear() has reserved memory for all of them
 void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame, FitPoints& near);
 

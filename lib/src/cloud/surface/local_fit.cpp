@@ -56,7 +56,8 @@ struct Scratch {
     std::vector<CreasePoint> crease;
 };
 
-/// Keeps the points of the ranges that lie within the radius and whose normals are on this side.
+/// Copies to scratch.near the points of scratch.ranges that lie within level.radius of the origin and whose normals
+/// point to the same side as axes[2].
 void keep_near(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
     std::size_t all = 0;
     for (const PointCells::Range& range : scratch.ranges) all += range.end - range.begin;

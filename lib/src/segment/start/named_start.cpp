@@ -95,7 +95,7 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
         facts.on_surface = facts.marks.trusted;
         facts.origin = StartOrigin::Guess;
         facts.report.remarks.choose("start", "near its marks",
-                                    "it is used as a guess that the marks correct, without a flow", run);
+                                    "the start is used as a guess that the marks correct, and no flow is run", run);
         return start;
     }
     start.u = carried_beyond_turned_image(problem, facts.domain, start.u);
