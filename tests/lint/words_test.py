@@ -77,7 +77,7 @@ def in_page(text):
 def findings(root):
     readers = {".cpp": in_cpp, ".h": in_cpp, ".py": in_python, ".md": in_page}
     paths = [path for folder in ("lib", "tools", "tests", "docs", "houdini_free_examples") for path in (root / folder).rglob("*")]
-    for path in sorted([*paths, root / "README.md", root / "CONTRIBUTING.md"]):
+    for path in sorted([*paths, *root.glob("*.md")]):
         name = path.relative_to(root).as_posix()
         if path.suffix not in readers or "node_modules" in name or name in ("docs/glossary.md", "tests/lint/words_test.py"):
             continue
