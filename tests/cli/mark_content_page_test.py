@@ -113,8 +113,9 @@ class Content(PageCase):
         if os.environ.get("COVOL_PICTURES"):
             self.driver.save_screenshot(os.environ["COVOL_PICTURES"] + "/table.png")
         self.keys(Keys.ESCAPE)
-        # The voxels of the first answer are coarser, and a busy machine may still show it.
-        before = self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.triangles")
+        # The voxels of the first answer are coarser, and a busy machine may still show it, or the result of fewer marks: with all
+        # of them, and voxels of the image's size, there are some 18,000 triangles.
+        before = self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.triangles > 12000 && r.triangles")
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=options]").click()
         field = self.driver.find_element(By.CSS_SELECTOR, "dialog.options [name=voxel_size]")
         field.send_keys("1.6")
