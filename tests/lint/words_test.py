@@ -48,11 +48,8 @@ def prose_of(text):
 
 def in_cpp(text):
     for token in CPP.finditer(text):
-        line = text.count("\n", 0, token.start()) + 1
-        if token["name"] and is_retired(token["name"]):
-            yield line, token["name"]
-        for word in prose_of(token["comment"] or ""):
-            yield line, word
+        words = [token["name"]] if token["name"] and is_retired(token["name"]) else prose_of(token["comment"] or "")
+        yield from ((text.count("\n", 0, token.start()) + 1, word) for word in words)
 
 
 def in_python(text):
