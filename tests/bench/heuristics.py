@@ -41,6 +41,6 @@ def read_heuristics(source=SOURCE):
                 unit, meaning = match.groups() if match else ("", "")
                 found.append(Heuristic(name, float(eval(plain, {"__builtins__": {}})), plain.replace(" ", ""), kind not in ("double", "float"), unit, meaning,
                                        path.parent.relative_to(source / "lib/src").as_posix(), words(comment), problem))
-        if len(found) - before != len(re.findall(r"\bheuristic\(", text)) or not re.search(r"struct", text):
+        if len(found) - before != len(re.findall(r"\bheuristic\(\"", text)) or not re.search(r"struct", text):
             found.append(Heuristic(str(path), 0, "", False, "", "", "", "", "a field that is not read: expected `type field = heuristic(\"step.field\", value);` in a struct"))
     return found

@@ -279,20 +279,20 @@ TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere"]
 GUESSED = ["m round", "m torus", "m two"]
 FLOWS = ["m paper", "m init", "m grow"]
 PLAN = {  # step: the jobs that exercise it, the most informative one first
-    "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "filled": CLOUDS, "indicator": CLOUDS, "winding_field": CLOUDS,
+    "cloud": CLOUDS + OPEN + ["spikes", "normals"], "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "filled": CLOUDS, "indicator": CLOUDS,
     "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "iteration": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
-    "tagging": TAGGED, "closing": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],
-    "variational": ["m torus alone", "few", "m two"], "guidance": GUESSED + REAL_JOBS, "learning": GUESSED + REAL_JOBS, "border": GUESSED + REAL_JOBS, "offset_field": GUESSED,
-    "correction": ["m guess", "m guess seed"], "torn": ["spikes", "plate", "normals plate"], "areas": CLOUDS, "join_pieces": ["spikes", "spikes noisy", "plate noisy", "twins"],
-    "hold_topology": ["spikes noisy", "plate noisy", "twins"], "given_sides": ["normals", "normals plate", "normals wrong", "front sensor"],
-    "views": OPEN + ["front sensor"], "layers": OPEN, "scan_noise": TAGGED[:2] + ["few"], "neighbours": CLOUDS[:2], "spacing": ["spikes", "few"],
-    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "grow": ["m grow", "m grow box"], "seeds": ["m grow box"],
+    "tagging": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],
+    "variational": ["m torus alone", "few", "m two"], "guidance": GUESSED + REAL_JOBS, "border": GUESSED + REAL_JOBS,
+    "correction": ["m guess", "m guess seed"], "join_pieces": ["spikes", "spikes noisy", "plate noisy", "twins"],
+    "given_sides": ["normals", "normals plate", "normals wrong", "front sensor"],
+    "views": OPEN + ["front sensor"], "layers": OPEN, "scan_noise": TAGGED[:2] + ["few"],
+    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "grow": ["m grow", "m grow box"],
     "fields": FLOWS, "job": TAGGED[:2] + ["few"], "flow": FLOWS + ["few"], "coarse_level": ["m coarse"], "doubts": ["m torus", "m tag slit"] + REAL_JOBS, "vanished": ["m tag slit", "half flat"],
     "final_surface": ["half open", "front"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"], "holes": ["half open", "half flat"],
-    "cut": ["half open", "half flat"], "membrane": ["half flat"], "edge": FLOWS, "evolve": FLOWS + ["few"], "motion": FLOWS, "solver": FLOWS,
+    "cut": ["half open", "half flat"], "edge": FLOWS, "evolve": FLOWS + ["few"], "motion": FLOWS,
     "painted": ["m painted", "m painted box"], "outline": ["m painted", "m painted box"], "contours": ["m contours", "m contours alone"],
     "inference": REAL_JOBS,
-    "relax": ["relaxed", "spikes"], "decimate": ["adaptive", "relaxed"], "level": ["relaxed", "adaptive"], "pieces": ["m two"], "cleanup": ["cleaned"],
+    "relax": ["relaxed", "spikes"], "decimate": ["adaptive", "relaxed"], "level": ["relaxed", "adaptive"], "pieces": ["m two"],
 }
 
 

@@ -13,21 +13,24 @@ from heuristics import read_heuristics  # noqa: E402
 # Floating-point constants in a .cpp of a folder that has a heuristics.h. Those that are not heuristic: tolerances of solvers, mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
+    "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
+    "cloud/indicator/iteration.cpp:kSteady", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/surface/hold_topology.cpp:kHeld",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMaxReach",
     "contours/contour_curve.cpp:kLongestPiece", "contours/section_field.cpp:kClosest", "contours/section_field.cpp:kSettled", "contours/slice_field.cpp:kSeedPiece",
-    "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
-    "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMaxCells",
-    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kNoStep",
-    "guidance/border_profile.cpp:kIgnoredWeight", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kMinSigma", "holes/holes.cpp:kP95OfSpacing",
+    "edge/edge.cpp:kHaloSigmas", "edge/edge.cpp:kHeatTolerance", "edge/edge.cpp:kLargestHeatStep", "evolve/band_solver.cpp:kDiverged", "evolve/band_solver.cpp:kLocalGoal", "evolve/band_solver.cpp:kMaxOmega", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
+    "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/guess_correction.cpp:kVoxelEnd",
+    "guess/marks_surface.cpp:kExact", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMaxCells", "guess/marks_surface.cpp:kWholeWeight",
+    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kMinLambda", "guess/variational.cpp:kNoStep",
+    "guidance/border_profile.cpp:kIgnoredWeight", "guidance/learning.cpp:kSteepest", "guidance/motion.cpp:kFinest", "guidance/motion.cpp:kMinNoise", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kMinSigma", "holes/holes.cpp:kP95OfSpacing", "holes/holes.cpp:kStep", "holes/membrane.cpp:kMinWeight",
     "inference/appearance.cpp:kConverged", "inference/appearance.cpp:kFeatureSigmas", "inference/candidate.cpp:kCells", "inference/candidate.cpp:kFarCells",
     "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMaxCells",
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
-    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
-    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kOutsideDomain", "tagging/tagging.cpp:kBall",
+    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "meshing/relax.cpp:kGain", "meshing/relax.cpp:kStep", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
+    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain", "tagging/tagging.cpp:kBall",
 }
 
 

@@ -40,7 +40,7 @@ struct RelaxReport {
 COVOL_API RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options = {},
                                  const RunContext& run = {});
 
-/// The distances of a mesh's points, less than a voxel apart, from a level set, to first order, without the caps of a
+/// The distances of a mesh's points, at most a voxel apart, from a level set, to first order, without the caps of a
 /// clip.
 [[nodiscard]] COVOL_API MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh,
                                                         double isovalue = 0.0, const RunContext& run = {});

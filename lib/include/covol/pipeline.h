@@ -108,8 +108,8 @@ struct SegmentOptions {
     std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
-    /// Automatic attraction range: after tagging 8 voxels, without an image unlimited (the band limits the points'
-    /// reach), after the other starts 5 voxels. `follow` is also chosen.
+    /// Automatic attraction range: 6 voxels; after tagging without an image unlimited (the band limits the points'
+    /// reach). `follow` is also chosen.
     EvolveOptions evolve;
     ExtractOptions extract;
     HolesOptions holes;  ///< for points without an image

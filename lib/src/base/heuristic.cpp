@@ -1,5 +1,5 @@
 // Only compiled in the sensitivity build.
-#include "base/heuristic.h"
+#include "base/heuristics.h"
 
 #include <cstdlib>
 #include <cstring>

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/heuristics.h"
 #include "base/number.h"
 #include "contours/contour_curve.h"
 #include "contours/contour_solid.h"
 #include "contours/heuristics.h"
 #include "contours/sections.h"
+#include "covol/domain.h"
 #include "covol/error.h"
 
 namespace covol {
@@ -23,7 +25,12 @@ using detail::Vec2;
 
 constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 256 MB; a coarser grid beyond
 
+constexpr int kMarginCells = 2;  // around the contours of a slice; the level continues beyond with the distance to them
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
+
+/// Cells from the image's end to where a continued body ends: nothing that is computed depends on it, because it is a
+/// band's half width, and a cell, beyond the domain.
+double end_cells() { return kCommon.beyond_voxels + kHalfWidthVoxels + 1; }
 
 struct Line {
     std::vector<Vec3> index;  ///< marks in voxels, or in a frame of the contours' own
@@ -74,6 +81,10 @@ public:
 private:
     void read(const PointCloud& cloud);
     void check_inside(const Line& line) const;
+    /// Maximum deviation of marks from their common slice: of the image, or relative to the marks' extent.
+    [[nodiscard]] double same_slice(double spacing, double extent) const {
+        return has_image_ ? kContours.same_slice * spacing : kCommon.same_place * extent;
+    }
     void find_planes(Line& line) const;
     void choose_plane();
     [[nodiscard]] bool lies_in_slices() const;
@@ -155,8 +166,7 @@ void Densifier::find_planes(Line& line) const {
             high[a] = std::max(high[a], p[a]);
         }
     const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-    const double tolerance = has_image_ ? kContours.same_slice : kContours.same_slice_of_extent * extent;
-    for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= tolerance;
+    for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= same_slice(1, extent);
     if (line.constant != std::array<bool, 3>{false, false, false} || line.index.size() < 3) return;
     const double off = detail::thickness_along(line.world, detail::plane_through(line.world).normal);
     if (off > tolerance * geometry_.smallest_spacing()) {
@@ -185,9 +195,7 @@ bool Densifier::choose_tilted_plane() {
     const detail::SectionPlane plane = detail::plane_through(longest->world);
     const double spacing = geometry_.smallest_spacing();
     const auto is_across = [&](const Line& line) {
-        const double tolerance = has_image_ ? kContours.same_slice * spacing
-                                            : kContours.same_slice_of_extent * detail::extent_of(line.world);
-        return detail::thickness_along(line.world, plane.normal) <= tolerance;
+        return detail::thickness_along(line.world, plane.normal) <= same_slice(spacing, detail::extent_of(line.world));
     };
     if (!std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) { return !line.closed || is_across(line); }))
         return false;
@@ -244,7 +252,7 @@ std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const
             if (end > n) {
                 for (std::size_t m = n; m <= end; ++m) {
                     carried.push_back(curve[m]);
-                    carried.back()[a] = face + out * kContours.side_cells * options_.step;
+                    carried.back()[a] = face + out * end_cells() * options_.step;
                 }
                 carried.push_back(curve[end]);
             }
@@ -272,8 +280,7 @@ void Densifier::make_network() {
     }
     const double step = std::max(options_.step, length / kContours.network_marks);
     std::vector<detail::Section> sections =
-        detail::sections_of(closed, has_image_ ? kContours.same_slice * geometry_.smallest_spacing()
-                                               : kContours.same_slice_of_extent * detail::extent_of(result_.marks));
+        detail::sections_of(closed, same_slice(geometry_.smallest_spacing(), detail::extent_of(result_.marks)));
     detail::SectionMarks marks = detail::marks_along(sections, step);
     result_.along.insert(result_.along.end(), marks.places.begin(), marks.places.end());
     if (open.empty() && !has_loose_) result_.outward = std::move(marks.outward);
@@ -322,8 +329,7 @@ void Densifier::make_solid() {
     auto data = std::make_shared<ContourSolid::Data>();
     data->frame = frame_;
     std::vector<std::vector<Polygon>> polygons;
-    const double same = has_image_ ? kContours.same_slice * geometry_.spacing[frame_.axis()]
-                                   : kContours.same_slice_of_extent * options_.step;
+    const double same = same_slice(geometry_.spacing[frame_.axis()], options_.step);
     for (auto& [w, polygon] : loops_) {
         if (data->slices.empty() || w - data->slices.back().w > same) {
             data->slices.emplace_back();
@@ -363,9 +369,9 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
         run_.info("contours: slices are filled on a grid with cells of " + detail::number(cell) +
                   ", coarser than the voxels, to limit memory");
     data.grid.cell = cell;
-    data.grid.origin = {low[0] - kContours.margin_cells * cell, low[1] - kContours.margin_cells * cell};
-    data.grid.nx = int((high[0] - low[0]) / cell + 2 * kContours.margin_cells) + 2;
-    data.grid.ny = int((high[1] - low[1]) / cell + 2 * kContours.margin_cells) + 2;
+    data.grid.origin = {low[0] - kMarginCells * cell, low[1] - kMarginCells * cell};
+    data.grid.nx = int((high[0] - low[0]) / cell + 2 * kMarginCells) + 2;
+    data.grid.ny = int((high[1] - low[1]) / cell + 2 * kMarginCells) + 2;
     run_.check();
     tbb::parallel_for(std::size_t(0), data.slices.size(), [&](std::size_t n) {
         SolidSlice& slice = data.slices[n];
@@ -437,8 +443,8 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
         if (!slices[end].open) return;
-        slices[end].cap = left + kContours.open_cells * options_.step;
-        slices[end].end = left + kContours.end_cells * options_.step;
+        slices[end].cap = left + kCommon.beyond_voxels * options_.step;
+        slices[end].end = left + end_cells() * options_.step;
     };
     if (slices.size() == 1) {
         cap(0, 0);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
@@ -29,6 +30,10 @@ using detail::LeafBounds;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kHeatTolerance = 1e-4;  // of the brightness range
+// Sigmas beyond which the weights of a Gaussian are too small to change a value: half and twice as many give the same.
+constexpr double kHaloSigmas = 3.0;
+// Maximum time step, h^2: shorter ones make the kernel more similar to a Gaussian, which changes no result visibly.
+constexpr double kLargestHeatStep = 0.5;
 
 // The band's leaves with a sufficient margin, and the normalised image on them.
 struct Window {
@@ -62,7 +67,7 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     std::vector<Coord> origins;
     for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) origins.push_back(leaf->origin());
-    const int rings = int(std::ceil((kEdge.halo_sigmas * sigma / domain.voxel_size + 2.0) / kLeafDim));
+    const int rings = int(std::ceil((kHaloSigmas * sigma / domain.voxel_size + 2.0) / kLeafDim));
     Window window{LeafBand(detail::dilate_leaves(origins, rings, domain)), {}};
     const LeafBand& band = window.band;
     window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
@@ -98,7 +103,7 @@ std::array<double, 2> brightness_range(const Window& window) {
     const auto value_at = [&](double fraction) {
         return double(detail::nth_value(values, std::size_t(std::lround(fraction * double(values.size() - 1)))));
     };
-    const double low = value_at(kEdge.low_percentile), high = value_at(kEdge.high_percentile);
+    const double low = value_at(kEdge.clipped), high = value_at(1 - kEdge.clipped);
     if (low < high) return {low, high};
     const auto [minimum, maximum] = std::minmax_element(values.begin(), values.end());
     return {double(*minimum), double(*maximum)};
@@ -184,7 +189,7 @@ std::vector<double> heat_series(double t, int steps) {
 // 1955).
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
-    const int steps = int(std::ceil(time / kEdge.largest_heat_step - 1e-9));
+    const int steps = int(std::ceil(time / kLargestHeatStep - 1e-9));
     if (steps == 0) return;
     const std::vector<double> series = heat_series(time / steps, steps);
     const LeafBand& band = window.band;
@@ -237,7 +242,7 @@ double contrast_of(FloatGrid& slopes, double percentile) {
 
 double automatic_contrast(FloatGrid& s, const EdgeOptions& options, bool is_line) {
     if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
-    return is_line ? kEdge.line_fraction * contrast_of(s, kEdge.line_percentile)
+    return is_line ? kEdge.line_fraction * contrast_of(s, 0.5)  // the median
                    : contrast_of(s, kEdge.slope_percentile);
 }
 
@@ -341,7 +346,7 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
     found.line = line / count;
     found.step = step / count;
     const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
-    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kEdge.standard_errors * error)
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kCommon.errors * error)
         found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
     return found;
 }

@@ -13,7 +13,6 @@
 #include "covol/error.h"
 #include "evolve/change_kernel.h"
 #include "evolve/finite.h"
-#include "evolve/heuristics.h"
 #include "evolve/state_file.h"
 #include "redistance/local_distance.h"
 
@@ -24,6 +23,13 @@ using LeafNode = FloatGrid::TreeType::LeafNodeType;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
+
+// How the system is solved. None of these is decisive: they change the number of visits, while the solution is the same
+// up to `solver_tolerance`.
+constexpr int kInnerSweeps = 2;     // of a leaf per visit: the second costs a fifth and saves a third of the visits
+constexpr double kMaxOmega = 1.9;   // over-relaxation
+constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is abandoned
+constexpr double kLocalGoal = 0.5;  // fraction of the residual aimed at; a leaf with a smaller one is not visited
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -203,7 +209,7 @@ Motion BandSolver::step(double tau, Counts& counts) {
     const double regular_row = 8.0 * constants.curvature + tau * (options_.theta + options_.rho);
     const double row = std::min(rows.largest, regular_row);
     const double jacobi = row / (1.0 + row);
-    solve(std::min(kSolver.max_omega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi))), rows.residual, counts);
+    solve(std::min(kMaxOmega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi))), rows.residual, counts);
     hold_to_bounds();
     counts.seconds_sweeps += seconds_since(solve_start);
     return measure();
@@ -229,10 +235,10 @@ void BandSolver::solve(double omega, double first, Counts& counts) {
     const double goal = std::max(options_.solved_to() * first, kRounding);
     double start = first;
     bool visit_all = true;
-    for (int visit = 0; visit * kSolver.inner_sweeps < options_.max_sweeps; ++visit) {
+    for (int visit = 0; visit * kInnerSweeps < options_.max_sweeps; ++visit) {
         const double residual = sweep(static_cast<float>(omega), visit_all ? 0.0 : goal, counts);
         if (visit == 0) start = std::max(first, residual);  // an initial value worse than u^{n-1} is not divergence
-        visit_all = omega > 1.0 && !(residual <= kSolver.diverged * start);
+        visit_all = omega > 1.0 && !(residual <= kDiverged * start);
         if (visit_all) {
             // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
             omega = 1.0;
@@ -327,7 +333,7 @@ double BandSolver::root_mean_square() const {
 // Whether the residual of the leaf, or of one across a face, is above the goal; goal = 0: all leaves are visited.
 bool BandSolver::is_unconverged(std::size_t leaf, double goal) const {
     if (goal == 0.0) return true;
-    const double per_voxel = kSolver.local_goal * goal * kSolver.local_goal * goal;
+    const double per_voxel = kLocalGoal * goal * kLocalGoal * goal;
     const auto above = [&](std::size_t n) { return residuals_[n] > per_voxel * active_counts_[n]; };
     if (above(leaf)) return true;
     for (const int slot : kFaceSlots) {
@@ -350,7 +356,7 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
                     prefetch(star_of(field_, next));
                     residuals_[leaf] =
                         kernel.relax(star_of(field_, leaf), previous_.leaf(leaf), rows(leaf), active(leaf), omega,
-                                     kSolver.inner_sweeps, {previous_.leaf(next), rows(next)});
+                                     kInnerSweeps, {previous_.leaf(next), rows(next)});
                     ++visits;
                 }
                 return visits;

@@ -13,6 +13,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "base/number.h"
 #include "covol/domain.h"
 #include "covol/error.h"
@@ -41,6 +42,10 @@ bool has_active(const FloatGrid& u) {
 // A row's fractions are accurate to half of 1/65535: the smallest step moves at most 1.5 % too far or too little; after
 // the largest one the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction.
 constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
+
+// Steps between two examinations of a tracked band. A step moves the front by less than a voxel, so that it stays
+// within the band for as many steps as the band's half width has voxels.
+constexpr int kCycle = int(kHalfWidthVoxels);
 
 class Evolver {
 public:
@@ -224,7 +229,7 @@ private:
     // the band has to move. Each redistancing moves the front slightly, so it is done only if necessary. The front's
     // displacement is measured just before that, at the same phase of each cycle.
     double track(double motion) {
-        if (report_.steps % kEvolve.cycle != 0) return motion;
+        if (report_.steps % kCycle != 0) return motion;
         std::vector<float> largest;
         const Front front = measure_front(largest);
         const std::vector<std::size_t> left = front_displacement_.due_leaves(solver_->u());
@@ -233,8 +238,8 @@ private:
         else if (!front.is_distance)
             solver_->redistance(tracking_clamp(options_));
         // Only now, so that a leaf becomes inactive in the same phase that the others have at the end.
-        if (solver_) solver_->update_active_leaves(largest, kEvolve.cycle * inactive_below());
-        return std::min(motion, front.moved / kEvolve.cycle);
+        if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
+        return std::min(motion, front.moved / kCycle);
     }
 
     struct Front {
@@ -298,9 +303,12 @@ private:
         if (is_held()) solver_->redistance(tracking_clamp(options_));
     }
 
+    // Aims at steps in which the front leaves the band's middle within a cycle. Between the limits lie two changes of
+    // the time step in each direction, so that it does not alternate.
     void adapt_tau(double motion) {
-        if (motion < kEvolve.slow_motion) tau_ = std::min(tau_ * kEvolve.tau_growth, kEvolve.largest_tau);
-        if (motion > kEvolve.fast_motion) tau_ = std::max(tau_ / kEvolve.tau_growth, 1.0);
+        const double aim = kMotion.left_by / kCycle, margin = kCommon.growth * kCommon.growth;
+        if (motion < aim / margin) tau_ = std::min(tau_ * kCommon.growth, kEvolve.largest_tau);
+        if (motion > aim * margin) tau_ = std::max(tau_ / kCommon.growth, 1.0);
     }
 
     // By steps or by the decrease of the change, whichever is further.

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "covol/domain.h"
 #include "evolve/change_kernel.h"
 #include "evolve/heuristics.h"
 #include "evolve/state_file.h"
@@ -17,6 +18,14 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kFewJumps = 8;
+
+// Minimum divisor of a leaf's mean motion, because a mean over fewer edges is unreliable: half as many crossings as a
+// leaf's face has voxels.
+constexpr int kFewCrossings = kLeafDim * kLeafDim / 2;
+
+// Voxels at most this deep, in voxels, are more than a voxel from the band's end. If the front has passed a deeper one,
+// anywhere, the band follows at once.
+constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
@@ -170,7 +179,7 @@ void CrossingMarks::exchange(StateFile& file) {
 
 FrontDisplacement::Reference::Reference(const float* values)
     : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
-    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kMotion.deep) << (n & 63);
+    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
 }
 
 void FrontDisplacement::set_references(const LeafArray<float>& u, std::size_t leaves) {
@@ -199,12 +208,12 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
             deep |= (flipped & ~made.near[word]) != 0;
             flips += __builtin_popcountll(flipped);
         }
-        const double moved =
-            flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kMotion.few_crossings) : 0.0;
-        states[leaf] = deep                          ? kDeepDown
-                       : moved >= kMotion.left_by    ? kLeft
-                       : moved >= kMotion.leaving_by ? kLeaving
-                                                     : kStays;
+        const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
+        // A leaf that is halfway follows with the others; otherwise the band would have to follow again soon.
+        states[leaf] = deep                           ? kDeepDown
+                       : moved >= kMotion.left_by     ? kLeft
+                       : moved >= kMotion.left_by / 2 ? kLeaving
+                                                      : kStays;
     });
     std::vector<std::size_t> leaving;
     std::size_t crossed = 0, left = 0;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/start.h"
@@ -44,7 +45,7 @@ double deviation_along(const InImage& options, const Vec3& direction) {
 const HalfSpace* end_beside(const Vec3& mark, const InImage& options) {
     for (const HalfSpace& face : options.faces) {
         // half a voxel from its centre to its end, and the error of marking
-        const double near = 4 * deviation_along(options, face.normal);
+        const double near = kCommon.errors * deviation_along(options, face.normal);
         if (detail::along(face, mark) > -near) return &face;
     }
     return nullptr;
@@ -91,7 +92,7 @@ std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, co
 /// close.
 /// @return whether it does
 bool add_outside_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
-    const std::vector<Vec3> far = places_around(known.marks, kGuess.runs_on, options);
+    const std::vector<Vec3> far = places_around(known.marks, 2 * kGuess.held_at, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
     const detail::KdTree tree(known.marks);
     for (const Vec3& place : places_around(known.marks, kGuess.held_at, options)) {
@@ -115,7 +116,7 @@ std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& m
     return found;
 }
 
-/// Whether the directions to other marks around this one, within the face's plane, leave no wide gap.
+/// Whether the directions to the nearest marks around this one, within the face's plane, leave no wide gap.
 bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
     const auto [u, v] = detail::directions_in(face);
     std::vector<std::array<double, 2>> around;  // squared distance, angle
@@ -124,7 +125,7 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
         const double x = dot(to, u), y = dot(to, v);
         if (x != 0 || y != 0) around.push_back({x * x + y * y, std::atan2(y, x)});
     }
-    const std::size_t count = std::min(kGuess.around, around.size());
+    const std::size_t count = std::min(kCommon.ring, around.size());
     std::partial_sort(around.begin(), around.begin() + std::ptrdiff_t(count), around.end());
     std::vector<double> directions;
     for (std::size_t n = 0; n < count; ++n) directions.push_back(around[n][1]);
@@ -138,7 +139,7 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
 /// Whether marks beside a face lie on a line around an area and not all over it: then they are the outline of the cut,
 /// regardless of the other marks.
 bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
-    if (marks.size() < kGuess.min_outline) return false;
+    if (marks.size() < kCommon.ring) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
     return double(surrounded) < kGuess.surrounded_fraction * double(marks.size());
@@ -163,18 +164,18 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
     for (const auto& [face, of_face] : by_face(marks, options))
         if (face != nullptr && !is_outline(of_face, *face)) all_over.insert(face);
     for (const Vec3& mark : marks) (all_over.contains(end_beside(mark, options)) ? doubtful : sure).push_back(mark);
-    if (doubtful.empty() || sure.size() < kGuess.min_outline || !guess::span_space(sure)) return marks;
+    if (doubtful.empty() || sure.size() < kCommon.ring || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
-    for (int round = 0; round < kGuess.cut_rounds && held != before;
+    for (int round = 0; round < kCommon.rounds && held != before;
          ++round) {  // with marks on its outline the section's border is known better
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {
             const HalfSpace& cut = *end_beside(mark, options);
-            double voxel = 0;
+            double deviation = 0;
             for (const Vec3& direction : detail::directions_in(cut))
-                voxel = std::max(voxel, deviation_along(options, direction) / kUniformDeviation);
-            if (within_section(body, mark, cut, options) > -kGuess.inside_voxels * voxel) held.push_back(mark);
+                deviation = std::max(deviation, deviation_along(options, direction));
+            if (within_section(body, mark, cut, options) > -kCommon.errors * deviation) held.push_back(mark);
         }
     }
     return held;
@@ -203,7 +204,7 @@ Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks
         auto surface = std::make_unique<guess::MarksSurface>(known, run);
         report.held_around = add_outside_constraints(*surface, options, known);
         if (report.held_around) surface = std::make_unique<guess::MarksSurface>(known, run);
-        for (int round = 0; round < kGuess.seed_rounds && add_seed_constraints(*surface, options, known); ++round)
+        for (int round = 0; round < kCommon.rounds && add_seed_constraints(*surface, options, known); ++round)
             surface = std::make_unique<guess::MarksSurface>(known, run);
         report.patches = surface->patches();
         report.wrong_seeds = count_wrong(*surface, options);

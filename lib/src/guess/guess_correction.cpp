@@ -10,6 +10,7 @@
 #include <memory>
 #include <numeric>
 
+#include "base/heuristics.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/error.h"
@@ -28,6 +29,8 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 constexpr double kSolved = 1e-6;        // relative to the right-hand side
 constexpr double kSteepestBump = 2.11;  // maximum slope of Wendland's function, in heights over radii
 constexpr int kMaxIterations = 1000;
+// Voxels from a seed to the end of its voxel, beyond which the surface is placed.
+constexpr double kVoxelEnd = 0.5;
 
 struct Bump {
     Vec3 center;
@@ -38,7 +41,7 @@ struct Bump {
 class FarDistance {
 public:
     FarDistance(const FloatGridPtr& guess, const std::vector<Vec3>& crossings)
-        : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings) {}
+        : guess_(guess), exact_((kHalfWidthVoxels - 1) * guess->voxelSize()[0]), surface_(crossings) {}
 
     [[nodiscard]] double at(const Vec3& world) const {
         const double near = detail::level_at(*guess_, world);
@@ -79,7 +82,7 @@ public:
 
 private:
     FloatGridPtr guess_;
-    double exact_;
+    double exact_;  ///< below it no voxel from which the distance is interpolated is clamped
     detail::KdTree surface_;
 };
 
@@ -119,11 +122,11 @@ Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, st
     for (std::size_t n = 0; n < targets.size(); ++n) {
         surface.push_back(targets[n].at);
         if (n < marks) continue;
-        // The surface lies beyond a seed, on all sides.
+        // The surface lies beyond a seed, on all sides: twice as far as it is moved.
         for (int a = 0; a < 3; ++a)
             for (const int side : {-1, 1}) {
                 surface.push_back(targets[n].at);
-                surface.back()[a] += side * 2 * kCorrection.seed_depth_voxels * h;
+                surface.back()[a] += side * 2 * kVoxelEnd * h;
             }
     }
     return detail::convex_hull(surface);
@@ -228,7 +231,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
         double square = 0, fourth = 0;  // of residuals
         std::size_t now = 0;
         for (std::size_t n = 0; n < open.size(); ++n) {
-            if (radius_of(left[n]) * kCorrection.level_ratio < radius) {
+            if (radius_of(left[n]) * kCommon.growth < radius) {
                 later.push_back(open[n]);
                 continue;
             }
@@ -382,7 +385,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         std::vector<Target> targets = on_surface;
         std::vector<char> used(inside.size() + outside.size(), 0);
         // Seeds become active once they are on the wrong side.
-        for (int round = 0; round < kCorrection.seed_rounds; ++round) {
+        for (int round = 0; round < kCommon.rounds; ++round) {
             run.check();
             data->bumps.clear();
             add_bumps(data->bumps, targets, minimum, precision);
@@ -393,7 +396,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
                 const double distance = data->distance.at(seed), now = distance - sum_of(data->bumps, seed);
                 if (used[n] || (in ? now < 0 : now > 0)) continue;
                 used[n] = 1;
-                targets.push_back({seed, distance + (in ? 1 : -1) * kCorrection.seed_depth_voxels * h});
+                targets.push_back({seed, distance + (in ? 1 : -1) * kVoxelEnd * h});
             }
             if (targets.size() == before) break;
         }

@@ -9,12 +9,28 @@
 #include <numeric>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "guess/heuristics.h"
 #include "guess/wendland.h"
 #include "points/kd_tree.h"
 
 namespace covol::guess {
 namespace {
+
+// Of the variance that is stated: marks with less are as good as exact, the deviation being 1/30 of the stated one.
+constexpr double kExact = 1e-3;
+// Weight of the whole among the parts, in weights of a part at its centre: it only has to continue them at their ends.
+constexpr double kWholeWeight = 1e-3;
+
+/// Number of marks whose normals are optimised without initial values: the time grows with the cube of the number, so
+/// that several initial values for a third of the marks take about as long as the whole.
+std::size_t oriented_marks() { return kMarks.whole / 3; }
+
+/// Number of marks in a part: its core, a fourth of them, lies within half of its radius and is described by a quadric.
+std::size_t part_marks() { return 4 * kCommon.quadric; }
+
+/// Ratio between the variances of the marks that are compared: the deviation doubles.
+double variance_step() { return std::pow(kCommon.growth, 4); }
 
 Vec3 unit_or_x(const Vec3& v) {
     const double size = length(v);
@@ -76,9 +92,9 @@ struct LikeliestVariance {
 };
 
 /// The gain in log likelihood that is required to change the variance. For exact marks, a variance that is
-/// kMarks.variance_step times smaller increases the likelihood of each by a factor of sqrt(kMarks.variance_step); a
-/// step requires half of that gain.
-double step_shows(double marks) { return 0.5 * 0.5 * marks * std::log(kMarks.variance_step); }
+/// variance_step() times smaller increases the likelihood of each by a factor of sqrt(variance_step()); a step requires
+/// half of that gain.
+double step_shows(double marks) { return 0.5 * 0.5 * marks * std::log(variance_step()); }
 
 LikeliestVariance likeliest_variance(const VariationalSurface& stated, const ImpreciseMarks& marks,
                                      const std::vector<std::size_t>& chosen,
@@ -91,11 +107,11 @@ LikeliestVariance likeliest_variance(const VariationalSurface& stated, const Imp
     };
     const double enough = step_shows(double(chosen.size()));
     LikeliestVariance best{1, with(1)};
-    while (best.factor > kMarks.min_factor) {
+    while (best.factor > kExact) {
         run.check();
-        std::unique_ptr<VariationalSurface> finer = with(best.factor / kMarks.variance_step);
+        std::unique_ptr<VariationalSurface> finer = with(best.factor / variance_step());
         if (finer->log_likelihood() - best.surface->log_likelihood() < enough) break;
-        best = {best.factor / kMarks.variance_step, std::move(finer)};
+        best = {best.factor / variance_step(), std::move(finer)};
     }
     return best;
 }
@@ -103,9 +119,10 @@ LikeliestVariance likeliest_variance(const VariationalSurface& stated, const Imp
 /// The factor of the stated variance, at least 1, for marks that fit each other worse than stated. Computed on
 /// neighbourhoods, which are dense enough to distinguish imprecise marks from a rough surface.
 double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& normals, const RunContext& run) {
-    const std::vector<std::size_t> centers = spread_out(marks.marks, kMarks.tried_parts);
+    // With as many marks as the whole has, the standard error of a variance is below a tenth.
+    const std::vector<std::size_t> centers = spread_out(marks.marks, 1 + kMarks.whole / part_marks());
     std::vector<std::vector<std::size_t>> near;
-    for (const std::size_t center : centers) near.push_back(nearest(marks.marks, center, kMarks.patch_marks));
+    for (const std::size_t center : centers) near.push_back(nearest(marks.marks, center, part_marks()));
     const auto log_likelihood = [&](double factor) {
         run.check();
         std::vector<double> of_part(near.size());
@@ -119,7 +136,7 @@ double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& norm
     const double enough = step_shows(double(near.size() * near.front().size()));
     double factor = 1, best = log_likelihood(1);
     while (factor < marks.max_factor) {
-        const double coarser = std::min(factor * kMarks.variance_step, marks.max_factor);
+        const double coarser = std::min(factor * variance_step(), marks.max_factor);
         const double likelihood = log_likelihood(coarser);
         if (likelihood - best < enough) break;
         factor = coarser;
@@ -157,7 +174,7 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         part.world = marks.world;
         return part;
     };
-    const std::vector<std::size_t> few = spread_out(marks.marks, kMarks.oriented);
+    const std::vector<std::size_t> few = spread_out(marks.marks, oriented_marks());
     // If approximate normals are given, other directions are not tried.
     const bool is_known = !marks.normals.empty();
     const Search search = is_known ? Search::Near : Search::Wide;
@@ -194,8 +211,8 @@ void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& r
     std::vector<Neighbourhood> places;
     for (std::size_t n = 0; n < count; ++n) {
         if (covered[n]) continue;
-        std::vector<std::size_t> near = nearest(marks.marks, n, kMarks.patch_marks);
-        for (std::size_t k = 0; k < std::min(kMarks.core_marks, near.size()); ++k) covered[near[k]] = 1;
+        std::vector<std::size_t> near = nearest(marks.marks, n, part_marks());
+        for (std::size_t k = 0; k < std::min(kCommon.quadric, near.size()); ++k) covered[near[k]] = 1;
         const double reach = std::sqrt(detail::squared_distance(marks.marks[near.back()], marks.marks[n]));
         places.push_back({n, std::move(near), reach});
     }
@@ -265,7 +282,7 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     whole_->row(from, step, count, values);
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
-    std::vector<double> added(count, 0.0), weights(std::size_t(count), kMarks.whole_weight), part(count), w(count);
+    std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count), w(count);
     // The patches of all cells that the row crosses, in order, so that the sum does not depend on how rows are split.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();

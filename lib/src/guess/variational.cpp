@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 
+#include "base/heuristics.h"
 #include "clip/clipped.h"
 #include "covol/error.h"
 #include "guess/heuristics.h"
@@ -25,6 +26,12 @@ using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: the null space of the energy
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
+// Of the subspace iteration for the flattest modes: vectors, more than the modes that are used, and steps.
+constexpr int kSubspace = 6, kSubspaceSteps = 12;
+constexpr int kMaxSteps = 500;       // of L-BFGS, which converges before
+constexpr int kAmplitudeRounds = 3;  // after which the amplitude, to which the precision is relative, has converged
+constexpr int kDirections = 64;      // around the marks; half and twice as many give the same surfaces
+constexpr double kMinLambda = 1e-9;  // of the amplitude; keeps the matrix regular if marks coincide
 constexpr double kAround[] = {1.15, 1.5};  // relative to the farthest mark
 
 /// Minimum-energy interpolation at fixed nodes: the energy of values v and gradients g is that of g^T H g + 2 c^T g +
@@ -210,7 +217,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     std::copy(start.data(), start.data() + size, y);
     lbfgs_parameter_t parameter;
     lbfgs_parameter_init(&parameter);
-    parameter.max_iterations = kVariational.min_energy_steps;
+    parameter.max_iterations = kMaxSteps;
     parameter.epsilon = 1e-5;
     parameter.past = 5;
     parameter.delta = 1e-6;
@@ -237,7 +244,7 @@ Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
 
 /// Approximate eigenvectors of the smallest eigenvalues: inverse iteration on a subspace.
 Matrix flattest_modes(const Matrix& H, const Vector& outward) {
-    const Index size = H.rows(), count = std::min<Index>(kVariational.subspace, size);
+    const Index size = H.rows(), count = std::min<Index>(kSubspace, size);
     Matrix shifted = H;
     shifted.diagonal().array() += 1e-10 * H.trace() / double(size);
     const Eigen::LLT<Matrix> factor(shifted);
@@ -245,7 +252,7 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     space.col(0) = outward;
     for (Index j = 1; j < count; ++j)
         for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // arbitrary vectors
-    for (int step = 0; step < kVariational.subspace_steps; ++step) {
+    for (int step = 0; step < kSubspaceSteps; ++step) {
         space = factor.solve(space).eval();
         space = (Eigen::HouseholderQR<Matrix>(space).householderQ() * Matrix::Identity(size, count)).eval();
     }
@@ -284,8 +291,8 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     double reach = 0;
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
     std::vector<Point> points;
-    for (int n = 0; n < kVariational.directions; ++n) {  // Fibonacci lattice
-        const double z = 1 - (2 * n + 1) / double(kVariational.directions), phi = n * 2.399963229728653;
+    for (int n = 0; n < kDirections; ++n) {  // Fibonacci lattice
+        const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
         points.emplace_back(times * reach * (from_ball * direction));
     }
@@ -332,7 +339,7 @@ Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Ve
     std::vector<Vector> initial_values{outward};
     initial_values.insert(initial_values.end(), known.begin(), known.end());
     for (const double fraction : kLocalFractions)
-        if (fraction * double(marks) >= kVariational.min_local)
+        if (fraction * double(marks) >= double(kCommon.ring))
             initial_values.push_back(away_from_neighbours(nodes, marks, fraction));
     const Matrix modes = flattest_modes(system.energy(), outward);
     for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k)
@@ -369,7 +376,7 @@ bool span_space(const std::vector<Vec3>& marks) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    return axes[0] > kVariational.flat * axes[2];
+    return axes[0] > kCommon.same_place * kCommon.same_place * axes[2];
 }
 
 std::vector<Vec3> points_around(const std::vector<Vec3>& marks, double times) {
@@ -438,9 +445,9 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
 
     double unit_amplitude = amplitude > 0 ? amplitude * radius_ : 1.0;
     Gradients found;
-    const int rounds = amplitude > 0 ? 1 : kVariational.amplitude_rounds;
+    const int rounds = amplitude > 0 ? 1 : kAmplitudeRounds;
     for (int round = 0; round < rounds; ++round) {
-        const Vector lambda = (variance / unit_amplitude).cwiseMax(kVariational.min_lambda);
+        const Vector lambda = (variance / unit_amplitude).cwiseMax(kMinLambda);
         const HermiteSystem system(nodes, marks, lambda);
         double constant = 0;
         const Vector c = system.linear(values, constant) - system.energy() * before;

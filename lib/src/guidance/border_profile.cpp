@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "covol/guess.h"
 #include "guidance/heuristics.h"
 #include "guidance/profile_kernel.h"
 
@@ -91,7 +92,9 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
                     c.outside[level] += weight / kFarSteps;
             }
     }
-    for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kBorder.depth_blur);
+    // Along the normal by the error of a mark somewhere in its voxel.
+    for (int level = 0; level < kLevels; ++level)
+        blur(c.border.data() + level, kDepths, kLevels, kUniformDeviation * kStepsPerVoxel);
     for (int depth = 0; depth < kDepths; ++depth)
         blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kBorder.level_blur);
     blur(c.inside.data(), kLevels, 1, kBorder.level_blur);
@@ -119,14 +122,14 @@ void BorderProfile::normalise(Counts& c, const Counts* base) {
             values[level] = (values[level] + belief * prior[level]) / (total + belief);
     };
     std::vector<double> prior(kLevels, 1.0 / kLevels);
-    mix(c.inside.data(), base ? base->inside.data() : prior.data(), kBorder.belief);
-    mix(c.outside.data(), base ? base->outside.data() : prior.data(), kBorder.belief);
+    mix(c.inside.data(), base ? base->inside.data() : prior.data(), kGuide.belief);
+    mix(c.outside.data(), base ? base->outside.data() : prior.data(), kGuide.belief);
     for (int depth = 0; depth < kDepths; ++depth) {
         double* row = c.border.data() + std::size_t(depth) * kLevels;
         const double out = std::clamp(0.5 + double(depth - kBorderSteps) / (2.0 * kStepsPerVoxel), 0.0, 1.0);
         for (int level = 0; level < kLevels; ++level)
             prior[level] = (1 - out) * c.inside[level] + out * c.outside[level];
-        mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kBorder.belief);
+        mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kGuide.belief);
     }
 }
 

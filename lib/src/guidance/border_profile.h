@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "covol/fwd.h"
+#include "guidance/heuristics.h"
 
 namespace covol::guidance {
 
@@ -11,6 +12,8 @@ inline constexpr int kStepsPerVoxel = 4;
 inline constexpr int kBorderSteps = 10;
 inline constexpr int kDepths = 2 * kBorderSteps + 1;
 inline constexpr int kLevels = 24;  ///< of intensity
+/// [voxels] On both sides of the surface, within which profiles are read: the farthest border with its own profile.
+inline double profile_reach() { return kGuide.farthest + double(kBorderSteps) / kStepsPerVoxel; }
 
 /// Intensity along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
 struct PatchProfile {

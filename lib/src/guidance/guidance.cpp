@@ -12,10 +12,12 @@
 #include <numeric>
 #include <optional>
 
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/guess.h"
 #include "covol/start.h"
 #include "covol/surface.h"
+#include "guess/heuristics.h"
 #include "guidance/grid_sampler.h"
 #include "guidance/heuristics.h"
 #include "guidance/learning.h"
@@ -53,7 +55,7 @@ public:
     bool step(bool first) {
         run_.check();
         cut_surface();
-        distance_.emplace(*surface_, patches_.places, domain_, kGuide.width, run_);
+        distance_.emplace(*surface_, patches_.places, domain_, profile_reach(), run_);
         if (first) start_ = distance_->grid();
         if (!place_marks(first)) return false;
         set_ranges();
@@ -124,7 +126,7 @@ private:
 
 void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
-    SurfaceVertices vertices = vertices_of(mesh, kGuide.normal_rounds);
+    SurfaceVertices vertices = vertices_of(mesh, kGuide.patch_width);
     const auto place = [&](std::uint32_t v) { return vertices.places[v]; };
     const Vec3 origin = mesh.empty() ? Vec3{} : place(mesh.triangles.front()[0]);
     double volume = 0;
@@ -164,9 +166,9 @@ bool Guide::place_marks(bool first) {
     // The marks of one patch are combined; marks far away belong to another surface.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
     for (std::size_t m = 0; m < marks_.size(); ++m)
-        if (std::abs(residual[m]) < (kGuide.width - 2) * h_) by_patch[patch[m]].push_back(m);
+        if (std::abs(residual[m]) < kGuide.farthest * h_) by_patch[patch[m]].push_back(m);
     on_.clear();
-    const std::size_t every = by_patch.size() / kGuide.max_marks + 1;
+    const std::size_t every = by_patch.size() / kMarks.whole + 1;
     std::size_t count = 0;
     for (const auto& [i, members] : by_patch) {
         if (count++ % every != 0) continue;
@@ -181,7 +183,7 @@ bool Guide::place_marks(bool first) {
         mark.deviation = width * std::sqrt(fraction / 12);  // standard deviation of a uniform error
         on_.push_back(mark);
     }
-    if (on_.size() < kGuide.fewest_marks) {
+    if (on_.size() < kCommon.ring) {
         report_.reason =
             "only " + std::to_string(on_.size()) +
             " positions on the guess have marks near them, too few to learn how the image looks at the border";
@@ -210,7 +212,7 @@ void Guide::set_ranges() {
         GridSampler to_start(*start_, domain_);
         for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
             home_[i] -= to_start(patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
-        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kGuide.longest_offset * h_);
+        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kGuide.farthest * h_);
         broad2[i] = squared(0.5 * reach[i]);
     });
     broad_ = std::sqrt(mean(broad2));
@@ -220,7 +222,7 @@ void Guide::set_ranges() {
         // At marks the range is that of any other position, as if the guess were no better there.
         double range = std::max(reach[i], 2 * broad_);
         if (options_.range) range = std::min(range, *options_.range);
-        range = std::min(range + std::abs(home_[i]), (kGuide.width - 2) * h_);
+        range = std::min(range + std::abs(home_[i]), kGuide.farthest * h_);
         ranges_[i] = int(std::ceil(range * kStepsPerVoxel / patches_.voxel[i]));
     }
 }
@@ -233,19 +235,12 @@ bool Guide::learn(const Scene& scene, bool first) {
             box.max[a] = std::max(box.max[a], x[a]);
         }
     for (int a = 0; a < 3; ++a) {
-        box.min[a] -= kGuide.width * h_;
-        box.max[a] += kGuide.width * h_;
+        box.min[a] -= profile_reach() * h_;
+        box.max[a] += profile_reach() * h_;
     }
     learnt_.reset();
-    WorldBox later = box;  // with a margin for the movement of the surface
-    for (int a = 0; a < 3; ++a) {
-        later.min[a] -= kGuide.moves * h_;
-        later.max[a] += kGuide.moves * h_;
-    }
     const auto try_sigma = [&](double sigma) {
-        SmoothImage image = smooth_ && smooth_->covers(box, sigma)
-                                ? std::move(*smooth_)
-                                : SmoothImage(image_, first ? later : box, sigma, run_);
+        SmoothImage image(image_, box, sigma, run_);
         if (image.empty()) return;
         LearntProfile lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
         if (learnt_ && lesson.sure_gain() <= learnt_->sure_gain()) return;
@@ -266,7 +261,7 @@ bool Guide::learn(const Scene& scene, bool first) {
         places.push_back(mark.at);
         normals.push_back(patches_.directions[mark.patch]);
     }
-    report_.feature = detect_feature(image_, places, normals, kGuide.sides * h_);
+    report_.feature = detect_feature(image_, places, normals, kHalfWidthVoxels * h_);
     report_.inside = learnt_->brightness(-2 * kStepsPerVoxel);
     report_.border = learnt_->brightness(0);
     report_.outside = learnt_->brightness(2 * kStepsPerVoxel);
@@ -340,7 +335,7 @@ std::vector<double> Guide::local_error2(const ValidationResult& validation) cons
     const double all = validation.error2 + mark2_;
     std::vector<double> result(patches_.size());
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
-        double sum = kGuide.weight_of_all * all, total = kGuide.weight_of_all;
+        double sum = kGuide.belief * all, total = kGuide.belief;
         for (std::size_t n = 0; n < on_.size(); ++n) {
             const double weight =
                 std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
@@ -366,7 +361,7 @@ void Guide::weigh(bool first) {
     std::vector<ValidationResult> validations;
     if (first) {
         do validations.push_back(cross_validate(field, broad_ * std::pow(0.5, validations.size())));
-        while (int(validations.size()) < kGuide.priors && validations.back().response >= kGuide.min_response);
+        while (int(validations.size()) < kCommon.rounds && validations.back().response >= kGuide.min_response);
     } else {
         validations.push_back(cross_validate(field, prior_));
     }

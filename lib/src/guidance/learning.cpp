@@ -7,9 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "cloud/orientation/heuristics.h"
+#include "base/heuristics.h"
 #include "guidance/grid_sampler.h"
-#include "guidance/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol::guidance {
@@ -125,11 +124,11 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
                     const double away = s * step;
                     const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
                                   x[2] + side * away * normal[2]};
-                    // Beyond the middle of a gap or of the body another part of the surface is closer.
-                    const double margin = side * distance(at) - (kLearning.own_fraction * away - h);
+                    // Beyond the middle of a gap or of the body another part of the surface is closer than along a
+                    // normal that is tilted against it; less a voxel.
+                    const double margin = side * distance(at) - (kCommon.turn * away - h);
                     if (margin < 0) break;
-                    checked =
-                        s + int(std::max(margin - kSeam * h, 0.0) / ((kSteepest + kLearning.own_fraction) * step));
+                    checked = s + int(std::max(margin - kSeam * h, 0.0) / ((kSteepest + kCommon.turn) * step));
                 }
                 if (!line.sample(side * s, row.values[side * s])) {
                     ++(side < 0 ? ends_below : ends_above);
@@ -162,8 +161,9 @@ LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& m
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
-    if (marks.size() >= kLearning.marks_for_places) {
-        radius_ = std::max(neighbourhood(profile_, kLearning.neighbours), apart);
+    // Profiles that vary with the position are learnt at as many marks as a quadric would be fitted to.
+    if (marks.size() > kCommon.quadric) {
+        radius_ = std::max(neighbourhood(profile_, int(kCommon.quadric)), apart);
         test(scene, marks, prior_deviation, apart, true);
     }
     const std::vector<double> all(marks.size(), 1.0);

@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "covol/domain.h"
 #include "covol/start.h"
@@ -27,6 +28,13 @@ namespace {
 using namespace guidance;
 
 constexpr int kStepsOfSample = kStepsPerVoxel / 2;
+constexpr int kParts = 8;  // of a step, at which offsets are compared
+// Voxels: the finest difference between offsets.
+constexpr double kFinest = 1.0 / (kStepsPerVoxel * kParts);
+constexpr double kMinNoise = 1e-6;  // of the variance of intensity: images that are equal have none
+
+/// [voxels] Maximum movement of a part of the surface in addition to that of the whole, which accounts for most of it.
+double part_range() { return 0.5 * kGuide.farthest; }
 
 /// Mean intensity of a patch by steps outward of it.
 class Template {
@@ -109,17 +117,17 @@ struct SurfaceTemplate::Data {
 SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const RunContext& run)
     : given(std::move(level_set)),
       h(given->voxelSize()[0]),
-      domain(widened(domain_of(*given), int(std::ceil(kMotion.farthest)))),
+      domain(widened(domain_of(*given), int(std::ceil(kGuide.farthest)))),
       surface(start_from_grid(domain, *given, run)) {
-    SurfaceVertices vertices = vertices_of(extract_mesh(*surface, {}, run), kGuide.normal_rounds);
+    SurfaceVertices vertices = vertices_of(extract_mesh(*surface, {}, run), kGuide.patch_width);
     patches = cut_patches(vertices, image.geometry(), kGuide.patch_width * h);
     find_borders(std::move(vertices), patches);
-    distance.emplace(*surface, patches.places, domain, kGuide.width, run);
+    distance.emplace(*surface, patches.places, domain, profile_reach(), run);
     for (const double voxel : patches.voxel) {
-        window.push_back(int(std::ceil(kMotion.window * h * kStepsPerVoxel / voxel)));
-        range.push_back(int(std::ceil(kMotion.range * h * kStepsPerVoxel / voxel)));
+        window.push_back(int(std::ceil(kHalfWidthVoxels * h * kStepsPerVoxel / voxel)));
+        range.push_back(int(std::ceil(part_range() * h * kStepsPerVoxel / voxel)));
     }
-    const SmoothImage smooth(image, box(kGuide.width * h), h, run);
+    const SmoothImage smooth(image, box(profile_reach() * h), h, run);
     templates.resize(patches.size());
     tbb::parallel_for(std::size_t(0), patches.size(), [&](std::size_t i) { templates[i] = read(i, smooth, {}); });
 }
@@ -148,7 +156,7 @@ public:
           patches_(known.patches),
           h_(known.h),
           run_(run),
-          image_(image, known.box((kGuide.width + kMotion.farthest) * known.h), known.h, run) {}
+          image_(image, known.box((profile_reach() + kGuide.farthest) * known.h), known.h, run) {}
 
     Followed follow() {
         translate();
@@ -165,7 +173,6 @@ private:
         /// Calls visit(offset, square) at fractions of a step, with parabolic interpolation between steps.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
-            constexpr int kParts = 8;
             for (std::size_t n = 0; n < squares.size(); ++n) {
                 const bool is_end = n == 0 || n + 1 == squares.size();
                 const double below = squares[is_end ? n : n - 1], here = squares[n],
@@ -208,7 +215,7 @@ private:
 
 /// 1 - correlation of the templates with the shifted new image.
 double Motion::mismatch(const Vec3& shift) const {
-    const std::size_t every = patches_.size() / kMotion.max_patches + 1;
+    const std::size_t every = patches_.size() / kCommon.sample + 1;
     std::vector<Moments> of_patch(patches_.size() / every + 1);
     std::vector<double> samples(of_patch.size(), 0.0);
     tbb::parallel_for(std::size_t(0), of_patch.size(), [&](std::size_t n) {
@@ -232,8 +239,8 @@ double Motion::mismatch(const Vec3& shift) const {
         all.add(of_patch[n]);
         expected += samples[n];
     }
-    // A shift that leaves the image is rejected.
-    return all.count() < kMotion.min_seen * expected ? 2.0 : 1 - all.correlation();
+    // A shift by which most samples leave the image is rejected.
+    return 2 * all.count() < expected ? 2.0 : 1 - all.correlation();
 }
 
 /// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), with steps from half of the maximum movement down to a
@@ -241,8 +248,8 @@ double Motion::mismatch(const Vec3& shift) const {
 void Motion::translate() {
     double best = mismatch(translation_);
     const double standing = best;
-    const double maximum = kMotion.farthest * h_;
-    for (double step = 0.5 * maximum; step >= kMotion.finest_step * h_; step *= 0.5)
+    const double maximum = kGuide.farthest * h_;
+    for (double step = 0.5 * maximum; step >= kFinest * h_; step *= 0.5)
         for (bool moved = true; moved;) {
             moved = false;
             Vec3 to = translation_;
@@ -271,14 +278,14 @@ void Motion::match() {
     offset_.assign(patches_.size(), 0.0);
     const OffsetField field(patches_, std::max(kMotion.alike * radius(), 4 * h_));
     const std::vector<Mismatch> of_itself = compare(known_.templates);
-    for (int pass = 0; pass < kMotion.passes; ++pass) {
+    for (int pass = 0; pass < kGuide.iterations; ++pass) {
         const std::vector<Mismatch> now = compare(read_now());
         std::vector<double> minimum;
         for (const Mismatch& m : now)
             if (!m.squares.empty()) minimum.push_back(m.minimum);
         const double spread = both_.deviation_x();
         if (minimum.empty() || !(spread > 0)) return;
-        const double noise = std::max(cloud::median(minimum), kMotion.min_noise * spread * spread);
+        const double noise = std::max(cloud::median(minimum), kMinNoise * spread * spread);
         const std::vector<Estimate> seen = estimates(now, noise);
         // If intensity changes on one side of a patch only, its estimated offset is biased towards the other side, even
         // if it has not moved. The estimate for the unmoved template is this bias.
@@ -297,9 +304,9 @@ void Motion::fit(const OffsetField& field, const std::vector<double>& measured, 
     const std::size_t count = patches_.size();
     const std::vector<OffsetEvidence> none(count);
     const std::vector<double> zero(count, 0.0);
-    double deviation = 0.5 * kMotion.range * h_;
+    double deviation = 0.5 * part_range() * h_;
     std::vector<double> believed = precision;
-    for (int round = 0; round < kMotion.rounds; ++round) {
+    for (int round = 0; round < kCommon.rounds; ++round) {
         run_.check();
         offset_ = field.fit(zero, std::vector<double>(count, deviation), none, measured, believed, nullptr).offset;
         double squares = 0, area = 0;
@@ -310,7 +317,7 @@ void Motion::fit(const OffsetField& field, const std::vector<double>& measured, 
             // Student's t with three degrees of freedom: some places have changed, and are no valid measurements.
             believed[i] = precision[i] * 4 / (3 + off * off * precision[i]);
         }
-        deviation = std::max(std::sqrt(squares / area), kMotion.finest_step * h_);
+        deviation = std::max(std::sqrt(squares / area), kFinest * h_);
     }
 }
 
@@ -390,7 +397,8 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
         });
         const double step = patches_.voxel[i] / kStepsPerVoxel, mean = first / mass;
         result[i].offset = mean * step;
-        result[i].variance = (std::max(second / mass - mean * mean, 0.0) + kMotion.variance) * step * step;
+        // Samples are a step apart, so that each offset is uncertain by half a step.
+        result[i].variance = (std::max(second / mass - mean * mean, 0.0) + 0.5 * 0.5) * step * step;
     });
     return result;
 }
@@ -420,7 +428,7 @@ Followed Motion::moved() const {
     }
     report.mean_offset /= area;
     result.u = known_.given;
-    const bool is_still = translation_ == Vec3{0, 0, 0} && !(report.max_offset > kMotion.still * h_);
+    const bool is_still = translation_ == Vec3{0, 0, 0} && !(report.max_offset > kFinest * h_);
     if (is_still) return result;
     const FloatGridPtr level = known_.distance->less(on_vertices(patches_, kGuide.patch_width * h_, offset_));
     // Whole voxels shift the lattice and only the fraction is interpolated: linear interpolation would shrink convex

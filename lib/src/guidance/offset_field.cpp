@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "guidance/conjugate_gradients.h"
-#include "guidance/heuristics.h"
 
 namespace covol::guidance {
 namespace {
@@ -90,7 +90,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     std::vector<double> field = to_units(mean);
     const std::vector<double> pull = *precision_ * field;
     std::vector<double> site(count, 0.0), prior_precision(count), known(count, 0.0), right(count);
-    for (int round = 0; round < (requested ? kOffsets.rounds : 1); ++round) {
+    for (int round = 0; round < (requested ? kCommon.rounds : 1); ++round) {
         // The value of the field at a patch is the prediction from its neighbours; its precision grows with theirs.
         for (std::size_t i = 0; i < count; ++i) {
             prior_precision[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];

@@ -15,8 +15,8 @@ struct SurfaceVertices {
 };
 
 /// @param mesh    closed, outward
-/// @param smooth  rounds of averaging of normals
-[[nodiscard]] SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth);
+/// @param smooth  distance over which normals are averaged, voxels
+[[nodiscard]] SurfaceVertices vertices_of(const TriangleMesh& mesh, double smooth);
 
 /// A surface cut into patches about two voxels wide, each with a single offset.
 struct Patches {

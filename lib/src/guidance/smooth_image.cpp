@@ -18,8 +18,7 @@ constexpr double kMinSigma = 0.3;  // voxels; below it a sampled Gaussian is the
 
 }  // namespace
 
-SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run)
-    : box_(box), sigma_(sigma) {
+SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run) {
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
     for (const Vec3& corner : corners(box)) {
@@ -98,12 +97,6 @@ SmoothImage::Line SmoothImage::along(const Vec3& first, const Vec3& step) const 
         line.step_[a] = row[0] * step[0] + row[1] * step[1] + row[2] * step[2];
     }
     return line;
-}
-
-bool SmoothImage::covers(const WorldBox& box, double sigma) const {
-    bool inside = sigma == sigma_;
-    for (int a = 0; a < 3; ++a) inside = inside && box_.min[a] <= box.min[a] && box.max[a] <= box_.max[a];
-    return inside;
 }
 
 bool SmoothImage::at(const Vec3& at, float& value) const {

@@ -32,15 +32,10 @@ public:
     /// @param step  world
     [[nodiscard]] Line along(const Vec3& first, const Vec3& step) const;
     [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
-    /// Whether it equals what the same image, this box and `sigma` would give, for this box or a wider one.
-    [[nodiscard]] bool covers(const WorldBox& box, double sigma) const;
 
 private:
     void smooth(int axis, double sigma);
     bool at(const Vec3& index, float& value) const;
-
-    WorldBox box_;
-    double sigma_;
 
     Matrix3 to_index_{};
     Vec3 offset_{};

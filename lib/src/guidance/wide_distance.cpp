@@ -6,8 +6,6 @@
 
 #include <cmath>
 
-#include "guidance/heuristics.h"
-
 namespace covol::guidance {
 namespace {
 
@@ -34,7 +32,8 @@ WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vert
     : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)),
       grid_(start.deepCopy()) {
     const double h = domain.voxel_size;
-    const auto own = float(kOffsets.own_voxels * h), far = float(width * h);
+    // In the outermost voxel of its band the start's distance is affected by the clamping.
+    const auto own = float((kHalfWidthVoxels - 1) * h), far = float(width * h);
     openvdb::tools::changeLevelSetBackground(grid_->tree(), far);
     const std::vector<Leaf*> leaves = touched(*grid_, nearest_);
     const detail::CoordBBox box = detail::box_of(domain);

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "holes/heuristics.h"
 #include "mesh/triangle.h"
 
@@ -26,7 +27,7 @@ double squared_length(const Point& a, const Point& b) {
     return sum;
 }
 
-bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCut.min_cosine * std::sqrt(dot(a, a) * dot(b, b)); }
+bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCommon.turn * std::sqrt(dot(a, a) * dot(b, b)); }
 
 /// Moves vertices close to the line onto it; their value becomes 0 even if the move is undone.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
@@ -49,8 +50,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
         values[v] = 0;
         tried[v] = moved[v];
     }
-    bool undone = true;
-    for (int round = 0; undone && round < kCut.undo_rounds; ++round) {
+    for (bool undone = true; undone;) {  // ends, because each round undoes moves
         undone = false;
         for (const Triangle& t : mesh.triangles) {
             if (!moves[t[0]] && !moves[t[1]] && !moves[t[2]]) continue;

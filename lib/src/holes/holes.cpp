@@ -27,6 +27,10 @@ double area_of(const TriangleMesh& mesh, const Triangle& t) {
     return meshing::area(mesh.place(t[0]), mesh.place(t[1]), mesh.place(t[2]));
 }
 
+/// Step of a diffusion, as a fraction of the way to the neighbours' mean: the largest at which no wave overshoots, even
+/// one that the mean reverses. It is not decisive, because the number of steps follows from it.
+constexpr float kStep = 0.5F;
+
 /// Diffusion over the mesh: approximately a Gaussian of standard deviation `width` if the triangles are even.
 void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) {
     std::vector<std::uint32_t> count(values.size(), 0);
@@ -36,8 +40,8 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
             count[t[k]] += 2;
             squares += detail::squared_distance(mesh.place(t[k]), mesh.place(t[(k + 1) % 3]));
         }
-    // Each step adds half the mean squared edge, times kHoles.step, to the variance along each axis.
-    const double variance = 0.5 * kHoles.step * squares / double(3 * mesh.triangles.size());
+    // Each step adds half the mean squared edge, times kStep, to the variance along each axis.
+    const double variance = 0.5 * kStep * squares / double(3 * mesh.triangles.size());
     const auto steps = int(std::ceil(width * width / variance));
     std::vector<float> sums(values.size());
     for (int n = 0; n < steps; ++n) {
@@ -45,7 +49,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
         for (const Triangle& t : mesh.triangles)
             for (int k = 0; k < 3; ++k) sums[t[k]] += values[t[(k + 1) % 3]] + values[t[(k + 2) % 3]];
         for (std::size_t v = 0; v < values.size(); ++v)
-            if (count[v] > 0) values[v] += kHoles.step * (sums[v] / float(count[v]) - values[v]);
+            if (count[v] > 0) values[v] += kStep * (sums[v] / float(count[v]) - values[v]);
     }
 }
 

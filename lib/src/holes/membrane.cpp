@@ -5,14 +5,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
-#include "holes/heuristics.h"
 
 namespace covol::holes {
 namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
+// Solutions with updated cotangents: Pinkall and Polthier, Computing discrete minimal surfaces, Exp. Math. 2(1), 1993.
+// The iteration converges, usually in fewer rounds.
+constexpr int kMaxRounds = 20;
+// Weights are between this cotangent and its inverse, because triangles without area have none: not decisive, because
+// such triangles contribute no area.
+constexpr double kMinWeight = 1e-3;
 
 /// Cotangent of the angle between two sides; 0 if they are parallel.
 double cotangent(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
@@ -32,7 +39,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
     for (std::size_t v = 0; v < number.size(); ++v)
         for (int a = 0; a < 3; ++a) at(std::ptrdiff_t(v), a) = mesh.vertices[v][a];
     Eigen::SimplicialLDLT<Matrix> solver;
-    for (int round = 0; round < kMembrane.max_rounds; ++round) {
+    for (int round = 0; round < kMaxRounds; ++round) {
         run.check();
         std::vector<Eigen::Triplet<double>> entries;
         Positions right = Positions::Zero(count, 3);
@@ -45,8 +52,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                                       v = at.row(b).transpose() - tip;
                 // At first, all edges have the same weight: that distributes the vertices of a bulge over the future
                 // surface.
-                const double w =
-                    round == 0 ? 1 : std::clamp(cotangent(u, v), kMembrane.min_weight, kMembrane.max_weight);
+                const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kMinWeight, 1 / kMinWeight);
                 edges += (u - v).norm();
                 ++edge_count;
                 for (const auto& [own, other] : {std::pair{a, b}, {b, a}}) {
@@ -71,7 +77,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
             maximum = std::max(maximum, (solved.row(number[v]) - at.row(std::ptrdiff_t(v))).norm());
             at.row(std::ptrdiff_t(v)) = solved.row(number[v]);
         }
-        if (maximum < kMembrane.steady * edges / edge_count) break;
+        if (maximum < kCommon.same_place * edges / edge_count) break;
     }
     for (std::size_t v = 0; v < number.size(); ++v)
         if (number[v] >= 0)

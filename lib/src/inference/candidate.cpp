@@ -9,7 +9,9 @@
 
 #include "base/geometry.h"
 #include "base/median.h"
+#include "covol/domain.h"
 #include "covol/error.h"
+#include "covol/guess.h"
 #include "inference/heuristics.h"
 #include "inference/minimal_surface.h"
 #include "points/kd_tree.h"
@@ -29,6 +31,7 @@ constexpr std::size_t kElsewhere = 300;               // samples not taken at ma
 // time.
 constexpr std::size_t kMarksBesideSpread = 300;
 constexpr std::size_t kFewestSamples = 40;
+constexpr int kIterations = 150;  // of minimize_surface(), which ends by itself before unless it converges slowly
 
 template <typename Visit>
 void for_each_row(const Lattice& lattice, const Visit& visit) {
@@ -184,7 +187,7 @@ private:
 };
 
 std::vector<std::size_t> surely_outside(const Scene& scene) {
-    const double above = kInference.surely_outside * scene.marks.spacing + scene.lattice.finest();
+    const double above = kInference.above_hull * scene.marks.spacing + scene.lattice.finest();
     std::vector<std::size_t> nodes;
     for (std::size_t n = 0; n < scene.above_hull.size(); ++n)
         if (double(scene.above_hull[n]) > above) nodes.push_back(n);
@@ -206,12 +209,12 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
             Features at = scene.image->at(n);
             add_guess(row[std::size_t(i)], double(scene.to_mark[n]), cell, at);
             const double above =
-                std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
+                std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.above_hull);
             double value = std::clamp(appearance.log_odds(at), -maximum, maximum);
-            value = std::max(value - kInference.hull_odds * above, -maximum);
+            value = std::max(value - maximum * above, -maximum);  // a spacing higher, the side is certain
             if (refine != nullptr) {
                 const double off = refine->lattice.value(coarse, lattice.place(i, j, k)) / refine->lattice.finest();
-                if (std::abs(off) > kInference.fine_band) value = off < 0 ? maximum : -maximum;
+                if (std::abs(off) > kHalfWidthVoxels) value = off < 0 ? maximum : -maximum;
             }
             odds[n] = float(value);
         }
@@ -242,13 +245,13 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
     double all = 0;
     for (std::size_t n = 0; n < solid.inside.size(); ++n) {
-        if (parts.number[n] == 0 || double(scene.to_mark[n]) >= kInference.on_mark * solid.lattice.finest()) continue;
+        if (parts.number[n] == 0 || double(scene.to_mark[n]) >= kInference.off_cells * solid.lattice.finest()) continue;
         ++marked[std::size_t(parts.number[n])];
         ++all;
     }
     std::size_t inside = 0;
     for (std::size_t n = 0; n < solid.inside.size(); ++n) {
-        if (marked[std::size_t(parts.number[n])] < kInference.min_part * std::max(all, 1.0)) solid.inside[n] = 0;
+        if (marked[std::size_t(parts.number[n])] < kInference.wrong * std::max(all, 1.0)) solid.inside[n] = 0;
         inside += std::size_t(solid.inside[n] != 0);
     }
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
@@ -285,7 +288,7 @@ double score_of(const Scene& scene, const Solid& solid, double bits) {
     double off = 0;
     for (const Vec3& mark : scene.marks.places)
         off += std::min(std::abs(solid.lattice.value(distance, mark)) / cell, kFarthestMiss);
-    return bits - std::log(area_of(solid)) - off / (kInference.usual_off * double(scene.marks.places.size()));
+    return bits - std::log(area_of(solid)) - off / (kUniformDeviation * double(scene.marks.places.size()));
 }
 
 }  // namespace
@@ -321,7 +324,7 @@ void Scene::measure() {
 }
 
 Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u, const RunContext& run) {
-    minimize_surface(lattice, weight, cost, kInference.iterations, u, run);
+    minimize_surface(lattice, weight, cost, kIterations, u, run);
     Solid solid{lattice, std::vector<char>(u.size())};
     for (std::size_t n = 0; n < u.size(); ++n) solid.inside[n] = u[n] > 0.5F ? 1 : 0;
     return solid;

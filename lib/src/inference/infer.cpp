@@ -5,14 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "covol/domain.h"
 #include "covol/error.h"
+#include "covol/guess.h"
 #include "covol/start.h"
 #include "grid/levels_at.h"
 #include "guess/marks_surface.h"
@@ -95,7 +98,8 @@ Candidate Inference::best_candidate() const {
     };
     std::vector<Proposal> proposals;
     for (const double sigma : kSigmas) {
-        proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide, amplitude});
+        // They count as much as the bending energy.
+        proposals.push_back({image_axes(*coarse_, sigma, true), 1, Search::Wide, amplitude});
         // If the body is darker, or brighter, than all its surroundings, the gradients themselves are the normals.
         proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near, amplitude});
     }
@@ -107,15 +111,11 @@ Candidate Inference::best_candidate() const {
                 result = &c;
         return result;
     };
-    for (int round = 0; round < kInference.rounds; ++round) {
-        std::vector<Proposal> next;
-        for (int n = 0; n < kInference.continued; ++n) {
-            Candidate* from = best(true);
-            if (from == nullptr) break;
-            from->was_continued = true;
-            next.push_back(near_normals_of(from->solid, amplitude));
-        }
-        propose_all(next);
+    for (int round = 0; round < kCommon.rounds; ++round) {
+        Candidate* const from = best(true);
+        if (from == nullptr) break;
+        from->was_continued = true;
+        propose_all({near_normals_of(from->solid, amplitude)});
     }
     Candidate* chosen = best(false);
     return chosen != nullptr ? std::move(*chosen) : Candidate{};
@@ -123,7 +123,7 @@ Candidate Inference::best_candidate() const {
 
 void Inference::choose_box() {
     const double voxel = image_.geometry().smallest_spacing();
-    box_ = bounding_box(marks_.places, std::max(kInference.around_voxels * voxel, marks_.spacing));
+    box_ = bounding_box(marks_.places, std::max(kCommon.beyond_voxels * voxel, marks_.spacing));
 }
 
 bool Inference::find(InferenceReport& report) {
@@ -136,7 +136,7 @@ bool Inference::find(InferenceReport& report) {
 }
 
 Solid Inference::refined() const {
-    const Lattice fine = cover(image_.geometry(), box_.min, box_.max, kInference.fine_nodes);
+    const Lattice fine = cover(image_.geometry(), box_.min, box_.max, fine_nodes());
     if (fine.count() <= coarse_->lattice.count()) return coarse_body_;
     const Scene scene(image_, fine, marks_, run_);
     Proposal refining = near_normals_of(coarse_body_, amplitude_);
@@ -147,20 +147,21 @@ Solid Inference::refined() const {
 }
 
 bool Inference::leave_out_wrong(const HeldOut& held) {
-    if (held.marks.size() < kInference.wrong_from_marks) return false;
+    // A single suspect may also lie on a part that the body lacks: at least two wrong marks have to be expected.
+    if (kInference.wrong * double(held.marks.size()) < 2) return false;
     const Field level = coarse_body_.level();
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
     std::vector<double> off;
-    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes the marks that it was made from, including
-                                                         // wrong ones
+    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes the marks it was made from, even wrong ones
         off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
-    const std::vector<double> wrong = probability_wrong(off, anywhere, kInference.usual_off * coarse_cell());
+    const std::vector<double> wrong = probability_wrong(off, anywhere, kUniformDeviation * coarse_cell());
     std::vector<Vec3> suspects;
     for (std::size_t i = 0; i < held.marks.size(); ++i)
         if (wrong[i] > 0.5) suspects.push_back(held.marks[i]);
-    // Several suspects close to each other lie on a part that the body lacks.
-    const double beside = kInference.beside_spacings * marks_.spacing;
+    // Several suspects close to each other lie on a part that the body lacks. At random positions on a surface with
+    // this mean distance between nearest ones, a ring of marks lies within that radius.
+    const double beside = std::sqrt(4 * double(kCommon.ring) / std::numbers::pi) * marks_.spacing;
     std::vector<Vec3> all = wrong_;
     for (const Vec3& suspect : suspects) {
         const auto neighbours = std::count_if(suspects.begin(), suspects.end(), [&](const Vec3& other) {
@@ -169,9 +170,7 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
         if (neighbours < 2) all.push_back(suspect);
     }
     const double given = double(marks_.places.size() + wrong_.size());
-    // For a single suspect it cannot be decided whether it is wrong, or the body lacks a part.
-    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.max_wrong * given)
-        return false;
+    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.max_off * given) return false;
     wrong_ = std::move(all);
     marks_ = marks_.without(wrong_, image_.geometry());
     choose_box();
@@ -246,7 +245,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
 class Predictions {
 public:
     /// @param shrink  factor of the body's errors on a finer lattice
-    Predictions(const HeldOut& held, double cell, double shrink) : small_(kInference.usual_off * cell) {
+    Predictions(const HeldOut& held, double cell, double shrink) : small_(kUniformDeviation * cell) {
         const double maximum = kFarthestMiss * cell;
         for (std::size_t n = 0; n < held.of_body.size(); ++n)
             off_.push_back({std::clamp(shrink * held.of_body[n], -maximum, maximum),
@@ -346,7 +345,7 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
 /// In the image's frame; a spread-out subset if there are very many.
 void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, std::vector<Vec3>& places) {
     if (world.empty()) return;
-    for (const std::size_t n : guess::spread_out(world, kInference.max_places))
+    for (const std::size_t n : guess::spread_out(world, kInference.guess_marks))
         places.push_back(to_frame(geometry, world[n]));
 }
 
@@ -388,7 +387,7 @@ double error_slope(const HeldOut& held, double guess_weight, double shrink) {
 /// by the volume. Held-out marks lie on the true surface, and measure the error of a result from fewer marks. The
 /// relation of that error to the Dice coefficient was fitted: kInference.expected_scale.
 std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell, const Overlap& body) {
-    if (held.of_body.size() < kInference.fewest_marks || !(body.volume > 0)) return {};
+    if (held.of_body.size() < kCommon.quadric || !(body.volume > 0)) return {};
     constexpr double kMaxCells = 8, kMinCells = 0.1;
     const double maximum = kMaxCells * cell;
     double error = 0;
@@ -416,10 +415,10 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
     };
     const ImageGeometry& geometry = image.geometry();
     Marks marks(geometry, world);
-    if (marks.places.size() < kInference.fewest_marks)
+    if (marks.places.size() < kCommon.quadric)
         return keep_guess(std::to_string(marks.places.size()) +
                           " marks are too few to learn inside and outside from the image, expected at least " +
-                          std::to_string(kInference.fewest_marks));
+                          std::to_string(kCommon.quadric));
     add_places(geometry, sides.inside, marks.inside);
     add_places(geometry, sides.outside, marks.outside);
     Inference inference(image, std::move(marks), run);
@@ -433,7 +432,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
                 return;
             }
             held = inference.hold_out();
-            if (round == kInference.wrong_rounds || !inference.leave_out_wrong(held)) break;
+            if (round == kCommon.rounds || !inference.leave_out_wrong(held)) break;
         }
         const Solid body = inference.refined();
         const double cell = body.lattice.finest();
@@ -447,7 +446,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         std::erase_if(result.marks, [&](const Vec3& mark) {
             const Vec3 place = to_frame(geometry, mark);
             const bool is_wrong = inference.leaves_out(place) && std::abs(body.lattice.value(level, place)) >
-                                                                     kInference.on_mark * body.lattice.finest();
+                                                                     kInference.off_cells * body.lattice.finest();
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });

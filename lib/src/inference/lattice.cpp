@@ -119,6 +119,8 @@ Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, 
     return lattice;
 }
 
+double fine_nodes() { return 2 * 2 * 2 * kInference.coarse_nodes; }
+
 std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u) {
     std::vector<Vec3> places;
     places.reserve(lattice.count());
@@ -129,10 +131,9 @@ std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geome
 bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run) {
     double voxels = 1;
     for (int a = 0; a < 3; ++a) voxels *= (lattice.size[a] - 1) * lattice.spacing[a] / geometry.spacing[a] + 1;
-    // The box is not copied as a whole, but the chunks that cover it are held in memory.
+    // The box is not copied as a whole, but the chunks that cover it, which may be twice as large, are held in memory.
     return voxels > kInference.max_voxels ||
-           (run.memory_budget > 0 &&
-            sizeof(float) * voxels > kInference.max_memory_fraction * double(run.memory_budget));
+           (run.memory_budget > 0 && 2 * sizeof(float) * voxels > double(run.memory_budget));
 }
 
 Field sample(const Image& image, const Lattice& lattice, const RunContext& run) {

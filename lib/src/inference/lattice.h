@@ -46,6 +46,10 @@ struct Lattice {
 /// enough; otherwise they lie symmetrically about the middle of the box, so that a mirror image has the same nodes.
 [[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double maximum);
 
+/// The maximum number of nodes of a result's lattice, the cells of which are half as large as those of the lattice on
+/// which candidates are compared.
+[[nodiscard]] double fine_nodes();
+
 /// A level set at all nodes.
 [[nodiscard]] std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/inference.h"
 #include "covol/start.h"
@@ -42,7 +43,7 @@ Solid solid_of(const FloatGrid& guess, const ImageGeometry& geometry, const Latt
 
 Lattice around(const ImageGeometry& geometry, const std::vector<Miss>& misses, double reach) {
     const WorldBox box = bounding_box(places_of(misses), reach);
-    return cover(geometry, box.min, box.max, kInference.fine_nodes);
+    return cover(geometry, box.min, box.max, fine_nodes());
 }
 
 class Redrawing {
@@ -237,7 +238,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
     const ImageGeometry& geometry = image.geometry();
     const double voxel = geometry.smallest_spacing(),
                  widest = *std::max_element(geometry.spacing.begin(), geometry.spacing.end()),
-                 missed = kInference.missed_voxels * std::max(voxel, 0.5 * widest),
+                 missed = kInference.off_cells * std::max(voxel, 0.5 * widest),
                  clamp = kHalfWidthVoxels * guess->voxelSize()[0];
     std::vector<Miss> misses;
     const std::vector<double> levels = detail::levels_at(*guess, marks);
@@ -258,7 +259,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
             maximum = std::max(maximum, miss.off);
         }
         const Lattice lattice =
-            around(geometry, misses, (kInference.redrawn + 1) * maximum + kInference.around_voxels * voxel);
+            around(geometry, misses, (kInference.redrawn + 1) * maximum + kCommon.beyond_voxels * voxel);
         if (is_too_large(lattice, geometry, run)) {
             result.reason = "the image's box around the marks that the guess misses is too large to be read as a whole";
             return;

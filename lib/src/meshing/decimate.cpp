@@ -10,6 +10,7 @@
 #include <limits>
 #include <optional>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
@@ -223,7 +224,7 @@ private:
         for (const auto& [triangle, t] : changed_) {
             const Vec3 to = at(t[0]), next = at(t[1]), previous = at(t[2]);
             const Vec3 was = area_normal(from, next, previous), is = area_normal(to, next, previous);
-            if (!(dot(was, is) > kDecimate.turn * length(was) * length(is)))
+            if (!(dot(was, is) > kCommon.turn * length(was) * length(is)))
                 return std::numeric_limits<float>::infinity();
             const double now = worst_cosine(to, next, previous);
             if (now > worst && now > kNeedles[0].cosine && now > worst_cosine(from, next, previous)) worst = now;
@@ -231,8 +232,8 @@ private:
         float factor = 1;
         for (const Needle& needle : kNeedles)
             if (worst > needle.cosine) factor = needle.factor;
-        return goal_.tolerance > 0 && worst > kDecimate.adaptive_needle ? std::numeric_limits<float>::infinity()
-                                                                        : factor;
+        // With a tolerance the goal is well-shaped triangles, not few.
+        return goal_.tolerance > 0 && factor > 1 ? std::numeric_limits<float>::infinity() : factor;
     }
 
     [[nodiscard]] bool leaves_surface(std::uint32_t lost) {
@@ -278,7 +279,7 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     SafeQuadric& decider = decimater.module(handle);
     decider.begin(mesh, table, surface, goal, trust, run);
     decimater.initialize();
-    for (int pass = 0; pass < kDecimate.passes && decider.left() > goal.triangles; ++pass) {
+    for (int pass = 0; pass < kCommon.rounds && decider.left() > goal.triangles; ++pass) {
         decider.begin_pass();
         if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // a collapse removes two
     }

@@ -11,6 +11,7 @@
 namespace covol::meshing {
 namespace {
 
+constexpr int kSteps = 6;            // of Newton's method, which converges faster or not at all
 constexpr double kConverged = 1e-4;  // voxels
 constexpr double kNearFace = 0.01;   // voxels: twice the chamfer of extract_mesh()
 
@@ -143,18 +144,18 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
     const double h = domain_.voxel_size;
     Vec3 p = world;
     double gone = 0;
-    for (int step = 0; step <= kLevel.steps; ++step) {
+    for (int step = 0; step <= kSteps; ++step) {
         const Sample here = sample(p);
         Vec3 g = here.gradient;
         for (int a = 0; a < 3; ++a)
             if (held >> a & 1) g[a] = 0;
         const double steep = dot(g, g);
         if (std::abs(here.value) <= kConverged * h * std::sqrt(steep) || here.value == 0) return p;
-        if (step == kLevel.steps || !(steep > kLevel.flat * kLevel.flat)) return {};
+        if (step == kSteps || !(steep > 0)) return {};
         const double whole = here.value / std::sqrt(steep);
         const double move = std::clamp(whole, -kLevel.longest * h, kLevel.longest * h);
         gone += std::abs(move);
-        if (!(gone <= kLevel.reach * h)) return {};
+        if (!(gone <= h)) return {};  // farther away it may be another sheet
         p = plus(p, -move / std::sqrt(steep), g);
     }
     return {};
@@ -167,7 +168,8 @@ double Level::distance(const Vec3& world) const {
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {
     bool farther = false;
-    for_each_sample(a, b, c, kLevel.sampling * voxel_size(),
+    // The level set is interpolated within cells of a voxel.
+    for_each_sample(a, b, c, voxel_size(),
                     [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
     return farther;
 }
@@ -212,7 +214,7 @@ MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
                        c = to_vec3(mesh.vertices[t[2]]);
             double distances = 0;
             int count = 0;
-            for_each_sample(a, b, c, kLevel.sampling * level.voxel_size(), [&](const Vec3& p) {
+            for_each_sample(a, b, c, level.voxel_size(), [&](const Vec3& p) {
                 const double distance = level.distance(p);
                 sum.max = std::max(sum.max, distance);
                 distances += distance;

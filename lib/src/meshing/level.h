@@ -76,7 +76,7 @@ public:
     /// @param origin  of the meshes of this surface
     Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin);
     [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_, origin_}; }
-    /// From points less than a voxel apart; faces of the clip are excluded.
+    /// From points at most a voxel apart; faces of the clip are excluded.
     [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
 
 private:

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "base/heuristics.h"
 #include "covol/mesh_relax.h"
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
@@ -20,6 +21,13 @@
 namespace covol {
 namespace meshing {
 namespace {
+
+// Length of a move, as a fraction of the way to the neighbours' mean: the largest at which no wave overshoots, because
+// the mean of six even neighbours reverses a wave by at most half.
+constexpr double kStep = 2.0 / 3.0;
+
+// Cosine by which a flip has to increase the smallest angle: only prevents flips without end between equal angles.
+constexpr double kGain = 1e-3;
 
 class Relaxer {
 public:
@@ -36,7 +44,7 @@ public:
     void relax(int rounds, RelaxReport& report) {
         for (int round = 0; round < rounds; ++round) {
             if (round > 0) report.collapses += std::int64_t(collapse_slivers());
-            choose(round == 0 ? 2.0 : kRelax.poor);
+            choose(round == 0 ? 2.0 : kRelax.sliver);
             std::vector<Flip> turned = flip_edges();
             const Positions before = mesh_.vertices;
             for (int n = 0; n < kRelax.moves_per_round; ++n) {
@@ -91,12 +99,12 @@ private:
         const std::uint32_t v = table_.vertex(corner), w = table_.vertex(across);
         const Vec3 pa = at(a), pb = at(b), pv = at(v), pw = at(w);
         const double now = std::max(worst_cosine(pv, pa, pb), worst_cosine(pw, pb, pa));
-        if (!(std::max(worst_cosine(pv, pa, pw), worst_cosine(pw, pb, pv)) < now - kRelax.gain)) return false;
+        if (!(std::max(worst_cosine(pv, pa, pw), worst_cosine(pw, pb, pv)) < now - kGain)) return false;
         const Vec3 was[2] = {area_normal(pv, pa, pb), area_normal(pw, pb, pa)};
         const Vec3 is[2] = {area_normal(pv, pa, pw), area_normal(pw, pb, pv)};
         for (const Vec3& m : was)
             for (const Vec3& n : is)
-                if (!(dot(m, n) > kRelax.smooth * length(m) * length(n))) return false;
+                if (!(dot(m, n) > kCommon.turn * length(m) * length(n))) return false;
         const unsigned face = face_of(v, a, b);
         if (face_of(w, b, a) != face || face_of(v, a, w) != face || face_of(w, b, v) != face) return false;
         if (face != 0) return table_.can_flip(corner);
@@ -173,7 +181,7 @@ private:
             ++count;
         });
         const Vec3 p = to_vec3(here);
-        Vec3 step = plus(Vec3{}, kRelax.step, minus(plus(Vec3{}, 1.0 / count, sum), p));
+        Vec3 step = plus(Vec3{}, kStep, minus(plus(Vec3{}, 1.0 / count, sum), p));
         const unsigned held = holds_[v] & kFaces;
         for (int a = 0; a < 3; ++a)
             if (held >> a & 1) step[a] = normal[a] = 0;
@@ -183,7 +191,7 @@ private:
         step = plus(step, -dot(step, normal) / size, normal);
         const Vec3 goal = plus(p, 1, step);
         const std::optional<Vec3> found = levels_.local().project(goal, held);
-        const double slack = 1e-3 * levels_.local().voxel_size();
+        const double slack = kCommon.same_place * levels_.local().voxel_size();
         if (!found || length(minus(*found, goal)) > kRelax.drop * length(step) + slack) return here;
         Position there = to_position(*found);
         for (int a = 0; a < 3; ++a)
@@ -193,7 +201,7 @@ private:
 
     /// Whether a move turns the triangle over or moves it off the surface.
     [[nodiscard]] bool is_invalid_move(const Triangle& t, const Positions& before, const Positions& after) const {
-        if (is_turned(t, before, after, kRelax.same_side)) return true;
+        if (is_turned(t, before, after, kCommon.turn)) return true;
         return tolerance_ > 0 && has_moved(t, before, after) &&
                is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
     }
@@ -341,8 +349,8 @@ private:
                 worse = worse ||
                         (tolerance_ > 0 &&
                          is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
-                worse = worse ||
-                        !(dot(was, is) > (before > kRelax.sliver ? 0.0 : kRelax.same_side) * length(was) * length(is));
+                worse =
+                    worse || !(dot(was, is) > (before > kRelax.sliver ? 0.0 : kCommon.turn) * length(was) * length(is));
             }
             if (worse || slivers <= 0 || narrowest > narrowest_before || !edge.collapse(there)) continue;
             holds_[a] |= holds_[b];

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numeric>
 
-#include "meshing/heuristics.h"
+#include "base/heuristics.h"
 
 namespace covol::meshing {
 
@@ -29,7 +29,7 @@ std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal) {
     std::vector<std::uint32_t> all(mesh.triangles.size());
     std::iota(all.begin(), all.end(), 0U);
     const auto turned = [&](std::uint32_t t) {
-        return is_turned(mesh.triangles[t], before, mesh.vertices, kRelax.same_side);
+        return is_turned(mesh.triangles[t], before, mesh.vertices, kCommon.turn);
     };
     restore_all(table, those(all, turned), before, mesh.vertices, turned);
     ContactFinder finder(mesh.vertices, mesh.triangles);

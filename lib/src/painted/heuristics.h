@@ -1,13 +1,11 @@
 #pragma once
 // The heuristic constants of this folder: docs/heuristics.md shows the effect of halving and doubling each.
-#include "base/heuristic.h"
+#include "base/heuristics.h"
 
 namespace covol {
 
 /// Interpretation of painted labels: painted.cpp, whole_runs.cpp.
 struct PaintedHeuristics {
-    /// [voxels] A narrower patch gives little information about a cross-section.
-    int narrowest = heuristic("painted.narrowest", 3);
     /// [ratio] Minimum of the widest patch to a run of painted slices, for them to be separate slices.
     int thin_run = heuristic("painted.thin_run", 3);
     /// [of the largest section] Minimum of a section that counts as equally large.
@@ -27,8 +25,6 @@ struct OutlineHeuristics {
     int window = heuristic("outline.window", 8);
     /// [of the line's length] Maximum of this half-width.
     double window_of_line = heuristic("outline.window_of_line", 0.15);
-    /// [voxels] Maximum displacement of a vertex by smoothing.
-    double max_shift = heuristic("outline.max_shift", 0.5);
     /// [voxels] Maximum width of a scribble.
     int widest_stroke = heuristic("outline.widest_stroke", 4);
     /// [widths] Minimum length of a scribble.

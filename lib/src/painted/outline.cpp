@@ -144,7 +144,8 @@ Polygon smoothed(const Polygon& outline) {
         }
         const Vec2& old = outline[std::size_t(v)];
         for (int a = 0; a < 2; ++a)
-            line[std::size_t(v)][a] = std::clamp(mean[a], old[a] - kOutline.max_shift, old[a] + kOutline.max_shift);
+            // The centres of the voxels on both sides of the line are half a voxel away.
+            line[std::size_t(v)][a] = std::clamp(mean[a], old[a] - 0.5, old[a] + 0.5);
     }
     return line;
 }

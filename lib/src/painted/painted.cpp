@@ -170,7 +170,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
         std::array<AxisPaint, 3> axes;
         for (int a = 0; a < 3; ++a) axes[a] = painted::properties_across(paint, a);
         for (const int a : {2, 1, 0})
-            if (axes[a].widest >= kPainted.narrowest && is_sliced(axes[a], a, labels.geometry()))
+            if (is_sliced(axes[a], a, labels.geometry()))
                 result.views.push_back(view_of(paint, a, with_tips(axes[a]), source));
         if (result.views.empty())
             if (const std::optional<int> a = painted::find_whole_runs(paint, labels.geometry()))

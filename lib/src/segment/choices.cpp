@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "cloud/orientation/filled.h"
 #include "covol/error.h"
@@ -45,7 +46,7 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
     const double maximum = away[away.size() * 99 / 100];
-    if (far < kAutomatic.wild_point * maximum || far < kMaxReach * h) return;
+    if (far < kMaxReach * h || maximum >= kMaxReach * h) return;  // without it the others would not fit either
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
                                         " times as far as 99 % of them; remove it if it is a mistake");
@@ -80,21 +81,22 @@ StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points
 }
 
 std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunContext& run) {
-    std::vector<Vec3> kept = merge_close_points(points, kAutomatic.merge_voxels * h);
+    std::vector<Vec3> kept = merge_close_points(points, kAutomatic.noticeable_voxels * h);
     if (kept.size() < points.size())
         run.info("points: " + std::to_string(kept.size()) + " of " + std::to_string(points.size()) +
-                 " kept, the others are closer to them than half of " + number(kAutomatic.merge_voxels * h));
+                 " kept, the others are closer to them than half of " + number(kAutomatic.noticeable_voxels * h));
     return kept;
 }
 
 // A thick layer of points, or several adjacent layers, are replaced by the surface in their middle.
 std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
-    const double radius = kAutomatic.scan_radius_voxels * h, thickness = measure_layer_thickness(points, radius, run);
-    if (!(thickness > kAutomatic.noisy_fraction * h)) return points;
+    // Layers closer than that lie in the band of a single surface.
+    const double radius = kHalfWidthVoxels * h, thickness = measure_layer_thickness(points, radius, run);
+    if (!(thickness > kAutomatic.noticeable_voxels * h)) return points;
     points = average_layers(points, radius, run);
     remarks.choose("points_averaged", "within " + number(radius),
                    "on average they lie " + number(thickness) + " from their local plane, more than " +
-                       number(kAutomatic.noisy_fraction) + " voxels",
+                       number(kAutomatic.noticeable_voxels) + " voxels",
                    run);
     return points;
 }
@@ -106,10 +108,11 @@ double choose_attraction_range(const EvolveOptions& evolve, bool tags, double h,
         remarks.choose("attraction_range", "0", "unlimited, because the band around the points limits it", run);
         return 0;
     }
-    const double voxels = tags ? kAutomatic.tag_attraction_voxels : kAutomatic.attraction_voxels;
-    remarks.choose("attraction_range", number(voxels * h),
-                   number(voxels) + (tags ? " voxels: farther from the marks, the image decides" : " voxels"), run);
-    return voxels * h;
+    const double range = kAttractionVoxels * h;
+    remarks.choose(
+        "attraction_range", number(range),
+        number(kAttractionVoxels) + (tags ? " voxels: farther from the marks, the image decides" : " voxels"), run);
+    return range;
 }
 
 /// Adds the lengths, times and weights of a flow.
@@ -178,7 +181,7 @@ Resolved resolve(const Problem& problem) {
         c.h = choice.voxel_size;
         remarks.choose("voxel_size", number(c.h), choice.reason, run);
     }
-    check_sides(options.inside, options.outside, kAutomatic.same_seed_voxels * c.h);
+    check_sides(options.inside, options.outside, kCommon.same_place * c.h);
     if (problem.image == nullptr) check_extent(points, c.h);
     if (options.guess) {
         c.start = StartMethod::Corrected;
@@ -191,10 +194,10 @@ Resolved resolve(const Problem& problem) {
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
         // If a cloud encloses nothing, or fills a solid, its surface is that of the indicator alone.
-        const double h = c.cloud->has_quadrics ? 0 : kAutomatic.view_voxel * c.cloud->orientation.screened->cell();
+        const double h = c.cloud->has_quadrics ? 0 : kAutomatic.detail_voxel * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
-            remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);
+            remarks.choose("voxel_size", number(h), number(kAutomatic.detail_voxel) + " cells of the indicator", run);
         }
         // The surface that closes a scan may be much larger than the part that the points lie on.
         const double area =
@@ -252,9 +255,9 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     if (distinct.size() > kAutomatic.max_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
-        const double h = kAutomatic.cloud_noise * scale.noise;
+        const double h = kAutomatic.detail_voxel * scale.noise;
         if (h <= scale.nearest) return nearest(scale.nearest);
-        return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
+        return {h, number(kAutomatic.detail_voxel) + " times the noise of the points, " + number(scale.noise)};
     }
     const double spacing = measure_spacing(distinct).median;
     // A guess is well defined between its points, whatever the noise: its surface gets as many voxels as that of the

@@ -8,6 +8,9 @@
 
 namespace covol::pipeline {
 
+/// Automatic attraction range: points attract fully up to half of it, which is the whole band around the surface.
+inline constexpr double kAttractionVoxels = 2 * kHalfWidthVoxels;
+
 /// How the level set starts, resolved from SegmentOptions::start and the input.
 enum class StartMethod {
     Corrected,  ///< another tool's result, corrected by marks

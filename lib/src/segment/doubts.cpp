@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "covol/points.h"
 #include "grid/levels_at.h"
+#include "inference/heuristics.h"
 #include "points/kd_tree.h"
 #include "segment/heuristics.h"
 
@@ -61,9 +63,7 @@ void require_outside(const Problem& problem, const FloatGrid& u, const std::vect
     if (2 * std::count(inside.begin(), inside.end(), 1) <= std::ptrdiff_t(places.size())) return;
     std::vector<Vec3> known = problem.given;
     known.insert(known.end(), problem.options.inside.begin(), problem.options.inside.end());
-    const WorldBox box = bounding_box(known.empty() ? places : known);
-    const double far =
-        kDoubts.far_diagonals * std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    const double far = far_from_marks(known.empty() ? places : known);
     const detail::KdTree tree(known);
     std::size_t unexpected = 0;
     for (std::size_t n = 0; n < places.size(); ++n) {
@@ -97,11 +97,16 @@ Remarks doubt_isolated_marks(const Problem& problem) {
     return remarks;
 }
 
+double far_from_marks(const std::vector<Vec3>& marks) {
+    const WorldBox box = bounding_box(marks);
+    return 0.5 * std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+}
+
 double largest_error_of_marks(const Problem& problem, double h, double noise) {
     double edge = h;
     if (problem.image != nullptr)
         for (const double s : problem.image->geometry().spacing) edge = std::max(edge, s);
-    return std::max(kDoubts.off_voxels * edge, kDoubts.off_noise * noise);
+    return std::max(kInference.off_cells * edge, kCommon.errors * noise);
 }
 
 bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGrid& u) {

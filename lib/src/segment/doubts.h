@@ -23,6 +23,10 @@ namespace covol::pipeline {
 /// @throws Error InvalidInput
 void require_outside(const Problem& problem, const FloatGrid& u, const std::vector<char>& in_start);
 
+/// Distance from every mark, beyond which the marks do not support a surface any more: half the diagonal of their box,
+/// the radius of the ball around it.
+[[nodiscard]] double far_from_marks(const std::vector<Vec3>& marks);
+
 /// Maximum plausible distance of a mark from the surface that it marks, world units.
 /// @param noise  of a cloud, else 0
 [[nodiscard]] double largest_error_of_marks(const Problem& problem, double h, double noise);

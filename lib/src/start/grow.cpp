@@ -8,6 +8,7 @@
 #include <queue>
 #include <vector>
 
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "base/number.h"
 #include "covol/start.h"
@@ -114,7 +115,7 @@ public:
         Spread surface = spread_of(shell);
         surface.width = std::max({surface.width, inside_.width, 2 * kGrow.min_spread * range});
         const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) {
-            return std::abs(v - surface.middle) > kGrow.unlike * surface.width;
+            return std::abs(v - surface.middle) > kCommon.errors * surface.width;
         });
         if (double(unlike) > kGrow.unlike_fraction * double(inside.size()))
             return "the image differs between the inside and the surface of the start";
@@ -152,7 +153,7 @@ public:
     }
 
     [[nodiscard]] bool is_clear() const { return best_edge_ > kGrow.clear * inside_.width; }
-    [[nodiscard]] bool starts_at_edge() const { return start_edge_ > kGrow.at_hand * best_edge_; }
+    [[nodiscard]] bool starts_at_edge() const { return start_edge_ > kGrow.passed * best_edge_; }
     [[nodiscard]] double growth() const { return double(best_count_) / double(std::max<std::size_t>(start_count_, 1)); }
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }
@@ -181,8 +182,8 @@ private:
     [[nodiscard]] double edge() const {
         if (faces_ <= 0) return 0;
         const auto count = double(faces_);
-        return std::max(std::abs(change_) / count - kGrow.errors * inside_.width / std::sqrt(count / correlated_faces_),
-                        0.0);
+        const double error = inside_.width / std::sqrt(count / correlated_faces_);
+        return std::max(std::abs(change_) / count - kCommon.errors * error, 0.0);
     }
 
     void take(std::size_t n) {
@@ -214,7 +215,8 @@ private:
             if (taken_[other]) near[axis] = std::min(near[axis], double(arrival_[other]));
         });
         std::sort(near.begin(), near.end());
-        const double away = std::abs(double(image_[n]) - inside_.middle) / (kGrow.speed_spreads * inside_.width);
+        // The front is half as fast where noise no longer explains the difference.
+        const double away = std::abs(double(image_[n]) - inside_.middle) / (kCommon.errors * inside_.width);
         const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kGrow.min_speed);
         double time = near[0] + slowness, sum = near[0], squares = near[0] * near[0];
         for (int m = 1; m < 3 && near[m] < time; ++m) {
@@ -260,7 +262,7 @@ private:
 
     const Box& box_;
     const std::vector<float>&image_, &level_;
-    double voxel_, correlated_faces_;  // alike_: number of faces of a front that have a common error
+    double voxel_, correlated_faces_;  // number of faces of a front that have a common error
     Spread inside_;
     std::vector<float> arrival_;
     std::vector<char> taken_;
@@ -285,7 +287,7 @@ FloatGridPtr level_set_of(const Box& box, std::vector<float> region, const Domai
 GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigma, const RunContext& run) {
     const Domain domain = domain_of(start);
     const openvdb::CoordBBox active = start.evalActiveVoxelBoundingBox();
-    int pad = std::max(int(kGrow.min_pad), int(active.dim()[active.dim().maxIndex()]));
+    int pad = active.dim()[active.dim().maxIndex()];  // at least the width of a band
     for (;; pad *= 2) {
         Coord lo, hi;
         for (int a = 0; a < 3; ++a) {

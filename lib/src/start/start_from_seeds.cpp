@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "points/kd_tree.h"
-#include "start/heuristics.h"
 
 namespace covol {
 namespace {
@@ -19,7 +19,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 /// Half of the longest edge of the minimum spanning tree of the seeds (Prim).
 double joining_radius(const std::vector<Vec3>& seeds) {
-    if (seeds.size() > kSeeds.max_joined) {
+    if (seeds.size() > kCommon.sample) {
         double widest = 0;  // dense paint: neighbours are close, patches may remain separate
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));

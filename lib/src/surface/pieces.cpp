@@ -368,7 +368,7 @@ private:
 void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) {
     const auto limit = float(0.5 * level_set.voxelSize()[0]);
     const auto has_mark = [&](CoordBBox box) {
-        box.expand(kPieces.mark_voxels);
+        box.expand(int(kHalfWidthVoxels));  // a mark in the band around the piece preserves it
         return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
             return box.isInside(Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
         });

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/heuristics.h"
 #include "covol/band.h"
 #include "covol/error.h"
 #include "distance/memory_need.h"
@@ -15,7 +16,6 @@
 #include "grid/sign_masks.h"
 #include "redistance/interface_patches.h"
 #include "redistance/tracking.h"
-#include "tagging/heuristics.h"
 
 namespace covol {
 namespace {
@@ -74,7 +74,7 @@ FloatGridPtr grown_exterior(const FloatGrid& body, const std::vector<Vec3>& surf
 
 FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const RunContext& run) {
     const Domain domain = domain_of(band);
-    const double reach = kClosing.reach_voxels * domain.voxel_size;
+    const double reach = kCommon.beyond_voxels * domain.voxel_size;
     FloatGridPtr closed;
     with_threads(run, [&] {
         std::vector<Vec3> surface;

@@ -14,7 +14,6 @@
 #include "base/disjoint_sets.h"
 #include "grid/halo.h"
 #include "grid/leaf_columns.h"
-#include "tagging/heuristics.h"
 
 namespace covol::detail {
 namespace {
@@ -23,6 +22,7 @@ using detail::DisjointSets;
 
 constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of the region beyond the tube
 constexpr float kOutsideDomain = -kBeyond;                         ///< d outside the domain
+constexpr double kBucketsPerVoxel = 16;                            ///< of distances
 constexpr std::int32_t kExterior = 0;                              ///< the first component
 
 /// Two components merge once the threshold of d falls below this.
@@ -209,7 +209,7 @@ void CoreFinder::load(std::size_t leaf, Heights& heights) const {
 }
 
 void CoreFinder::count_voxels(Cores& result) const {
-    const double per_length = kTagDistance.buckets_per_voxel / domain_.voxel_size;
+    const double per_length = kBucketsPerVoxel / domain_.voxel_size;
     const auto buckets = std::size_t(radius_ * per_length) + 1;
     tbb::enumerable_thread_specific<std::vector<std::int64_t>> counts(buckets, 0);
     for_leaves([&](std::size_t leaf) {
@@ -446,8 +446,7 @@ void CoreFinder::measure(const Merging& merging, Cores& result) {
 
 double Cores::cloud_volume(double distance) const {
     double n = 0;
-    for (std::size_t bucket = 0;
-         bucket < histogram.size() && double(bucket) < distance * kTagDistance.buckets_per_voxel; ++bucket)
+    for (std::size_t bucket = 0; bucket < histogram.size() && double(bucket) < distance * kBucketsPerVoxel; ++bucket)
         n += double(histogram[bucket]);
     return n;
 }

@@ -2,7 +2,7 @@
 // The heuristic constants of this folder: docs/heuristics.md shows the effect of halving and doubling each.
 #include <cstdint>
 
-#include "base/heuristic.h"
+#include "base/heuristics.h"
 
 namespace covol {
 
@@ -12,18 +12,13 @@ struct TagDistanceHeuristics {
     double clear_ratio = heuristic("tag_distance.clear_ratio", 2.0);
     /// [ratio] The same for a core with a large fraction of the cloud's area.
     double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
-    /// [fraction of the cloud's area] Minimum that counts as large.
+    /// [fraction of the cloud's area, and volumes of the most important core] Minimum that counts as large, and of a
+    /// core that D has to close.
     double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
-    /// [volumes of the most important core] Minimum of a core that D has to close.
-    double important_fraction = heuristic("tag_distance.important_fraction", 0.1);
     /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
-    /// [voxels] Approximate number in the tube on the first grid.
-    std::int64_t coarse_voxels = heuristic("tag_distance.coarse_voxels", 200'000);
     /// [voxels] Maximum in the tube on the last grid, to limit time and memory.
     std::int64_t max_tube_voxels = heuristic("tag_distance.max_tube_voxels", 1'500'000);
-    /// [buckets] Of distances, for each voxel.
-    double buckets_per_voxel = heuristic("tag_distance.buckets_per_voxel", 16);
 };
 COVOL_HEURISTICS TagDistanceHeuristics kTagDistance{};
 
@@ -35,12 +30,5 @@ struct TaggingHeuristics {
     double significant_radius = heuristic("tagging.significant_radius", 0.25);
 };
 COVOL_HEURISTICS TaggingHeuristics kTagging{};
-
-/// Closing of a tagged body by a ball of radius D: closing.cpp.
-struct ClosingHeuristics {
-    /// [voxels] Distance beyond D, enough for a band around the closing's surface.
-    double reach_voxels = heuristic("closing.reach_voxels", 6.0);
-};
-COVOL_HEURISTICS ClosingHeuristics kClosing{};
 
 }  // namespace covol

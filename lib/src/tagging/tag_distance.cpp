@@ -56,7 +56,7 @@ MainCores judge(const Cores& analysis) {
     if (!primary) return verdict;
     double area = 0;
     for (const Core& c : analysis.cores) {
-        if (!is_significant(c) || c.full_volume() < kTagDistance.important_fraction * primary->full_volume()) continue;
+        if (!is_significant(c) || c.full_volume() < kTagDistance.large_fraction * primary->full_volume()) continue;
         verdict.saddle = std::max(verdict.saddle, c.saddle);
         area += c.full_area();
         ++verdict.cores;
@@ -75,7 +75,8 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
     const double extent = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2], h});
     double volume = 1;
     for (int a = 0; a < 3; ++a) volume *= std::max(box.max[a] - box.min[a], extent / 64);
-    double a = std::max(h, std::cbrt(volume / double(kTagDistance.coarse_voxels)));
+    // On the first grid the cells are twice as large as those that the last one may have.
+    double a = std::max(h, 2 * std::cbrt(volume / double(kTagDistance.max_tube_voxels)));
     double radius = extent;
     TagDistanceChoice choice;
     std::ostringstream reason;

@@ -139,7 +139,7 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
         for (std::size_t n = 1; n < pieces.size(); ++n) {
             openvdb::CoordBBox around;
             for (const Coord& c : pieces[n]) around.expand(c);
-            around.expand(kPieces.mark_voxels);
+            around.expand(int(kHalfWidthVoxels));
             const bool marked = std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
                 return around.isInside(Coord::round(openvdb::Vec3d(m[0], m[1], m[2])));
             });
@@ -158,7 +158,7 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
 TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows which patches meet", "[guidance]") {
     const double h = 0.5, radius = 8;
     const TriangleMesh mesh = extract_mesh(*start_from_sphere(cube(24, h), {0, 0, 0}, radius));
-    guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 3);
+    guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 1.5);
     ImageGeometry geometry;
     geometry.size = {40, 40, 40};
     geometry.spacing = {0.5, 0.5, 0.5};

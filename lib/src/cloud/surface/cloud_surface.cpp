@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
@@ -99,8 +100,8 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     const Orientation& orientation = cloud.orientation;
     const double fraction = cloud.encloses ? kBlend.min_resting_fraction : kBlend.min_resting_open,
                  noises = report.noise / report.spacing;
-    const auto minimum =
-        std::size_t(std::max({kBlend.min_resting, fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
+    const auto minimum = std::size_t(
+        std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);
     // Joins before the indicator's topology is imposed, which may lack torn parts, and after, since that may tear
     // others.

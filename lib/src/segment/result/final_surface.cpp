@@ -14,6 +14,7 @@
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "covol/start.h"
+#include "holes/heuristics.h"
 #include "holes/share_beyond.h"
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
@@ -97,7 +98,7 @@ struct Maker {
             case Holes::Flat: return flatten_holes(made.mesh, made.distance_to_points, distance, slack, run());
             case Holes::Auto: break;
         }
-        if (made.fraction_without_points <= kFinal.warn_without_points || options().contours) return {};
+        if (made.fraction_without_points <= kDoubts.negligible || options().contours) return {};
         try {
             TreatedHoles open = trimmed();
             double rims = 0;
@@ -119,7 +120,7 @@ struct Maker {
         HolesReport& holes = made.holes;
         const double automatic = choose_hole_distance(points, choices.h),
                      distance = requested.distance.value_or(automatic);
-        const double slack = kFinal.rim_slack * std::min(automatic, distance);
+        const double slack = 0.5 / kHoles.far * std::min(automatic, distance);  // half a spacing at most
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.fraction_without_points = measure_fraction_beyond(made.mesh, made.distance_to_points, distance);
         holes.distance = distance;

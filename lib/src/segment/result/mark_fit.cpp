@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "grid/levels_at.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
@@ -38,8 +39,8 @@ std::vector<std::string> compare_with_marks(SegmentReport& report, const FloatGr
     const double h = surface.voxelSize()[0], bias = sum / count;
     const double error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
     report.fit.bias = bias;
-    if (std::abs(bias) >= kDoubts.bias_voxels * std::max(h, report.cloud.noise) &&
-        std::abs(bias) >= kDoubts.bias_errors * error)
+    if (std::abs(bias) >= kAutomatic.noticeable_voxels * std::max(h, report.cloud.noise) &&
+        std::abs(bias) >= kCommon.errors * error)
         lines.push_back("on average the marks lie " + number(std::abs(bias) / h) + " voxels " +
                         (bias > 0 ? "outside" : "inside") + " the surface: it is too " +
                         (bias > 0 ? "small" : "large"));

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/compare.h"
 #include "grid/levels_at.h"
 #include "image/support.h"
@@ -78,16 +79,14 @@ private:
 
     /// The surface of minimum bending energy through the marks may extend far beyond them.
     void find_surface_beyond() {
-        const WorldBox box = bounding_box(marks_);
-        const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
-        const double far = kDoubts.far_diagonals * diagonal;
+        const double far = far_from_marks(marks_);
         const std::vector<Vec3> places = places_on(*surface_.level_set);
         const detail::KdTree tree(marks_);
         const auto beyond = std::count_if(places.begin(), places.end(),
                                           [&](const Vec3& place) { return tree.nearest(place) > far * far; });
         const double fraction = double(beyond) / double(std::max<std::size_t>(1, places.size()));
         report_.surface_beyond_marks = fraction;
-        if (fraction > kDoubts.far_fraction)
+        if (fraction > kDoubts.missed_fraction)
             warn(number(std::round(100 * fraction)) + " % of the surface is farther than " + number(far) +
                  " (half of the extent of the marks) from every mark: it extends beyond the marked region; add marks "
                  "there, or give a position outside the body (`outside`)");
@@ -110,7 +109,7 @@ private:
         const auto [low, high] = problem_.image->percentiles(0.01, 0.99);
         const double largest = std::max(std::abs(low), std::abs(high));
         const double step = largest * std::numeric_limits<float>::epsilon();
-        if (high > low && step > kDoubts.lost_precision * (high - low))
+        if (high > low && step > kDoubts.negligible * (high - low))
             warn("the image's values lie between " + number(low) + " and " + number(high) +
                  ", where single precision resolves only steps of " + number(step) + ": subtract an offset first");
     }
@@ -121,7 +120,7 @@ private:
     };
 
     [[nodiscard]] Normals normals_at_marks() const {
-        const std::size_t every = std::max<std::size_t>(1, marks_.size() / kDoubts.support_marks);
+        const std::size_t every = std::max<std::size_t>(1, marks_.size() / kCommon.sample);
         std::vector<Vec3> beside;  // two samples for each mark and axis, before and behind
         for (std::size_t n = 0; n < marks_.size(); n += every)
             for (int a = 0; a < 3; ++a)
@@ -160,7 +159,7 @@ private:
         else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
             warn("the image at some marks hardly predicts where the others lie (a gain of " + number(guidance.gain) +
                  " nats per mark)" + look);
-        else if (border.fraction < kDoubts.border_fraction && border.errors > kDoubts.border_errors)
+        else if (border.fraction < kDoubts.clear_support && border.errors > kCommon.errors)
             warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
                  (border.at < 0 ? "inside" : "outside") + " the marks, everywhere (at the marks they have " +
                  number(std::round(100 * border.fraction)) + " % of that steepness)" + look + ", and have its scale");
@@ -202,7 +201,7 @@ private:
             warn("the surface through the marks has " + std::to_string(surface_.measures.components) +
                  " pieces: if they are one body, add marks between them; mark several bodies as separate structures");
         if (const int genus = surface_.measures.genus;
-            genus > 1 && double(marks) < kFinal.marks_of_handle * double(genus))
+            genus > 1 && double(marks) < kDoubts.marks_of_handle * double(genus))
             warn("the surface has " + std::to_string(genus) + " handles with " + std::to_string(marks) +
                  " marks: if the body has no holes, its walls are thinner than the errors of the marks; more "
                  "marks there, or more precise ones, close the holes");
@@ -218,7 +217,7 @@ private:
     void find_holes() {
         const HolesReport& holes = surface_.holes;
         // A surface that ends where the points end is correct, and its choice is reported elsewhere.
-        if (surface_.fraction_without_points <= kFinal.warn_without_points || holes.policy == Holes::Open) return;
+        if (surface_.fraction_without_points <= kDoubts.negligible || holes.policy == Holes::Open) return;
         warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface is farther than " +
              number(holes.distance) + " from every point: " +
              (holes.policy == Holes::Flat ? "flat patches close it there" : "only curvature determines it there"));

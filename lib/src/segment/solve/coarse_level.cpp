@@ -12,10 +12,12 @@
 namespace covol::pipeline {
 namespace {
 
+constexpr int kRefinement = 2;  // of the voxel size, from level to level: SegmentOptions::coarse_levels
+
 bool is_large(const Domain& d) {
     int minimum = d.max[0] - d.min[0];
     for (int a = 1; a < 3; ++a) minimum = std::min(minimum, d.max[a] - d.min[a]);
-    return minimum >= kCoarse.min_coarsened;
+    return minimum >= kFlow.min_coarsened;
 }
 
 /// Automatic if the way to the surface may be long. Tagging and a previous result start close to it.
@@ -27,27 +29,27 @@ int levels_of(const SegmentOptions& options, const StartFacts& start) {
 
 EvolveOptions coarsened(EvolveOptions flow, double h) {
     flow.follow = true;
-    flow.tolerance = std::max(flow.tolerance, kCoarse.coarse_tolerance);
+    flow.tolerance = std::max(flow.tolerance, kFlow.rough_tolerance);
     if (flow.tau)
-        *flow.tau *= kCoarse.refinement;
+        *flow.tau *= kRefinement;
     else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // otherwise it grows automatically
-        flow.tau = kCoarse.coarse_tau * h;
+        flow.tau = kFlow.rough_tau * h;
     if (const double range = flow.attraction_range.value_or(0); range > 0)
-        flow.attraction_range = std::max(range, kCoarse.min_coarse_attraction * h);
+        flow.attraction_range = std::max(range, kHalfWidthVoxels * h);
     return flow;
 }
 
 // On the coarse level two edges closer than a few voxels merge, so that the fine level has to approach from the side of
-// the start.
+// the start: from as far as the clamped values of the band, which must not change their sign, allow.
 void step_back(FloatGrid& u, const FloatGrid& start, double h) {
-    const auto back = static_cast<float>(kCoarse.step_back * h);
+    const auto back = static_cast<float>((kHalfWidthVoxels - 1) * h);
     const auto start_at = start.getConstAccessor();
     for (auto v = u.beginValueOn(); v; ++v)
         v.setValue(std::clamp(start_at.getValue(v.getCoord()), *v - back, *v + back));
 }
 
 EdgeOptions coarsened(EdgeOptions edge, double h) {
-    edge.sigma = std::max(edge.sigma.value_or(0), kCoarse.min_coarse_sigma * h);
+    edge.sigma = std::max(edge.sigma.value_or(0), 0.5 * h);  // what is finer than a voxel is not sampled
     return edge;
 }
 
@@ -77,7 +79,7 @@ StartSurface coarsened(const Problem& problem, const StartSurface& start, double
 CoarsePass pass(const Problem& problem, const StartSurface& start, const EdgeOptions& fine_edge, int levels) {
     CoarsePass result;
     const Timed timed(result.report.seconds.coarse);
-    const double h = kCoarse.refinement * start.h();
+    const double h = kRefinement * start.h();
     const EdgeOptions edge = coarsened(fine_edge, h);
     StartSurface coarse = coarsened(problem, start, h);
     SegmentReport::CoarseLevel level{h, 0, 0, "the start is too small for such a coarse lattice"};

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "covol/distance.h"
 #include "distance/memory_need.h"
-#include "segment/heuristics.h"
 
 namespace covol::pipeline {
 namespace {
@@ -73,7 +73,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
             for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
-            inside += body.level(side) < -kFields.side_depth * reach;
+            inside += body.level(side) < -0.5 * reach;  // no other wall is closer than half of the way
         }
         if (2 * inside > places.size()) return reach;
     }
@@ -99,7 +99,9 @@ FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u,
     if (const double range = start.flow.attraction_range.value_or(0); range > 0)
         return find_distance(points, start.domain, range + slack, 0, report, run);
     const WorldBox all = start.domain.world_box();
-    const Domain coarse = make_domain(all, kFields.coarse_factor * h);
+    // One voxel for each leaf of u, of which one position is measured.
+    const double coarse_h = double(FloatGrid::TreeType::LeafNodeType::DIM) * h;
+    const Domain coarse = make_domain(all, coarse_h);
     const FloatGridPtr d = compute_distance(points, coarse, {diagonal(all, bounding_box(points))}, run).grid;
     double largest = 0;
     const auto d_at = d->getConstAccessor();
@@ -108,7 +110,7 @@ FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u,
         const openvdb::Vec3d where = d->worldToIndex(u.indexToWorld(center));
         largest = std::max(largest, double(d_at.getValue(openvdb::Coord::round(where))));
     }
-    const double radius = largest + kFields.coarse_factor * h + slack;
+    const double radius = largest + coarse_h + slack;
     report.remarks.choose("distance_tube", number(radius), "the attraction is unlimited: the tube extends to the start",
                           run);
     return find_distance(points, start.domain, radius, 0, report, run);
@@ -129,7 +131,7 @@ EdgeChoice choose_edge_feature(const Problem& problem, const Choices& choices) {
     if (!uses_image(choices.evolve) || choices.edge.feature != EdgeFeature::Automatic || body == nullptr) return choice;
     std::vector<Vec3> places, normals;
     const std::vector<Vec3>& along = problem.options.contours->along;
-    const std::size_t stride = 1 + along.size() / kFields.feature_marks;
+    const std::size_t stride = 1 + along.size() / kCommon.sample;
     for (std::size_t n = 0; n < along.size(); n += stride) {
         Vec3 normal = gradient(*body, along[n], choices.h);
         const double length = std::hypot(normal[0], normal[1], normal[2]);
@@ -138,8 +140,9 @@ EdgeChoice choose_edge_feature(const Problem& problem, const Choices& choices) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    const double reach = reach_within(
-        *body, places, normals, kFields.sides_sigmas * std::max(choices.edge.sigma.value_or(0), choices.h), choices.h);
+    // Three standard deviations from a mark, the smoothed image shows hardly anything of what is at the mark.
+    const double reach =
+        reach_within(*body, places, normals, 3 * std::max(choices.edge.sigma.value_or(0), choices.h), choices.h);
     const MarkedFeature found = detect_feature(*problem.image, places, normals, reach);
     choice.options.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +

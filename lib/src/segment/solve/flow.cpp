@@ -6,8 +6,10 @@
 #include <cmath>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "grid/levels_at.h"
+#include "inference/heuristics.h"
 #include "segment/heuristics.h"
 #include "segment/solve/vanished.h"
 
@@ -34,9 +36,9 @@ EvolveReport approach(const StartFacts& start, FloatGrid& u, EvolveFields fields
     alone.rho = 0;
     alone.attraction_range = 0;
     alone.image_yields = 0;
-    if (alone.follow) alone.tau = kFlow.approach_tau * alone.tau.value_or(start.domain.voxel_size);
+    if (alone.follow) alone.tau = kFlow.rough_tau * alone.tau.value_or(start.domain.voxel_size);
     alone.max_steps = std::min(alone.max_steps, kFlow.approach_steps);
-    alone.tolerance = std::max(alone.tolerance, kFlow.approach_tolerance);
+    alone.tolerance = std::max(alone.tolerance, kFlow.rough_tolerance);
     fields.edge = nullptr;
     fields.extend = nullptr;
     return evolve(u, fields, alone, run);
@@ -90,12 +92,12 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     options.error_slope = start.inference.error_slope;
-    if (start.inference.used) options.range = kFlow.inferred_range * start.domain.voxel_size;
+    if (start.inference.used) options.range = kInference.off_cells * start.domain.voxel_size;
     solution.was_requested = true;
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
     // Between contours the start may be far off: if guidance reduces the error, its result is a better start for the
     // next pass.
-    const int passes = start.origin == StartOrigin::Contours ? kFlow.contour_passes : 1;
+    const int passes = start.origin == StartOrigin::Contours ? kCommon.rounds : 1;
     for (int pass = 1; pass < passes && guided.report.used; ++pass) {
         if (!(guided.report.image_error < guided.report.guess_error)) break;
         Guided again = guide(*guided.u, marks, *problem.image, options, problem.run);
@@ -170,9 +172,10 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
 bool has_lost(const Solution& solution, const FloatGrid& start) {
     if (solution.has_vanished()) return true;
     if (solution.start.origin == StartOrigin::Grown)
-        return inside_volume(*solution.u) < kFlow.min_of_grown * inside_volume(start);
+        return 2 * inside_volume(*solution.u) < inside_volume(start);  // the flow lost more than it kept
     const std::vector<Vec3>& trusted = solution.start.marks.trusted;
-    return mean_distance(trusted, *solution.u) > mean_distance(trusted, start) + kFlow.leaves_voxels * solution.h();
+    return mean_distance(trusted, *solution.u) >
+           mean_distance(trusted, start) + kAutomatic.noticeable_voxels * solution.h();
 }
 
 void check_flow(const Problem& problem, const Choices& choices, Solution& solution) {

@@ -3,8 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/points.h"
 #include "segment/heuristics.h"
@@ -30,30 +32,31 @@ Eigen::Vector3d extents(const std::vector<Vec3>& points) {
 
 std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distance, bool encloses) {
     const Eigen::Vector3d extent = extents(points);
-    const bool is_flat = extent[0] <= kVanished.thin_fraction * extent[2],
-               is_line = extent[1] <= kVanished.thin_fraction * extent[2];
+    const bool is_flat = extent[0] <= kDoubts.negligible * extent[2],
+               is_line = extent[1] <= kDoubts.negligible * extent[2];
     std::ostringstream text;
     text.precision(3);
     if (encloses && !is_flat) {
         text << "the points are too sparse to hold the surface at the tag distance " << tag_distance
-             << "; try `tag_distance = " << kVanished.wider_tag * tag_distance << "`, a lower `delta`, or more points";
+             << "; try `tag_distance = " << kCommon.growth * tag_distance << "`, a lower `delta`, or more points";
         return text.str();
     }
     const WorldBox box = bounding_box(points);
     Vec3 side;
     for (int a = 0; a < 3; ++a) side[a] = box.max[a] - box.min[a];
-    const double layer =
-        std::min(kVanished.layer_spacings * measure_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
+    const double radius = 0.5 * std::hypot(side[0], side[1], side[2]);  // of the ball around the box
+    // Of n random points on a surface with this mean distance between nearest ones, 1/n leave a wider gap.
+    const double gap = 2 * std::sqrt(2 * std::log(double(std::max<std::size_t>(points.size(), 2))) / std::numbers::pi);
+    const double layer = std::min(gap * measure_spacing(points).mean, radius);
     text << (is_line   ? "the points lie on a line"
              : is_flat ? "the points lie in a plane"
                        : "the points enclose nothing")
          << " and keep no surface from vanishing; add points on the sides that are missing";
     if (!is_flat) text << ", or try `init = cloud`";
-    const double hull = kVanished.hull * *std::max_element(side.begin(), side.end());
-    if (!is_flat && tag_distance < hull)
-        text << "; if they surround a body on all sides, try `tag_distance = " << hull << "`";
+    if (!is_flat && tag_distance < radius)
+        text << "; if they surround a body on all sides, try `tag_distance = " << radius << "`";
     text << "; for a closed layer around them set `max_steps = 0, tag_distance = " << layer
-         << ", voxel_size = " << layer / kVanished.layer_voxels << "`";
+         << ", voxel_size = " << layer / kHalfWidthVoxels << "`";
     return text.str();
 }
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "cloud/surface/cloud_field.h"
 #include "covol/start.h"
+#include "holes/heuristics.h"
 #include "segment/heuristics.h"
 #include "segment/solve/fields.h"
 #include "segment/start/starts.h"
@@ -13,7 +15,8 @@
 namespace covol::pipeline {
 namespace {
 
-// In the holes of a scan nothing holds the surface, which would slide along the adjoining walls.
+// In the holes of a scan nothing holds the surface, which would slide along the adjoining walls. It may sink by this
+// depth.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
     FloatGridPtr obstacle = start.deepCopy();
     for (auto leaf = obstacle->tree().beginLeaf(); leaf; ++leaf)
@@ -33,7 +36,7 @@ void report_hints(const HintsReport& hints, Remarks& remarks, const RunContext& 
                    number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
                        (hints.inward ? ", after all were flipped, because they pointed inwards" : ""),
                    run);
-    if (1 - hints.agree > kStarts.warn_disagreeing)
+    if (1 - hints.agree > kDoubts.missed_fraction)
         remarks.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the " +
                          (normals ? "given normals" : "normals computed from the sensor positions") +
                          " point to the wrong side",
@@ -81,7 +84,7 @@ void report_cloud(const CloudReport& report, std::size_t points, Remarks& remark
 
 Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<Vec3>& points) {
     return problem.domain(h, points,
-                          kStarts.margin_fraction * longest_side(bounding_box(points)) + kJob.margin_voxels * h);
+                          kStarts.margin_fraction * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h);
 }
 
 StartSurface start_from_cloud(const Problem& problem, const Choices& choices, MarkSets marks) {
@@ -102,12 +105,12 @@ StartSurface start_from_cloud(const Problem& problem, const Choices& choices, Ma
     const CloudReport& report = facts.cloud;
     if (!at_rest && uses_points(facts.flow)) {
         if (!problem.options.evolve.attraction_range) {
-            const double range = kStarts.reach_spacings * std::max(report.spacing, choices.h);
+            const double range = kHoles.far * std::max(report.spacing, choices.h);
             facts.flow.attraction_range = range;
             remarks.choose("attraction_range", number(range),
                            "the start touches the points, and parts without points should not be attracted", run);
         }
-        if (!report.encloses) start.obstacle = raised(*start.u, kFlow.hold_depth * choices.h);
+        if (!report.encloses) start.obstacle = raised(*start.u, choices.h);
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
     }
     report_cloud(report, facts.marks.attracting.size(), remarks, run);

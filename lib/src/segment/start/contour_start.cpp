@@ -3,9 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "covol/start.h"
-#include "segment/heuristics.h"
 #include "segment/solve/fields.h"
 #include "segment/start/starts.h"
 
@@ -16,7 +16,7 @@ namespace {
 /// wall to a right angle.
 Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     const WorldBox box = domain.world_box();
-    const int layers = int(kJob.margin_voxels);
+    const int layers = int(kCommon.beyond_voxels);
     for (int a = 0; a < 3; ++a) {
         if (body.min[a] < box.min[a]) domain.min[a] -= layers;
         if (body.max[a] > box.max[a]) domain.max[a] += layers;
@@ -36,8 +36,8 @@ const char* why_tag(const Problem& problem, const std::vector<Vec3>& loose, doub
     for (const Vec3& seed : problem.options.exterior_seeds)
         if (body.level(seed) < 0) return "an exterior seed lies inside the contours";
     // Maximum error of the body between slices, and beyond the last one.
-    const double far = std::max(kAutomatic.tag_attraction_voxels * h,
-                                problem.is_guided() ? problem.options.contours->slice_distance : 0.0);
+    const double far =
+        std::max(kAttractionVoxels * h, problem.is_guided() ? problem.options.contours->slice_distance : 0.0);
     for (const Vec3& point : loose)
         if (std::abs(body.level(point)) > far) return "points lie far from the contours' body";
     return nullptr;
@@ -67,7 +67,7 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
     StartFacts& facts = start.facts;
     facts.report.remarks.choose("start", "contours",
                                 "the body between the contours; what inner contours enclose is outside", run);
-    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kJob.margin_voxels * choices.h);
+    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kCommon.beyond_voxels * choices.h);
     if (!problem.options.roi) facts.domain = carried_beyond_image(facts.domain, body->box());
     {
         const Timed timed(facts.report.seconds.tag);
@@ -75,7 +75,7 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
     }
     if (!uses_points(facts.flow)) return start;
     if (problem.is_guided() && !loose.empty()) correct_start(problem, start);
-    const double range = std::max(facts.flow.attraction_range.value_or(0), kJob.margin_voxels * choices.h);
+    const double range = std::max(facts.flow.attraction_range.value_or(0), kCommon.beyond_voxels * choices.h);
     start.distance =
         find_distance(facts.marks.attracting, facts.domain, range + band_slack(choices.h), 0, facts.report, run);
     return start;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/inference.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
@@ -18,7 +19,8 @@ CorrectionOptions correction_options(const Problem& problem, double h) {
     double minimum = kCorrectionVoxels * h;
     if (problem.image != nullptr) {
         const Vec3& spacing = problem.image->geometry().spacing;
-        minimum = std::max(minimum, kStarts.radius_spacings * *std::max_element(spacing.begin(), spacing.end()));
+        // A mark on one slice affects the next by half.
+        minimum = std::max(minimum, 2 * *std::max_element(spacing.begin(), spacing.end()));
     }
     options.min_radius = minimum;
     return options;
@@ -69,7 +71,7 @@ StartSurface start_from_corrected_guess(const Problem& problem, const Choices& c
     facts.origin = StartOrigin::Corrected;
     facts.marks = std::move(marks);
     facts.flow = choices.evolve;
-    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kJob.margin_voxels * choices.h);
+    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kCommon.beyond_voxels * choices.h);
     {
         const Timed timed(facts.report.seconds.tag);
         start.u = start_grid(*problem.options.guess, facts.domain, problem.run);

@@ -1,6 +1,7 @@
 // The start from few marks: the surface of minimum bending energy through them.
 #include <utility>
 
+#include "base/heuristics.h"
 #include "contours/section_field.h"
 #include "covol/inference.h"
 #include "covol/orientation.h"
@@ -122,11 +123,10 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     StartFacts& facts = start.facts;
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
-    facts.domain = problem.domain(h, points, kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * h);
+    facts.domain = problem.domain(h, points, kStarts.margin_fraction * longest_side(box) + kCommon.beyond_voxels * h);
     // A body that the image cuts is continued beyond it: at the image's end its wall would be closed, and the image
     // would be evaluated at a cap. The clip at the end makes the cut.
-    if (problem.image != nullptr && !problem.options.roi)
-        facts.domain = widened(facts.domain, kStarts.guess_beyond_voxels);
+    if (problem.image != nullptr && !problem.options.roi) facts.domain = widened(facts.domain, kCommon.beyond_voxels);
     detail::require_band_memory(largest_area(box), h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);

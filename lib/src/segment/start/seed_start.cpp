@@ -2,7 +2,6 @@
 #include <utility>
 
 #include "covol/start.h"
-#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {

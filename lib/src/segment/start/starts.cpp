@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "segment/heuristics.h"
+#include "base/heuristics.h"
 #include "start/carry_on.h"
 
 namespace covol::pipeline {
@@ -17,8 +17,8 @@ StartSurface follow(StartOrigin origin, const Choices& choices, MarkSets marks) 
 }
 
 Domain choose_domain_of_flow(const Problem& problem, double h, const std::vector<Vec3>& points) {
-    const Domain domain = problem.domain(h, points, 2 * kJob.margin_voxels * h);
-    return problem.is_turned() && !problem.options.roi ? widened(domain, int(kJob.margin_voxels)) : domain;
+    const Domain domain = problem.domain(h, points, 2 * kCommon.beyond_voxels * h);
+    return problem.is_turned() && !problem.options.roi ? widened(domain, int(kCommon.beyond_voxels)) : domain;
 }
 
 FloatGridPtr carried_beyond_turned_image(const Problem& problem, const Domain& domain, FloatGridPtr u) {

@@ -6,12 +6,14 @@
 #include <optional>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "clip/open_ends.h"
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "covol/guess.h"
 #include "covol/start.h"
-#include "segment/heuristics.h"
+#include "holes/heuristics.h"
+#include "inference/heuristics.h"
 #include "segment/solve/fields.h"
 #include "segment/solve/vanished.h"
 #include "segment/start/starts.h"
@@ -89,11 +91,12 @@ std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& p
         body.tag.tag_distance = *given;
     } else {
         body.tag = tagger.choose(
-            closed, around(domain, closed, 0.25 * longest_side(bounding_box(closed)) + kJob.margin_voxels * tagger.h));
+            closed,
+            around(domain, closed, 0.25 * longest_side(bounding_box(closed)) + kCommon.beyond_voxels * tagger.h));
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
-    const BandResult tagged = tagger.tag(closed, around(domain, closed, D + kJob.margin_voxels * tagger.h), D);
+    const BandResult tagged = tagger.tag(closed, around(domain, closed, D + kCommon.beyond_voxels * tagger.h), D);
     if (tagged.report.leaks) return {};
     body.band = tagged.report;
     body.level_set = close_by_ball(*tagged.grid, D, tagger.problem.run);
@@ -115,12 +118,12 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
     };
     if (std::any_of(points.begin(), points.end(), is_at_end)) {
         std::optional<CutBody> body =
-            tag_with(tagger, points, domain, detail::carried_on(points, faces, kStarts.tagged_beyond_voxels * tagger.h),
+            tag_with(tagger, points, domain, detail::carried_on(points, faces, kCommon.beyond_voxels * tagger.h),
                      "the marks' section on the image's end slices is continued beyond it");
         if (body) return body;
     }
-    std::vector<Vec3> images =
-        detail::mirrored(points, faces, kStarts.mirror_spacings * measure_spacing(points).median);
+    // Farther from a face there would be a hole, which does not show that the face cuts the body.
+    std::vector<Vec3> images = detail::mirrored(points, faces, kHoles.far * measure_spacing(points).median);
     if (images.empty() || encloses_alone(tagger, points, domain)) return {};
     return tag_with(tagger, points, domain, std::move(images),
                     "together with their mirror image beyond the image's end, the marks enclose a body");
@@ -131,7 +134,7 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
 /// @param beyond  the points that continue them
 MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
                   const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
-    const double deep = kStarts.cap_depth_voxels * start.h();
+    const double deep = kInference.off_cells * start.h();
     const auto level = start.u->getConstAccessor();
     const auto caps = [&](const Vec3& p) {
         const Vec3 at = start.facts.domain.world_to_index(p);
@@ -167,7 +170,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
         // If it ended at the image's end, the flow would turn the wall to a right angle.
-        facts.domain = widened(domain, kStarts.tagged_beyond_voxels);
+        facts.domain = widened(domain, kCommon.beyond_voxels);
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
     Remarks& remarks = facts.report.remarks;
@@ -218,14 +221,13 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     if (!facts.tag_distance) {
         const Timed timed(facts.report.seconds.tag);
         // Wide enough for any D below a quarter of the cloud's size; the final domain is made once D is known.
-        facts.tag = tagger.choose(
-            points,
-            problem.domain_with_margin(h, points, 0.25 * longest_side(bounding_box(points)) + kJob.margin_voxels * h));
+        const double margin = 0.25 * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h;
+        facts.tag = tagger.choose(points, problem.domain_with_margin(h, points, margin));
         facts.tag_distance = facts.tag.tag_distance;
         remarks.choose("tag_distance", number(facts.tag.tag_distance), facts.tag.reason, run);
     }
     const double D = facts.tag.tag_distance = *facts.tag_distance;
-    facts.domain = problem.domain(h, points, D + kJob.margin_voxels * h);
+    facts.domain = problem.domain(h, points, D + kCommon.beyond_voxels * h);
     start.distance = find_distance(points, facts.domain, D + band_slack(h), D, facts.report, run);
     const Timed timed(facts.report.seconds.tag);
     const BandResult tagged =
@@ -234,16 +236,15 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     facts.encloses = problem.options.tag_distance ? !tagged.report.leaks : facts.tag.encloses;
     start.u = tagged.grid;
     if (tagged.report.leaks) remarks.warn(tagged.report.leak(), run);
-    if (D <= kStarts.close_from_voxels * h) return start;
+    if (D <= band_slack(h)) return start;
     // The tagged surface lies D outside the points, which is as far as the widest gap is large. Its closing by a ball
     // of radius D touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
     if (const FloatGridPtr closed = close_by_ball(*start.u, D, run)) {
         start.u = closed;
         facts.flow.follow = true;
-        remarks.choose("start", "closing",
-                       "of the tagged surface by a ball of radius D, because D exceeds " +
-                           number(kStarts.close_from_voxels) + " voxels",
-                       run);
+        remarks.choose(
+            "start", "closing",
+            "of the tagged surface by a ball of radius D, because D exceeds " + number(band_slack(1)) + " voxels", run);
     }
     return start;
 }

@@ -1,0 +1,67 @@
+#pragma once
+// Heuristic constants: thresholds, factors and counts that were chosen by judgement or measurement and change results.
+// Each folder keeps its own in heuristics.h, with one struct for each step; docs/heuristics.md shows the effect of
+// halving and doubling each of them.
+//
+// In the build that measures this (-DCOVOL_SENSITIVITY=ON, never installed), each is multiplied at start-up by a factor
+// from the environment: COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
+#include <cstddef>
+
+#ifdef COVOL_SENSITIVITY
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#define COVOL_HEURISTICS inline const
+#else
+#define COVOL_HEURISTICS inline constexpr
+#endif
+
+namespace covol {
+
+#ifdef COVOL_SENSITIVITY
+/// The factor that COVOL_SCALE gives for the name; 1 by default.
+[[nodiscard]] double heuristic_scale(const char* name);
+
+/// Counts are rounded, and at least 1.
+template <typename T>
+[[nodiscard]] T heuristic(const char* name, T value) {
+    const double scaled = heuristic_scale(name) * double(value);
+    if constexpr (std::is_integral_v<T>)
+        return T(std::max(1LL, std::llround(scaled)));
+    else
+        return T(scaled);
+}
+#else
+template <typename T>
+[[nodiscard]] constexpr T heuristic(const char* /*name*/, T value) {
+    return value;
+}
+#endif
+
+/// Principles that all steps share: samples, neighbourhoods, significance, repetition and margins.
+struct CommonHeuristics {
+    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %.
+    std::size_t sample = heuristic("common.sample", 4000);
+    /// [points] Nearest neighbours that show what is around a point of a surface: about one ring.
+    std::size_t ring = heuristic("common.ring", 8);
+    /// [points] Minimum to which a plane or a quadric is fitted: twice as many as a quadric has unknowns.
+    std::size_t quadric = heuristic("common.quadric", 12);
+    /// [standard errors] Difference from which on a measured value is not explained by chance.
+    double errors = heuristic("common.errors", 4.0);
+    /// [rounds] Maximum number in which a repair is repeated until it changes nothing.
+    int rounds = heuristic("common.rounds", 4);
+    /// [ratio] Of a length to the one before it when a suitable scale is searched: an area doubles.
+    double growth = heuristic("common.growth", 1.4142135623730951);
+    /// [voxels] By which a surface is continued beyond the place where it is cut, so that its band is right up to
+    /// there: twice the half width of a band.
+    double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
+    /// [ratio] Of a distance to the relevant length, below which two positions are the same one.
+    double same_place = heuristic("common.same_place", 1e-3);
+    /// [cosine] Minimum between the normals of a triangle, or of neighbouring sheets, before and after a change: 60
+    /// degrees.
+    double turn = heuristic("common.turn", 0.5);
+};
+COVOL_HEURISTICS CommonHeuristics kCommon{};
+
+}  // namespace covol

@@ -1,0 +1,178 @@
+"""Switches mechanisms off, one at a time, and measures what is lost on data that they were not made for: docs/ablation.md.
+
+    cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
+    cmake --build build-sensitivity
+    nice /usr/bin/python3 tests/bench/ablate.py build-sensitivity/bin/covol --rivals BENCH_RECONSTRUCT_RIVALS [--only NAME ...]
+
+A mechanism is switched off by COVOL_SCALE (base/heuristics.h), which makes its condition hold never or always. The panels:
+
+- clouds: 16 shapes of reconstruct/compare.py, 5,000 points each, without noise and with 0.25 and 1 %; the error is the sum of both
+  mean distances between mesh and truth in % of the diagonal (--rivals measures it). Needs COVOL_DATA for nine of the shapes.
+- marks: twelve structures of real images with 20 and with 60 marks (sensitivity_jobs.REAL); the error is 1 - Dice. Needs COVOL_DATA.
+- jobs: all small jobs of sensitivity_jobs.JOBS: clouds, scans of one side, given normals, contours, painted slices, guesses, growth.
+
+`--scale "layers.max_gain=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
+"""
+import argparse
+import concurrent.futures
+import hashlib
+import json
+import os
+import pathlib
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+import sensitivity_jobs as jobs
+from tables import markdown
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "reconstruct"))
+import clouds  # noqa: E402
+import ply  # noqa: E402
+import shapes  # noqa: E402
+
+MAX_SECONDS = 120   # of processor time
+NOTICEABLE = 0.05   # a case is better or worse if its error changes by this fraction of itself, and by MINIMUM[panel]
+MINIMUM = {"clouds": 0, "marks": 0.2, "jobs": 0.1}  # percentage points
+NOISES = (0, 0.25, 1)
+# name: (what is switched off, COVOL_SCALE, panels)
+MECHANISMS = {}
+
+
+class Panel:
+    """Cases: {name: arguments of covol}, and the error of a result in percent."""
+
+    def __init__(self, name, options, folder):
+        self.name, self.options, self.folder, self.cases = name, options, folder, {}
+        if name == "clouds":
+            self._draw()
+        else:
+            real = name == "marks"
+            self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items() if (kind == "real") == real}
+
+    def _draw(self):
+        given = {path.stem: path for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("meshes/*.ply"))}
+        folder = self.folder / "clouds"
+        folder.mkdir()
+        self.truths = {}
+        for name in [*given, *shapes.OWN]:
+            truth = given.get(name) or shapes.truth(name, folder / "truth")
+            for noise in NOISES:
+                case = f"{name} {noise:g} %"
+                path = folder / f"{name}_{noise:g}.ply"
+                ply.write(path, clouds.cloud(ply.read(truth), 5000, noise, 0, self.options.seed))
+                self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply"]
+                self.truths[case] = truth
+
+    def output(self, case, out):
+        return out / "s.ply" if self.name == "clouds" else jobs.output_of(case, out)
+
+    def error(self, case, out):
+        """(error in percent, whether the topology is right; None if it is not known)"""
+        if self.name != "clouds":
+            return jobs.error_of(case, self.folder / "in", out), None
+        found = json.loads(subprocess.run([self.options.rivals, "measure", str(out / "s.ply"), str(self.truths[case])], check=True, capture_output=True, text=True).stdout)
+        whole = found["components"] == 1 and found["closed"] == "yes"
+        return found["mean_to"] + found["mean_from"], bool(whole and found["genus"] == found["genus_truth"])
+
+
+class Runner:
+    def __init__(self, options, folder):
+        self.options, self.folder = options, folder
+        jobs.make_inputs(folder / "in", pathlib.Path(options.covol).resolve())
+        self.panels = {name: Panel(name, options, folder) for name in options.panels}
+
+    def run(self, binary, scale, panel, case):
+        """{digest, error, right, cpu}; error is None if the job fails."""
+        out = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        binary = pathlib.Path(binary).resolve()
+        environment = os.environ | {"LD_LIBRARY_PATH": str(binary.parent.parent / "lib"), "COVOL_SCALE": scale}
+        try:
+            done = subprocess.run([binary, *panel.cases[case], "--threads", "1", "--quiet"], cwd=out, capture_output=True, env=environment,
+                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS)))
+            path = panel.output(case, out)
+            if done.returncode < 0 or not path.exists():
+                return {"digest": "", "error": None, "right": False}
+            error, right = panel.error(case, out)
+            return {"digest": hashlib.sha256(path.read_bytes()).hexdigest(), "error": error, "right": right}
+        finally:
+            shutil.rmtree(out)
+
+    def all(self, binary, scale, panel):
+        with concurrent.futures.ThreadPoolExecutor(self.options.processes) as pool:
+            return dict(zip(panel.cases, pool.map(lambda case: self.run(binary, scale, panel, case), panel.cases)))
+
+
+def compared(panel, before, after):
+    """A row: how many cases are unchanged, better and worse, and by how much."""
+    changed = {case for case in before if before[case]["digest"] != after[case]["digest"]}
+    better, worse, ratios = [], [], []
+    for case in before:
+        old, new = before[case]["error"], after[case]["error"]
+        if old is None or new is None:
+            if (old is None) != (new is None):
+                (better if old is None else worse).append((np.inf, case))
+            continue
+        ratios.append(max(new, 1e-6) / max(old, 1e-6) if case in changed else 1)
+        if abs(new - old) > NOTICEABLE * old and abs(new - old) > MINIMUM[panel]:
+            (worse if new > old else better).append((abs(new - old), case))
+    median_old, median_new = (np.median([r["error"] for r in results.values() if r["error"] is not None]) for results in (before, after))
+    right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if panel == "clouds" else None
+
+    def largest(cases):
+        if not cases:
+            return ""
+        _, case = max(cases)
+        old, new = before[case]["error"], after[case]["error"]
+        return f"{case}: {'fails' if old is None else f'{old:.2f}'} → {'fails' if new is None else f'{new:.2f}'}"
+    return {"panel": panel, "cases": len(before), "same bits": len(before) - len(changed), "median error": f"{median_old:.3f} → {median_new:.3f}",
+            "mean ratio": f"{np.exp(np.mean(np.log(ratios))):.3f}", "better": len(better), "worse": len(worse),
+            "right topology": f"{right[0]} → {right[1]}" if right else "", "largest loss": largest(worse), "largest gain": largest(better)}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("covol", help="of a build with -DCOVOL_SENSITIVITY=ON")
+    parser.add_argument("--rivals", help="bench_reconstruct_rivals of tests/bench/reconstruct: for the clouds")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="mechanisms [all]")
+    parser.add_argument("--scale", nargs="+", default=[], metavar="NAME=FACTOR", help="other settings of COVOL_SCALE, instead of the mechanisms")
+    parser.add_argument("--against", metavar="BINARY", help="a program to compare with, instead of the mechanisms")
+    parser.add_argument("--panels", nargs="+", choices=list(MINIMUM), default=list(MINIMUM), help="[all]")
+    parser.add_argument("--seed", type=int, default=7, help="of the clouds [%(default)s]")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--baseline", type=pathlib.Path, metavar="FILE.json", help="keeps the results without a change, for the next call")
+    parser.add_argument("--output", type=pathlib.Path, metavar="FILE.md", help="the table")
+    options = parser.parse_args()
+    if "clouds" in options.panels and not options.rivals:
+        parser.error("--rivals: expected the program that measures meshes, for the panel of clouds")
+    with tempfile.TemporaryDirectory(prefix="covol_ablate_") as name:
+        runner = Runner(options, pathlib.Path(name))
+        known = json.loads(options.baseline.read_text()) if options.baseline and options.baseline.exists() else {}
+        if options.against:
+            variants = [(options.against, options.against, "", options.panels)]
+        elif options.scale:
+            variants = [(scale, options.covol, scale, options.panels) for scale in options.scale]
+        else:
+            variants = [(what, options.covol, scale, [p for p in panels if p in options.panels])
+                        for mechanism, (what, scale, panels) in MECHANISMS.items() if not options.only or mechanism in options.only]
+        rows = []
+        for what, binary, scale, panels in variants:
+            for panel in panels:
+                if panel not in known:
+                    known[panel] = runner.all(options.covol, "", runner.panels[panel])
+                    if options.baseline:
+                        options.baseline.write_text(json.dumps(known))
+                rows.append({"switched off": what} | compared(panel, known[panel], runner.all(binary, scale, runner.panels[panel])))
+                print(json.dumps(rows[-1], ensure_ascii=False), flush=True)
+        table = markdown(rows)
+        if options.output:
+            options.output.write_text(table + "\n")
+
+
+if __name__ == "__main__":
+    main()
