@@ -124,15 +124,14 @@ def compared(panel, before, after):
     median_old, median_new = (np.median([r["error"] for r in results.values() if r["error"] is not None]) for results in (before, after))
     right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if panel == "clouds" else None
 
-    def largest(cases):
-        if not cases:
-            return ""
-        _, case = max(cases)
-        old, new = before[case]["error"], after[case]["error"]
-        return f"{case}: {'fails' if old is None else f'{old:.2f}'} → {'fails' if new is None else f'{new:.2f}'}"
+    def text(case):
+        return f"{case}: " + " → ".join("fails" if results[case]["error"] is None else f"{results[case]['error']:.3g}" for results in (before, after))
+
+    for title, cases in (("worse", worse), ("better", better)):
+        print(f"{title}: " + "; ".join(text(case) for _, case in sorted(cases, reverse=True)), file=sys.stderr)
     return {"panel": panel, "cases": len(before), "same bits": len(before) - len(changed), "median error": f"{median_old:.3f} → {median_new:.3f}",
             "mean ratio": f"{np.exp(np.mean(np.log(ratios))):.3f}", "better": len(better), "worse": len(worse),
-            "right topology": f"{right[0]} → {right[1]}" if right else "", "largest loss": largest(worse), "largest gain": largest(better)}
+            "right topology": f"{right[0]} → {right[1]}" if right else "", "largest loss": text(max(worse)[1]) if worse else "", "largest gain": text(max(better)[1]) if better else ""}
 
 
 def main():

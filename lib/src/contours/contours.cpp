@@ -165,8 +165,8 @@ void Densifier::find_planes(Line& line) const {
             low[a] = std::min(low[a], p[a]);
             high[a] = std::max(high[a], p[a]);
         }
-    const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-    for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= same_slice(1, extent);
+    const double tolerance = same_slice(1, std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}));
+    for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= tolerance;
     if (line.constant != std::array<bool, 3>{false, false, false} || line.index.size() < 3) return;
     const double off = detail::thickness_along(line.world, detail::plane_through(line.world).normal);
     if (off > tolerance * geometry_.smallest_spacing()) {
