@@ -61,7 +61,7 @@ class Panel:
         folder.mkdir()
         self.truths = {}
         for name in [*given, *shapes.OWN]:
-            truth = given.get(name) or shapes.truth(name, folder / "truth")
+            truth = given.get(name) or shapes.truth(name, self.options.work / "truth")
             for noise in NOISES:
                 case = f"{name} {noise:g} %"
                 path = folder / f"{name}_{noise:g}.ply"
@@ -143,6 +143,7 @@ def main():
     parser.add_argument("--against", metavar="BINARY", help="a program to compare with, instead of the mechanisms")
     parser.add_argument("--panels", nargs="+", choices=list(MINIMUM), default=list(MINIMUM), help="[all]")
     parser.add_argument("--seed", type=int, default=7, help="of the clouds [%(default)s]")
+    parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("build/reconstruct"), help="folder for the meshes of shapes made here [%(default)s]")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--baseline", type=pathlib.Path, metavar="FILE.json", help="keeps the results without a change, for the next call")
     parser.add_argument("--output", type=pathlib.Path, metavar="FILE.md", help="the table")

@@ -272,27 +272,29 @@ JOBS = {  # name: (arguments, kind of truth, shape, more)
     "m painted": ("segment ../in/p_torus.nrrd --painted ../in/s_torus.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m painted box": ("segment ../in/p_box.nrrd --painted ../in/s_box.nrrd --rho 0 -o s.vdb --mask m.nrrd", "mask", "box"),
 }
-CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins"]
-OPEN = ["front", "layers"]
+# By kind, the most informative job first.
+CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins", "torus noisy", "hole", "spikes", "plate"]
+SCANS = ["front", "layers", "front sensor", "half open", "hole", "half flat"]
+GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "half open", "twins"]
+TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere", "spikes tag"]
+ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours alone"]
+GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
+CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box"]
+FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
+MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
 REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
-TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere"]
-GUESSED = ["m round", "m torus", "m two"]
-FLOWS = ["m paper", "m init", "m grow"]
-PLAN = {  # step: the jobs that exercise it, the most informative one first
-    "cloud": CLOUDS + OPEN + ["spikes", "normals"], "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "filled": CLOUDS, "indicator": CLOUDS,
-    "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "iteration": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
-    "tagging": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],
-    "variational": ["m torus alone", "few", "m two"], "guidance": GUESSED + REAL_JOBS, "border": GUESSED + REAL_JOBS,
-    "correction": ["m guess", "m guess seed"], "join_pieces": ["spikes", "spikes noisy", "plate noisy", "twins"],
-    "given_sides": ["normals", "normals plate", "normals wrong", "front sensor"],
-    "views": OPEN + ["front sensor"], "layers": OPEN, "scan_noise": TAGGED[:2] + ["few"],
-    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "grow": ["m grow", "m grow box"],
-    "fields": FLOWS, "job": TAGGED[:2] + ["few"], "flow": FLOWS + ["few"], "coarse_level": ["m coarse"], "doubts": ["m torus", "m tag slit"] + REAL_JOBS, "vanished": ["m tag slit", "half flat"],
-    "final_surface": ["half open", "front"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"], "holes": ["half open", "half flat"],
-    "cut": ["half open", "half flat"], "edge": FLOWS, "evolve": FLOWS + ["few"], "motion": FLOWS,
-    "painted": ["m painted", "m painted box"], "outline": ["m painted", "m painted box"], "contours": ["m contours", "m contours alone"],
-    "inference": REAL_JOBS,
-    "relax": ["relaxed", "spikes"], "decimate": ["adaptive", "relaxed"], "level": ["relaxed", "adaptive"], "pieces": ["m two"],
+REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
+PLAN = {  # step: the jobs that exercise it
+    "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
+    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
+    **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
+    **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
+    **dict.fromkeys(("guess", "variational", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],
+    **dict.fromkeys(("guidance", "border"), GUESSED + REAL_FEW), "inference": REAL_FEW, "doubts": REAL_FEW,
+    **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": ["m grow", "m grow box"],
+    **dict.fromkeys(("edge", "evolve", "motion", "flow"), FLOWS), "pieces": GUESSED,
+    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
+    **dict.fromkeys(("holes", "cut", "relax", "decimate", "level"), MESHES),
 }
 
 
