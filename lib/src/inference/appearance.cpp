@@ -78,7 +78,7 @@ void Appearance::expand(const Features& at, float* terms) const {
         for (int b = a; b < kFeatures; ++b) terms[n++] = z[std::size_t(a)] * z[std::size_t(b)];
 }
 
-Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int without_fold) {
+Appearance::Appearance(const std::vector<Sample>& samples, int without_fold) {
     std::vector<const Sample*> used;
     double total[2] = {0, 0};
     for (const Sample& s : samples) {
@@ -116,7 +116,7 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
         // samples.
         weight[n] = double(used[std::size_t(n)]->weight) * 0.5 * sum / std::max(total[inside ? 1 : 0], 1e-9);
     }
-    Vector w = Vector::Zero(kTerms), penalty = Vector::Constant(kTerms, ridge);
+    Vector w = Vector::Zero(kTerms), penalty = Vector::Ones(kTerms);
     penalty[0] = 1e-6;
     for (int round = 0; round < kRounds; ++round) {
         const Vector odds = (Z * w).cwiseMax(-30).cwiseMin(30);
@@ -142,10 +142,10 @@ double Appearance::log_odds(const Features& at) const {
     return double(sum);
 }
 
-double held_out_bits(const std::vector<Sample>& samples, double ridge, int folds) {
+double held_out_bits(const std::vector<Sample>& samples, int folds) {
     std::vector<double> lost(std::size_t(folds), 0.0), weight(std::size_t(folds), 0.0);
     tbb::parallel_for(0, folds, [&](int fold) {
-        const Appearance appearance(samples, ridge, fold);
+        const Appearance appearance(samples, fold);
         for (const Sample& s : samples) {
             if (s.fold != fold) continue;
             const double odds = appearance.log_odds(s.at);

@@ -44,10 +44,11 @@ struct Sample {
     int fold = 0;
 };
 
-/// Quadratic logistic regression with a ridge penalty: log odds of inside against outside.
+/// Quadratic logistic regression: log odds of inside against outside. The coefficients of the standardised features
+/// have a prior of unit variance.
 class Appearance {
 public:
-    Appearance(const std::vector<Sample>& samples, double ridge, int without_fold = -1);
+    Appearance(const std::vector<Sample>& samples, int without_fold = -1);
     [[nodiscard]] double log_odds(const Features& at) const;
 
 private:
@@ -59,6 +60,6 @@ private:
 
 /// Information of a regression about the folds on which it was not trained, bits for each sample: 1 is perfect
 /// prediction, 0 none.
-[[nodiscard]] double held_out_bits(const std::vector<Sample>& samples, double ridge, int folds);
+[[nodiscard]] double held_out_bits(const std::vector<Sample>& samples, int folds);
 
 }  // namespace covol::inference

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/geometry.h"
-#include "base/median.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/guess.h"
@@ -50,8 +49,7 @@ Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& c
     Constraints c;
     c.marks = at(marks.places, chosen);
     c.variance.assign(chosen.size(), marks.variance);
-    if (proposal.strength > 0)
-        for (const std::size_t n : chosen) c.axes.push_back(times(std::sqrt(proposal.strength), proposal.axes[n]));
+    if (!proposal.axes.empty()) c.axes = at(proposal.axes, chosen);
     return c;
 }
 
@@ -230,7 +228,7 @@ Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
     Field cost(odds.size()), weight(odds.size()), u(odds.size());
     for (std::size_t n = 0; n < odds.size(); ++n) {
         cost[n] = float(-kInference.odds_weight) * odds[n];
-        weight[n] = scene.edge[n] * float(kInference.surface_at_marks + double(scene.to_mark[n]) / reach);
+        weight[n] = scene.edge[n] * float(double(scene.to_mark[n]) / reach);
         u[n] = cost[n] < 0 ? 1.0F : 0.0F;
     }
     // At known positions surface costs nothing, so that a small region is not smoothed away.
@@ -361,8 +359,8 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
     samples.add_nodes(surely_outside(scene), false);
     samples.add_nodes(scene.known_outside, false);
     samples.add_nodes(scene.known_inside, true);
-    if (proposal.is_compared) candidate.bits = held_out_bits(samples.all(), kInference.ridge, kFolds);
-    const Appearance appearance(samples.all(), kInference.ridge);
+    if (proposal.is_compared) candidate.bits = held_out_bits(samples.all(), kFolds);
+    const Appearance appearance(samples.all());
     run.check();
     Solid solid = min_body(scene, odds_of(scene, *guess, appearance, proposal.refine), run);
     keep_marked_parts(scene, solid);
@@ -371,21 +369,16 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
     return candidate;
 }
 
-std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading) {
+std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells) {
     const Lattice& lattice = scene.lattice;
     const Field smoothed = smooth(lattice, scene.image->image(), sigma_cells * lattice.finest());
     std::array<Field, 3> slope;
     for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice, smoothed, a);
-    std::vector<double> sizes(lattice.count());
-    for (std::size_t n = 0; n < sizes.size(); ++n) sizes[n] = double(std::hypot(slope[0][n], slope[1][n], slope[2][n]));
-    const double clear = std::max(kInference.clear_slope * cloud::median(sizes), 1e-9);
     std::vector<Vec3> axes;
     for (const Vec3& mark : scene.marks.places) {
         Vec3 g;
         for (int a = 0; a < 3; ++a) g[a] = lattice.value(slope[std::size_t(a)], mark);
-        const double size = length(g);
-        axes.push_back(size > 0 ? times(fading ? std::sqrt(std::min(size / clear, 1.0)) : 1.0, unit(g))
-                                : Vec3{1e-3, 0, 0});
+        axes.push_back(length(g) > 0 ? unit(g) : Vec3{1e-3, 0, 0});
     }
     return axes;
 }

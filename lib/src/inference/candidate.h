@@ -57,8 +57,7 @@ inline constexpr double kKnown = 4;
 
 /// The source of a candidate's normals.
 struct Proposal {
-    std::vector<Vec3> axes;  ///< of each mark; empty: from the marks alone
-    double strength = 0;     ///< of the axes, in mean eigenvalues of the bending energy
+    std::vector<Vec3> axes;  ///< of each mark, as strong as the bending energy; empty: from the marks alone
     guess::Search search = guess::Search::Wide;
     double amplitude = 0;           ///< of VariationalSurface; 0: estimated, which takes three times as long
     const Solid* refine = nullptr;  ///< restricts the body to a band around the surface of this one
@@ -83,9 +82,8 @@ struct KnownBall {
 };
 [[nodiscard]] std::vector<KnownBall> known_balls(const Marks& marks, double cell);
 
-/// Unit gradients of the image at all marks. @param fading  whether gradients that are not clearly larger than the
-/// median are shortened
-[[nodiscard]] std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading);
+/// Unit gradients of the image at all marks.
+[[nodiscard]] std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells);
 
 /// Outward unit normals of a solid at given positions.
 [[nodiscard]] std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places);

@@ -22,14 +22,6 @@ struct InferenceHeuristics {
     double max_odds = heuristic("inference.max_odds", 4);
     /// [cells of surface] Weight of a cell with log odds of one nat.
     double odds_weight = heuristic("inference.odds_weight", 0.6);
-    /// [of a cell of surface] Cost of surface at a mark if the image is uniform.
-    double surface_at_marks = heuristic("inference.surface_at_marks", 0.1);
-    /// [prior precision] Of the regression's standardised coefficients.
-    double ridge = heuristic("inference.ridge", 3);
-    /// [mean eigenvalues of the energy] Strength of normals taken from a body.
-    double normals_strength = heuristic("inference.normals_strength", 3);
-    /// [median slopes] Slope of the image at which a gradient has full weight as an axis.
-    double clear_slope = heuristic("inference.clear_slope", 4);
     /// [cells or voxels] Maximum plausible distance of a right mark from the surface that it marks.
     double off_cells = heuristic("inference.off_cells", 2);
     /// [of the marks] Maximum that a body may leave, or that may be wrong: if more are, the body is wrong instead.

@@ -74,7 +74,7 @@ private:
     void choose_box();
     [[nodiscard]] Candidate best_candidate() const;
     [[nodiscard]] Proposal near_normals_of(const Solid& body, double amplitude) const {
-        return {normals_of(body, marks_.places), kInference.normals_strength, Search::Near, amplitude};
+        return {normals_of(body, marks_.places), Search::Near, amplitude};
     }
 
     const Image& image_;
@@ -98,10 +98,10 @@ Candidate Inference::best_candidate() const {
     };
     std::vector<Proposal> proposals;
     for (const double sigma : kSigmas) {
-        // They count as much as the bending energy.
-        proposals.push_back({image_axes(*coarse_, sigma, true), 1, Search::Wide, amplitude});
+        const std::vector<Vec3> axes = image_axes(*coarse_, sigma);
+        proposals.push_back({axes, Search::Wide, amplitude});
         // If the body is darker, or brighter, than all its surroundings, the gradients themselves are the normals.
-        proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near, amplitude});
+        proposals.push_back({axes, Search::Near, amplitude});
     }
     propose_all(proposals);
     const auto best = [&](bool to_continue) {
@@ -186,8 +186,7 @@ HeldOut Inference::hold_out() const {
         std::vector<Vec3> of_rest;
         for (const std::size_t n : rest) of_rest.push_back(normals[n]);
         const Candidate again =
-            propose(Scene(*coarse_, part),
-                    {of_rest, kInference.normals_strength, Search::Near, amplitude_, nullptr, false}, run_);
+            propose(Scene(*coarse_, part), {of_rest, Search::Near, amplitude_, nullptr, false}, run_);
         if (again.solid.empty()) return;
         const Field level = again.solid.level();
         const guess::VariationalSurface surface = surface_near(part, of_rest, amplitude_);

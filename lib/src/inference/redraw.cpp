@@ -151,7 +151,7 @@ double Redrawing::learn() {
         }
     }
     if (samples_.size() < kFewest) return 0;
-    return held_out_bits(samples_, kInference.ridge, kFolds);
+    return held_out_bits(samples_, kFolds);
 }
 
 /// Drops parts without connection to known nodes: pieces without the guess's own inside, voids without its outside.
@@ -167,7 +167,7 @@ void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const 
 }
 
 void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside) {
-    const Appearance appearance(samples_, kInference.ridge);
+    const Appearance appearance(samples_);
     const double maximum = kInference.max_odds, cell = lattice_.finest();
     Field cost(lattice_.count()), weight = image_.edge(lattice_, places_of(misses_)), u(lattice_.count());
     tbb::parallel_for(std::size_t(0), lattice_.count(), [&](std::size_t n) {

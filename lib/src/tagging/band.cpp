@@ -9,6 +9,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/heuristics.h"
 #include "base/number.h"
 #include "covol/error.h"
 #include "redistance/signed_distance.h"
@@ -35,11 +36,14 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
     if (tagging.has_core(h)) {
         report.leaks = closes_at(tag_distance + h);
     } else {
-        // If a smaller D still gives a core, the body is thin and closed; otherwise there are only walls.
-        const auto has_core_at = [&](double fraction) {
-            return detail::tag(tube, float(fraction * tag_distance), seeds).has_core(h);
-        };
-        report.leaks = !has_core_at(0.85) && !has_core_at(0.7) && !has_core_at(0.55);
+        // If a smaller D, down to about half of it, still gives a core, the body is thin and closed; otherwise there
+        // are only walls.
+        report.leaks = true;
+        double smaller = tag_distance;
+        for (int n = 0; report.leaks && n < 3; ++n) {
+            smaller /= std::sqrt(kCommon.growth);
+            report.leaks = !detail::tag(tube, float(smaller), seeds).has_core(h);
+        }
     }
     if (!report.leaks) return;
     for (double larger = tag_distance + 0.5 * h; larger <= limit && report.holding_distance == 0; larger += 0.5 * h) {

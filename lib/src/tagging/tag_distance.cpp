@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/heuristics.h"
 #include "covol/band.h"
 #include "covol/distance.h"
 #include "covol/error.h"
@@ -88,7 +89,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         with_threads(run, [&] { analysis = detail::find_cores(*tube.grid, radius, exterior_seeds); });
         const MainCores verdict = judge(analysis);
         if (verdict.cores > 0) {
-            choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
+            choice.tag_distance = std::max((verdict.saddle + 1) * a, 1.5 * h);  // a cell more: the grid's uncertainty
             choice.encloses = true;
             reason.str({});
             reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores")
@@ -96,11 +97,11 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
                    << "), found on a grid with cells of " << a;
         }
         const double finer = std::max(h, 0.5 * a);
-        const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;
+        const bool is_resolved = verdict.cores > 0 && verdict.saddle >= kHalfWidthVoxels;
         const double next_voxels = double(analysis.tube_voxels) * (a / finer) * (a / finer);
         if (is_resolved || !(finer < a) || next_voxels > double(kTagDistance.max_tube_voxels)) break;
         a = finer;
-        radius = std::max(1.3 * choice.tag_distance, 4 * a);
+        radius = std::max(kCommon.growth * choice.tag_distance, (kHalfWidthVoxels + 1) * a);
     }
     if (choice.tag_distance == 0) {
         const double spacing = measure_spacing(merge_close_points(points, 0.0)).mean;
