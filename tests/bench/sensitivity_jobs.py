@@ -290,7 +290,7 @@ PLAN = {  # step: the jobs that exercise it
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "variational", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],
-    **dict.fromkeys(("guidance", "border"), GUESSED + REAL_FEW), "inference": REAL_FEW, "doubts": REAL_FEW,
+    "guidance": GUESSED + REAL_FEW, "inference": REAL_FEW, "doubts": REAL_FEW,
     **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": ["m grow", "m grow box"],
     **dict.fromkeys(("edge", "evolve", "motion", "flow"), FLOWS), "pieces": GUESSED,
     "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],

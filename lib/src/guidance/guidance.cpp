@@ -360,8 +360,8 @@ void Guide::weigh(bool first) {
     }
     std::vector<ValidationResult> validations;
     if (first) {
-        do validations.push_back(cross_validate(field, broad_ * std::pow(0.5, validations.size())));
-        while (int(validations.size()) < kCommon.rounds && validations.back().response >= kGuide.min_response);
+        for (int n = 0; n < kCommon.rounds; ++n)
+            validations.push_back(cross_validate(field, broad_ * std::pow(0.5, n)));
     } else {
         validations.push_back(cross_validate(field, prior_));
     }
@@ -372,8 +372,7 @@ void Guide::weigh(bool first) {
     if (options_.range) needed2 = std::min(needed2, guess2_ + mean(max2));
     ValidationResult chosen = validations.front();
     for (const ValidationResult& w : validations)
-        if (w.response >= kGuide.min_response && w.prior2 >= needed2 &&
-            w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
+        if (w.prior2 >= needed2 && w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
             chosen = w;
     prior_ = std::sqrt(chosen.prior2);
 

@@ -15,8 +15,6 @@ struct GuidanceHeuristics {
     double patch_width = heuristic("guidance.patch_width", 2.0);
     /// [patches] In the marks' spacing: offsets are not resolved at shorter lengths.
     double patches_per_spacing = heuristic("guidance.patches_per_spacing", 4);
-    /// [of a unit field] Minimum response: a field that hardly follows the image does not show how good the image is.
-    double min_response = heuristic("guidance.min_response", 0.25);
     /// [marks] Weight of what holds at all marks, compared to what holds at those nearby.
     double belief = heuristic("guidance.belief", 4.0);
     /// [d² / (2 R)] Error of a surface of minimum bending energy, at distance d from marks on a body of size R: about a
@@ -24,13 +22,6 @@ struct GuidanceHeuristics {
     double fraction_of_sagitta = heuristic("guidance.fraction_of_sagitta", 0.3);
 };
 COVOL_HEURISTICS GuidanceHeuristics kGuide{};
-
-/// Counts of intensity by depth: border_profile.cpp.
-struct BorderProfileHeuristics {
-    /// [levels of intensity] Blur over the 24 levels.
-    double level_blur = heuristic("border.level_blur", 1.0);
-};
-COVOL_HEURISTICS BorderProfileHeuristics kBorder{};
 
 /// From one image of a time-lapse to the next one: motion.cpp.
 struct MotionHeuristics {
