@@ -289,7 +289,7 @@ PLAN = {  # step: the jobs that exercise it
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "variational", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],
+    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],
     "guidance": GUESSED + REAL_FEW, "inference": REAL_FEW, "doubts": REAL_FEW,
     **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": ["m grow", "m grow box"],
     **dict.fromkeys(("edge", "evolve", "motion", "flow"), FLOWS), "pieces": GUESSED,

@@ -42,12 +42,4 @@ struct MarksSurfaceHeuristics {
 };
 COVOL_HEURISTICS MarksSurfaceHeuristics kMarks{};
 
-/// Normals of minimum energy: variational.cpp. The energy is that of Huang, Carr and Ju, Variational implicit point set
-/// surfaces, ACM Trans. Graph. 38(4), 2019; initial values and lattice are not from there.
-struct VariationalHeuristics {
-    /// [modes] Of the energy that are used as initial directions of the normals.
-    int modes = heuristic("variational.modes", 3);
-};
-COVOL_HEURISTICS VariationalHeuristics kVariational{};
-
 }  // namespace covol

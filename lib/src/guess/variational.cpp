@@ -13,7 +13,6 @@
 #include "base/heuristics.h"
 #include "clip/clipped.h"
 #include "covol/error.h"
-#include "guess/heuristics.h"
 #include "guess/triharmonic.h"
 
 namespace covol::guess {
@@ -26,8 +25,6 @@ using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: the null space of the energy
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
-// Of the subspace iteration for the flattest modes: vectors, more than the modes that are used, and steps.
-constexpr int kSubspace = 6, kSubspaceSteps = 12;
 constexpr int kMaxSteps = 500;       // of L-BFGS, which converges before
 constexpr int kAmplitudeRounds = 3;  // after which the amplitude, to which the precision is relative, has converged
 constexpr int kDirections = 64;      // around the marks; half and twice as many give the same surfaces
@@ -242,24 +239,6 @@ Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
     return result;
 }
 
-/// Approximate eigenvectors of the smallest eigenvalues: inverse iteration on a subspace.
-Matrix flattest_modes(const Matrix& H, const Vector& outward) {
-    const Index size = H.rows(), count = std::min<Index>(kSubspace, size);
-    Matrix shifted = H;
-    shifted.diagonal().array() += 1e-10 * H.trace() / double(size);
-    const Eigen::LLT<Matrix> factor(shifted);
-    Matrix space(size, count);
-    space.col(0) = outward;
-    for (Index j = 1; j < count; ++j)
-        for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // arbitrary vectors
-    for (int step = 0; step < kSubspaceSteps; ++step) {
-        space = factor.solve(space).eval();
-        space = (Eigen::HouseholderQR<Matrix>(space).householderQ() * Matrix::Identity(size, count)).eval();
-    }
-    const Eigen::SelfAdjointEigenSolver<Matrix> small(space.transpose() * H * space);
-    return space * small.eigenvectors();
-}
-
 Expansion expansion(const HermiteSystem& system, const Vector& values, const Vector& gradients,
                     const std::vector<Point>& nodes) {
     Vector basis;
@@ -341,9 +320,6 @@ Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Ve
     for (const double fraction : kLocalFractions)
         if (fraction * double(marks) >= double(kCommon.ring))
             initial_values.push_back(away_from_neighbours(nodes, marks, fraction));
-    const Matrix modes = flattest_modes(system.energy(), outward);
-    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k)
-        initial_values.push_back(modes.col(k));
     std::vector<Gradients> ends(initial_values.size());
     tbb::parallel_for(std::size_t(0), initial_values.size(), [&](std::size_t n) {
         Gradients& end = ends[n] = descend(energy, c, initial_values[n]);
