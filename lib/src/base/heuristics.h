@@ -58,6 +58,8 @@ struct CommonHeuristics {
     double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
     /// [ratio] Of a distance to the relevant length, below which two positions are the same one.
     double same_place = heuristic("common.same_place", 1e-3);
+    /// [fraction] Of a whole, that is negligible.
+    double negligible = heuristic("common.negligible", 0.02);
     /// [cosine] Minimum between the normals of a triangle, or of neighbouring sheets, before and after a change: 60
     /// degrees.
     double turn = heuristic("common.turn", 0.5);

@@ -53,9 +53,6 @@ struct DoubtsHeuristics {
     /// [fraction] Maximum of the marks that a surface may miss, of the surface that is far from every mark, and of the
     /// given normals that contradict the result.
     double missed_fraction = heuristic("doubts.missed_fraction", 0.1);
-    /// [fraction] Of an extent, an area or the image's range, from which on it matters: the thickness of a cloud, the
-    /// part of a surface without points, the steps of single precision.
-    double negligible = heuristic("doubts.negligible", 0.02);
     /// [radii of the largest ball inside a guess] Distance of a mark from the guess, above which the guess is
     /// unreliable there: of 60 masks of five thin structures that lacked a quarter, with 5 to 30 marks, 15 had a mark
     /// that lay farther; 9 of these became worse, as did 3 of the others.

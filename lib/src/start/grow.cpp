@@ -111,13 +111,13 @@ public:
                              double(all[std::size_t(0.005 * double(all.size() - 1))]);
         if (!(range > 0)) return "the image is constant";
         inside_ = spread_of(inside);
-        inside_.width = std::max(inside_.width, kGrow.min_spread * range);
+        inside_.width = std::max(inside_.width, kCommon.negligible * range);
         Spread surface = spread_of(shell);
-        surface.width = std::max({surface.width, inside_.width, 2 * kGrow.min_spread * range});
+        surface.width = std::max({surface.width, inside_.width, 2 * kCommon.negligible * range});
         const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) {
             return std::abs(v - surface.middle) > kCommon.errors * surface.width;
         });
-        if (double(unlike) > kGrow.unlike_fraction * double(inside.size()))
+        if (double(unlike) > kCommon.negligible * double(inside.size()))
             return "the image differs between the inside and the surface of the start";
         return {};
     }
@@ -145,9 +145,7 @@ public:
                 best_edge_ = edge();
                 best_count_ = order_.size();
             }
-            if (edge() < kGrow.passed * best_edge_ &&
-                double(order_.size()) > kGrow.passed_growth * double(best_count_) && is_clear())
-                break;
+            if (edge() < kGrow.passed * best_edge_ && is_clear()) break;
             if (order_.size() % 65536 == 0) run.check();
         }
     }
@@ -158,11 +156,10 @@ public:
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }
 
-    /// 1 in the region of the best front, with small cavities filled.
+    /// 1 in the region of the best front.
     [[nodiscard]] std::vector<float> region() const {
         std::vector<float> in(image_.size(), 0.0F);
         for (std::size_t n = 0; n < best_count_; ++n) in[order_[n]] = 1;
-        fill_cavities(in);
         return in;
     }
     /// Whether the best front reaches the box's end where that is not the domain's.
@@ -217,7 +214,7 @@ private:
         std::sort(near.begin(), near.end());
         // The front is half as fast where noise no longer explains the difference.
         const double away = std::abs(double(image_[n]) - inside_.middle) / (kCommon.errors * inside_.width);
-        const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kGrow.min_speed);
+        const double slowness = 1 + away * away * away * away;
         double time = near[0] + slowness, sum = near[0], squares = near[0] * near[0];
         for (int m = 1; m < 3 && near[m] < time; ++m) {
             sum += near[m];
@@ -227,29 +224,6 @@ private:
             time = (sum + std::sqrt(root)) / (m + 1);
         }
         return float(time);
-    }
-
-    void fill_cavities(std::vector<float>& in) const {
-        std::vector<char> seen(in.size(), 0);
-        std::vector<std::size_t> part;
-        for (std::size_t from = 0; from < in.size(); ++from) {
-            if (seen[from] || in[from] > 0) continue;
-            part.assign(1, from);
-            seen[from] = 1;
-            bool at_border = false;
-            for (std::size_t m = 0; m < part.size(); ++m) {
-                int neighbours = 0;
-                box_.for_each_neighbour(part[m], [&](std::size_t other, int) {
-                    ++neighbours;
-                    if (seen[other] || in[other] > 0) return;
-                    seen[other] = 1;
-                    part.push_back(other);
-                });
-                at_border = at_border || neighbours < 6;
-            }
-            if (!at_border && double(part.size()) < kGrow.small_cavity * double(best_count_))
-                for (const std::size_t n : part) in[n] = 1;
-        }
     }
 
     struct Waiting {

@@ -10,10 +10,7 @@ namespace covol {
 struct TagDistanceHeuristics {
     /// [ratio] Minimum of peak to saddle for a core that is a structure, not a pocket in a wall.
     double clear_ratio = heuristic("tag_distance.clear_ratio", 2.0);
-    /// [ratio] The same for a core with a large fraction of the cloud's area.
-    double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
-    /// [fraction of the cloud's area, and volumes of the most important core] Minimum that counts as large, and of a
-    /// core that D has to close.
+    /// [volumes of the most important core] Minimum of a core that D has to close.
     double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
     /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
@@ -24,8 +21,6 @@ COVOL_HEURISTICS TagDistanceHeuristics kTagDistance{};
 
 /// Tagged cores that are pockets: tagging.cpp.
 struct TaggingHeuristics {
-    /// [enclosed volumes] A core with a smaller volume, dilated by D, is a pocket.
-    double significant_fraction = heuristic("tagging.significant_fraction", 0.04);
     /// [D] A core with a smaller radius is a pocket.
     double significant_radius = heuristic("tagging.significant_radius", 0.25);
 };

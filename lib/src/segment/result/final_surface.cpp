@@ -98,7 +98,7 @@ struct Maker {
             case Holes::Flat: return flatten_holes(made.mesh, made.distance_to_points, distance, slack, run());
             case Holes::Auto: break;
         }
-        if (made.fraction_without_points <= kDoubts.negligible || options().contours) return {};
+        if (made.fraction_without_points <= kCommon.negligible || options().contours) return {};
         try {
             TreatedHoles open = trimmed();
             double rims = 0;

@@ -109,7 +109,7 @@ private:
         const auto [low, high] = problem_.image->percentiles(0.01, 0.99);
         const double largest = std::max(std::abs(low), std::abs(high));
         const double step = largest * std::numeric_limits<float>::epsilon();
-        if (high > low && step > kDoubts.negligible * (high - low))
+        if (high > low && step > kCommon.negligible * (high - low))
             warn("the image's values lie between " + number(low) + " and " + number(high) +
                  ", where single precision resolves only steps of " + number(step) + ": subtract an offset first");
     }
@@ -217,7 +217,7 @@ private:
     void find_holes() {
         const HolesReport& holes = surface_.holes;
         // A surface that ends where the points end is correct, and its choice is reported elsewhere.
-        if (surface_.fraction_without_points <= kDoubts.negligible || holes.policy == Holes::Open) return;
+        if (surface_.fraction_without_points <= kCommon.negligible || holes.policy == Holes::Open) return;
         warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface is farther than " +
              number(holes.distance) + " from every point: " +
              (holes.policy == Holes::Flat ? "flat patches close it there" : "only curvature determines it there"));

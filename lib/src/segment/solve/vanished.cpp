@@ -32,8 +32,8 @@ Eigen::Vector3d extents(const std::vector<Vec3>& points) {
 
 std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distance, bool encloses) {
     const Eigen::Vector3d extent = extents(points);
-    const bool is_flat = extent[0] <= kDoubts.negligible * extent[2],
-               is_line = extent[1] <= kDoubts.negligible * extent[2];
+    const bool is_flat = extent[0] <= kCommon.negligible * extent[2],
+               is_line = extent[1] <= kCommon.negligible * extent[2];
     std::ostringstream text;
     text.precision(3);
     if (encloses && !is_flat) {
