@@ -95,6 +95,10 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
     // Along the normal by the error of a mark somewhere in its voxel.
     for (int level = 0; level < kLevels; ++level)
         blur(c.border.data() + level, kDepths, kLevels, kUniformDeviation * kStepsPerVoxel);
+    for (int depth = 0; depth < kDepths; ++depth)
+        blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kGuide.level_blur);
+    blur(c.inside.data(), kLevels, 1, kGuide.level_blur);
+    blur(c.outside.data(), kLevels, 1, kGuide.level_blur);
     return c;
 }
 

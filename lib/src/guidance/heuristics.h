@@ -17,6 +17,8 @@ struct GuidanceHeuristics {
     double patches_per_spacing = heuristic("guidance.patches_per_spacing", 4);
     /// [marks] Weight of what holds at all marks, compared to what holds at those nearby.
     double belief = heuristic("guidance.belief", 4.0);
+    /// [levels of intensity] Blur of counts over the 24 levels.
+    double level_blur = heuristic("guidance.level_blur", 1.0);
     /// [d² / (2 R)] Error of a surface of minimum bending energy, at distance d from marks on a body of size R: about a
     /// third of the sagitta.
     double fraction_of_sagitta = heuristic("guidance.fraction_of_sagitta", 0.3);
