@@ -13,8 +13,6 @@ struct RelaxHeuristics {
     /// [cosine] Of an angle, 30 degrees, half of that of equilateral triangles: triangles without smaller angles are
     /// skipped after the first round, and the shortest side of those with smaller ones is collapsed.
     double sliver = heuristic("relax.sliver", 0.866);
-    /// [voxels] Maximum length of a side that is collapsed.
-    double short_side = heuristic("relax.short_side", 0.5);
     /// [voxels] Maximum distance from the level set of a flipped edge, unless it was as far before, and of merged ends.
     double off_level = heuristic("relax.off_level", 0.1);
 };
@@ -29,7 +27,7 @@ COVOL_HEURISTICS DecimateHeuristics kDecimate{};
 
 /// Projection of vertices onto the level set: level.cpp.
 struct LevelHeuristics {
-    /// [voxels] Maximum length of a step.
+    /// [voxels] Maximum length of a step, and of a triangle's side that is collapsed.
     double longest = heuristic("level.longest", 0.5);
     /// [fraction of the slope of a distance] Minimum slope for estimates of the distance, because it vanishes between
     /// two walls.

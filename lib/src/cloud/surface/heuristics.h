@@ -62,17 +62,6 @@ struct CloudSurfaceHeuristics {
     /// [indicator] Deviation from 1/2 from which on the surface is assumed to be farther away than the conversion
     /// gives; from twice that on it is out of the band.
     double sure = heuristic("blend.sure", 0.2);
-    /// [fraction of the points] Minimum on a separate piece; noise creates spurious pieces.
-    double min_resting_fraction = heuristic("blend.min_resting_fraction", 1e-3);
-    /// [spacings] Cells of an indicator for points with gaps.
-    double coarse_spacings = heuristic("blend.coarse_spacings", 2.4);
-    /// [spacings] Distance from all points from which on the surface is bare.
-    double far_spacings = heuristic("blend.far_spacings", 3);
-    /// [fraction of the area] Bare, above which the points have gaps.
-    double open_fraction = heuristic("blend.open_fraction", 0.05);
-    /// [fraction of the points] Minimum on a separate piece if the points enclose nothing: such pieces are not thin
-    /// parts.
-    double min_resting_open = heuristic("blend.min_resting_open", 1e-2);
 };
 COVOL_HEURISTICS CloudSurfaceHeuristics kBlend{};
 
