@@ -153,7 +153,7 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, const H
         const Vec3 low = detail::moved(mark, direction, -step), high = detail::moved(mark, direction, step);
         slope = std::hypot(slope, (body.value(high) - body.value(low)) / (2 * step));
     }
-    return body.value(mark) / std::max(slope, kGuess.min_slope);
+    return body.value(mark) / std::max(slope, kCommon.negligible);
 }
 
 /// Removes marks in the cut, inside the section of the body given by the other marks: the surface need not pass them.

@@ -8,8 +8,6 @@ namespace covol {
 
 /// The guess from marks: guess.cpp.
 struct GuessHeuristics {
-    /// [of a distance's slope] Minimum slope at a section whose body ends right beyond it.
-    double min_slope = heuristic("guess.min_slope", 0.05);
     /// [ellipsoids around the marks] Position of the constraints that close a surface which extends beyond twice that;
     /// the surface through marks on half a ball closes within 2.
     double held_at = heuristic("guess.held_at", 1.5);
