@@ -61,8 +61,9 @@ COVOL_HEURISTICS OrientationHeuristics kOrientation{};
 
 /// Normals and sensors of the file, checked: given_sides.cpp.
 struct GivenSidesHeuristics {
-    /// [fraction] Minimum of the normals that the other half predicts, and of the points that their sensor sees; at
-    /// least half of meaningless normals are predicted, and a body hides at least half of itself from a wrong position.
+    /// [fraction] Minimum of the normals that the other half predicts, and of the points that their sensor sees;
+    /// half or more of meaningless normals are predicted, and a body hides half or more of itself from a wrong
+    /// position.
     double min_right = heuristic("given_sides.min_right", 0.65);
     /// [indicator's step over a cell] Slope from which on the indicator contradicts a normal.
     double speaks_against = heuristic("given_sides.speaks_against", 0.1);
