@@ -1,4 +1,4 @@
-"""Switches mechanisms off, one at a time, and measures what is lost on data that they were not made for: docs/ablation.md.
+"""Switches mechanisms off, one at a time, and measures what is lost on data that they were not made for: docs/history/constants.md.
 
     cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
     cmake --build build-sensitivity
@@ -41,7 +41,22 @@ NOTICEABLE = 0.05   # a case is better or worse if its error changes by this fra
 MINIMUM = {"clouds": 0, "marks": 0.2, "jobs": 0.1}  # percentage points
 NOISES = (0, 0.25, 1)
 # name: (what is switched off, COVOL_SCALE, panels)
-MECHANISMS = {}
+MECHANISMS = {
+    "agreement": ("a guess that agrees with the image is kept", "inference.agreement=2", ("marks",)),
+    "redraw": ("a guess is redrawn by the image", "inference.redraw_bits=1000", ("jobs",)),
+    "iterations": ("the second iteration of guidance", "guidance.iterations=0.5", ("marks", "jobs")),
+    "level_blur": ("blur over levels of intensity", "guidance.level_blur=0.001", ("marks", "jobs")),
+    "sagitta": ("error of the guess by the sagitta", "guidance.fraction_of_sagitta=0", ("marks",)),
+    "layers": ("layers of a scan below others", "layers.max_gain=0", ("jobs",)),
+    "patches": ("turning of patches", "iteration.patch_off=100", ("clouds", "jobs")),
+    "joining": ("joining of torn pieces", "join_pieces.max_gap=0", ("clouds", "jobs")),
+    "creases": ("sheets that meet", "crease.misfit_ratio=0", ("clouds",)),
+    "folds": ("folds by the indicator", "local_fit.off_indicator=1e9", ("clouds",)),
+    "bias": ("bias of noise along curved surfaces", "local_fit.max_unbent=0", ("clouds",)),
+    "contradicted": ("given normals that others contradict are turned", "given_sides.speaks_against=1000", ("jobs",)),
+    "clear": ("growth: a clear edge", "grow.clear=0", ("jobs",)),
+    "snapping": ("vertices beside a cut are moved onto it", "cut.close=0", ("jobs",)),
+}
 
 
 class Panel:
