@@ -171,10 +171,10 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
         }
         return all;
     };
-    CHECK(held_out_bits(samples(2), 3, kFolds) > 0.8);
-    CHECK(held_out_bits(samples(0), 3, kFolds) < 0.1);
+    CHECK(held_out_bits(samples(2), kFolds) > 0.8);
+    CHECK(held_out_bits(samples(0), kFolds) < 0.1);
     const std::vector<Sample> learnt = samples(2);
-    const Appearance appearance(learnt, 3);
+    const Appearance appearance(learnt);
     Features middle{}, off{}, far{};
     off[0] = 2;
     far[0] = 100;  // beyond the range of the samples the slope at its end continues
