@@ -75,6 +75,11 @@ struct DoubtsHeuristics {
     /// (0.31 for a nucleus with poor labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as
     /// large, for 25 if it is 1.5 times as large.
     double clear_support = heuristic("doubts.clear_support", 0.65);
+    /// [fraction of the slope] Of the image at the marks, relative to the steepest slope within ten voxels beside them:
+    /// 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a nucleus with poor
+    /// labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as large, for 25 if it is 1.5 times
+    /// as large.
+    double border_fraction = heuristic("doubts.border_fraction", 0.6);
     /// [ratio] Of the estimated noise to that deviation, above which folds were mistaken for noise: up to 1.5 for noise
     /// of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
     double folded_noise = heuristic("doubts.folded_noise", 1.75);

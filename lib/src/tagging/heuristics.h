@@ -10,7 +10,10 @@ namespace covol {
 struct TagDistanceHeuristics {
     /// [ratio] Minimum of peak to saddle for a core that is a structure, not a pocket in a wall.
     double clear_ratio = heuristic("tag_distance.clear_ratio", 2.0);
-    /// [volumes of the most important core] Minimum of a core that D has to close.
+    /// [ratio] The same for a core with a large fraction of the cloud's area.
+    double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
+    /// [fraction of the cloud's area, and volumes of the most important core] Minimum that counts as large, and of a
+    /// core that D has to close.
     double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
     /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);

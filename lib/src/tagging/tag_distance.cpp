@@ -46,7 +46,10 @@ MainCores judge(const Cores& analysis) {
     };
     const auto is_significant = [&](const Core& c) {
         // Gaps below half a voxel are closed by the grid itself.
-        return c.peak >= 1.0 && c.peak / std::max(c.saddle, 0.5) >= kTagDistance.clear_ratio;
+        const double ratio = c.peak / std::max(c.saddle, 0.5);
+        return c.peak >= 1.0 && (ratio >= kTagDistance.clear_ratio ||
+                                 (ratio >= kTagDistance.significant_ratio &&
+                                  c.full_area() >= kTagDistance.large_fraction * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)

@@ -55,8 +55,8 @@ public:
     [[nodiscard]] double cell() const { return cell_; }
 
     [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
-        // Starts beyond the point's own sheet.
-        for (double t = kCloud.coarse;; ++t) {
+        // Starts beyond the point's own sheet, which may be half a cell farther because it lies anywhere in its cell.
+        for (double t = kCloud.coarse + 0.5;; ++t) {
             const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1],
                                              from[2] + t * cell_ * direction[2]});
             if (at < 0) return true;

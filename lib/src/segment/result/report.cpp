@@ -161,7 +161,7 @@ private:
         else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
             warn("the image at some marks hardly predicts where the others lie (a gain of " + number(guidance.gain) +
                  " nats per mark)" + look);
-        else if (border.fraction < kDoubts.clear_support && border.errors > kCommon.errors)
+        else if (border.fraction < kDoubts.border_fraction && border.errors > kCommon.errors)
             warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
                  (border.at < 0 ? "inside" : "outside") + " the marks, everywhere (at the marks they have " +
                  number(std::round(100 * border.fraction)) + " % of that steepness)" + look + ", and have its scale");
