@@ -68,12 +68,8 @@ struct DoubtsHeuristics {
     /// [nats] Gain of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with the right marks, on the
     /// same structures.
     double min_gain = heuristic("doubts.min_gain", 0.05);
-    /// [probability, or fraction of the slope] From which on the image shows the marked border clearly. As the
-    /// probability above, with a low gain: at most 0.62 for shifted, mirrored or randomly placed marks, 0.59 to 0.86
-    /// for the right marks on dim nuclei, whose gain is low, too. As the slope at the marks, relative to the steepest
-    /// slope within ten voxels beside them: 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues
-    /// (0.31 for a nucleus with poor labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as
-    /// large, for 25 if it is 1.5 times as large.
+    /// [probability] As above, from which on a low gain alone raises no doubt: at most 0.62 for shifted, mirrored or
+    /// randomly placed marks, 0.59 to 0.86 for the right marks on dim nuclei, whose gain is low, too.
     double clear_support = heuristic("doubts.clear_support", 0.65);
     /// [fraction of the slope] Of the image at the marks, relative to the steepest slope within ten voxels beside them:
     /// 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a nucleus with poor
