@@ -81,6 +81,9 @@ COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 struct ViewsHeuristics {
     /// [rays] From each cell, evenly distributed over the sphere.
     int rays = heuristic("views.rays", 96);
+    /// [fraction of the points] With a free view in one direction and not in the opposite one, from which on the
+    /// direction is the sky's.
+    double sky = heuristic("views.sky", 0.01);
     /// [weight] Of each point's own free directions, relative to the sky's.
     double beside_sky = heuristic("views.beside_sky", 0.1);
     /// [indicator's slope over a cell] Weight of the points in the screened indicator (Kazhdan and Hoppe, Screened

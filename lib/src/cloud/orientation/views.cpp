@@ -123,7 +123,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
         }
     });
     Vec3 sky{0, 0, 0};
-    if (*std::max_element(seen.begin(), seen.end()) > kCloud.some * double(points.size())) {
+    if (*std::max_element(seen.begin(), seen.end()) > kViews.sky * double(points.size())) {
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
         sky = unit(sky);
     }
