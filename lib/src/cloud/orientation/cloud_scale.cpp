@@ -110,9 +110,9 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const std::vector<Around> closest = measure_nearest(points, cells, nearest, step);
     scale.near_reach = median_of(closest, [](const Around& a) { return a.reach; });
     scale.near_noise = median_of(closest, [](const Around& a) { return a.noise; });
-    // From a disc with about as many points as a quadric requires to the whole cloud.
+    // From a disc with too few points for a quadric to the whole cloud.
     const double widest = longest_side(bounding_box(points));
-    double radius = kCloud.coarse * scale.spacing, best = 1;
+    double radius = kCloudScale.first_spacings * nearest, best = 1;
     do {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);

@@ -6,6 +6,8 @@ namespace covol {
 
 /// Spacing and noise of a cloud from quadrics fitted to neighbourhoods of increasing size: cloud_scale.cpp.
 struct CloudScaleHeuristics {
+    /// [median distances to the nearest point] The first radius.
+    double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
     /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; it is 0.45 for points that
     /// fill a ball.
     double sheet = heuristic("cloud_scale.sheet", 0.15);
