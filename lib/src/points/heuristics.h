@@ -33,4 +33,11 @@ struct IsolatedHeuristics {
 };
 COVOL_HEURISTICS IsolatedHeuristics kIsolated{};
 
+/// Distance to the nearest point: spacing.cpp.
+struct SpacingHeuristics {
+    /// [points] Maximum number of sampled points.
+    std::size_t queries = heuristic("spacing.queries", 50000);
+};
+COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
+
 }  // namespace covol

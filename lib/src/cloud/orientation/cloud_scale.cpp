@@ -7,9 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/heuristics.h"
 #include "base/median.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
@@ -17,6 +15,9 @@
 
 namespace covol {
 namespace {
+
+constexpr double kCellRadii = 2;      // edge of the cells for sorting points, in initial radii
+constexpr std::size_t kNearest = 12;  // twice the unknowns of a quadric
 
 /// Standard deviation of points from the best-fitting quadric over the plane of the last two axes.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
@@ -69,7 +70,7 @@ Around measure_around(const cloud::PointCells& cells, const Vec3& at, double rad
             const Eigen::Vector3d v = from_to(at, cells.sorted()[p]);
             if (v.squaredNorm() <= radius * radius) near.emplace_back(v / radius);
         }
-    if (near.size() < kCommon.quadric) return {};
+    if (near.size() < kCloudScale.minimum) return {};
     return {radius, double(near.size()), radius * off_sheet(near)};
 }
 
@@ -78,14 +79,14 @@ std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud
                                     std::size_t step) {
     tbb::concurrent_vector<Around> around;  // the order does not affect the medians
     cloud::for_nearest(
-        cells, 2 * nearest, kCommon.quadric - 1,
+        cells, 2 * nearest, kNearest - 1,
         [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
-            if (near.size() + 1 < kCommon.quadric) return;
+            if (near.size() + 1 < kNearest) return;
             const double reach = std::sqrt(near.back().squared);
             std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
             for (const cloud::Neighbour& other : near)
                 places.push_back(from_to(points[point], cells.sorted()[other.at]) / reach);
-            around.push_back({reach, double(kCommon.quadric), reach * off_sheet(places)});
+            around.push_back({reach, kNearest, reach * off_sheet(places)});
         },
         [&](std::size_t n) { return n % step == 0; });
     return {around.begin(), around.end()};
@@ -105,15 +106,13 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const double nearest = scale.nearest = measure_spacing(points).median;
     scale.spacing = 2 * nearest;  // the expected value for points that are distributed evenly at random
     if (!(nearest > 0)) return scale;
-    const std::size_t step = std::max<std::size_t>(1, points.size() / kCommon.sample);
-    const cloud::PointCells cells(points, kNear.first_radius * scale.spacing);
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
+    double radius = kCloudScale.first_spacings * nearest, best = 1;
+    const cloud::PointCells cells(points, kCellRadii * radius);
     const std::vector<Around> closest = measure_nearest(points, cells, nearest, step);
     scale.near_reach = median_of(closest, [](const Around& a) { return a.reach; });
     scale.near_noise = median_of(closest, [](const Around& a) { return a.noise; });
-    // From a disc with too few points for a quadric to the whole cloud.
-    const double widest = longest_side(bounding_box(points));
-    double radius = kCloudScale.first_spacings * nearest, best = 1;
-    do {
+    for (int n = 0; n < kCloudScale.radii; ++n, radius *= kCloudScale.growth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);
         tbb::parallel_for(std::size_t(0), around.size(),
@@ -128,7 +127,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
         }
         // In wider neighbourhoods, only the surface's own curvature would add to the deviation.
         if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
-    } while ((radius *= kCommon.growth) < widest);
+    }
     return scale;
 }
 
