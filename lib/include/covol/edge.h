@@ -88,7 +88,7 @@ struct MarkedFeature {
 };
 
 /// A line if the marked positions differ from both of their sides by more than the sides differ from each other, and by
-/// more than four standard errors; else a slope.
+/// more than three standard errors; else a slope.
 /// @param places   positions, world units
 /// @param normals  outward unit vectors, one for each position
 /// @param reach    distance from a position at which its two sides are sampled, world units
