@@ -9,7 +9,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "base/heuristics.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
