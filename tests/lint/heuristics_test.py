@@ -14,7 +14,7 @@ from heuristics import read_heuristics  # noqa: E402
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat", "cloud/surface/hold_topology.cpp:kHeld",
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat", 
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMaxReach",

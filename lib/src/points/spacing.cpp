@@ -8,7 +8,6 @@
 #include <limits>
 #include <numeric>
 
-#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/points.h"

@@ -76,6 +76,10 @@ struct DoubtsHeuristics {
     /// labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as large, for 25 if it is 1.5 times
     /// as large.
     double border_fraction = heuristic("doubts.border_fraction", 0.6);
+    /// [reaches] Deviation of twelve neighbouring points of a cloud from a quadric, below which they form a sheet: 0.33
+    /// if they fill a ball, 0.26 and more if the noise is as large as the distance between nearest points, 0.11 to
+    /// 0.247 in folds that were smoothed as noise.
+    double sheet = heuristic("doubts.sheet", 0.25);
     /// [ratio] Of the estimated noise to that deviation, above which folds were mistaken for noise: up to 1.5 for noise
     /// of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
     double folded_noise = heuristic("doubts.folded_noise", 1.75);

@@ -4,6 +4,7 @@
 
 #include "cloud/indicator/heuristics.h"
 #include "covol/domain.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {

@@ -6,20 +6,6 @@
 
 namespace covol {
 
-/// Principles that the steps after the orientation of a cloud have in common.
-struct CloudHeuristics {
-    /// [spacings] Edge of coarse cells, in which about four points represent the surface without holes; and the
-    /// distance from which on something is not beside a point.
-    double coarse = heuristic("cloud.coarse", 2.0);
-    /// [ratio] Of the distance from the plane of a sheet to the distance along it, up to which points are on the sheet.
-    double flat = heuristic("cloud.flat", 0.25);
-    /// [fraction of the points] That is explained by single points.
-    double few = heuristic("cloud.few", 0.002);
-    /// [fraction of the points, or of the area] That is not explained by noise.
-    double some = heuristic("cloud.some", 0.02);
-};
-COVOL_HEURISTICS CloudHeuristics kCloud{};
-
 /// The grids of the indicator function: indicator.cpp.
 struct IndicatorHeuristics {
     /// [longest sides] Margin of the lattice around the points.

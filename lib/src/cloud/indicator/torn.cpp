@@ -9,6 +9,7 @@
 #include "base/disjoint_sets.h"
 #include "base/geometry.h"
 #include "cloud/indicator/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "points/point_cells.h"
 

@@ -14,6 +14,7 @@
 #include "cloud/orientation/propagation.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
+#include "points/heuristics.h"
 #include "points/kd_tree.h"
 #include "points/neighbours.h"
 

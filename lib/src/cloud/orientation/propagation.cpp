@@ -12,6 +12,7 @@
 
 #include "base/geometry.h"
 #include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {

@@ -7,6 +7,7 @@
 #include "base/geometry.h"
 #include "base/median.h"
 #include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {

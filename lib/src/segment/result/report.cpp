@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/heuristics.h"
-#include "cloud/indicator/heuristics.h"
 #include "covol/compare.h"
 #include "grid/levels_at.h"
 #include "image/support.h"
@@ -94,12 +93,11 @@ private:
     }
 
     /// Noise fills space within its range. If the nearest points lie on sheets although the smoothing was that for
-    /// noise, the points are folds: the deviation of twelve neighbouring points from a quadric is 0.11 to 0.247 of
-    /// their reach in folds, and 0.26 or more if the noise is as large as the distance between nearest points.
+    /// noise, the points are folds.
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
-            cloud.near_noise < kCloud.flat * cloud.near_reach)
+            cloud.near_noise < kDoubts.sheet * cloud.near_reach)
             warn("the surface is smoothed for a noise of " + number(cloud.noise) +
                  ", but neighbouring points lie on sheets (" + number(cloud.near_noise) + " from them within " +
                  number(cloud.near_reach) +
