@@ -145,8 +145,7 @@ void Guide::cut_surface() {
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
     cut(kGuide.patch_width * h_);
-    // Offsets are not resolved at lengths below the marks' spacing, for which two patches suffice.
-    if (spacing_ > 2 * width_) cut(spacing_ / 2);
+    if (spacing_ > kGuide.patches_per_spacing * width_) cut(spacing_ / kGuide.patches_per_spacing);
     find_borders(std::move(vertices), patches_);
 }
 

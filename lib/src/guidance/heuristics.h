@@ -13,6 +13,8 @@ struct GuidanceHeuristics {
     double farthest = heuristic("guidance.farthest", 12.0);
     /// [voxels] Width of a patch of the surface with a single offset.
     double patch_width = heuristic("guidance.patch_width", 2.0);
+    /// [patches] In the marks' spacing: offsets are not resolved at shorter lengths.
+    double patches_per_spacing = heuristic("guidance.patches_per_spacing", 4);
     /// [marks] Weight of what holds at all marks, compared to what holds at those nearby.
     double belief = heuristic("guidance.belief", 4.0);
     /// [levels of intensity] Blur of counts over the 24 levels.
