@@ -17,6 +17,8 @@ struct TagDistanceHeuristics {
     double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
     /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
+    /// [ratio] Of D to the largest gap that it closes, in addition to half a cell, by which the gap is uncertain.
+    double margin = heuristic("tag_distance.margin", 1.05);
     /// [voxels] Maximum in the tube on the last grid, to limit time and memory.
     std::int64_t max_tube_voxels = heuristic("tag_distance.max_tube_voxels", 1'500'000);
 };
