@@ -100,9 +100,9 @@ double dice_of(const View& view) {
 
 /// The number of the band's voxels inside a ball that the image's end cuts, tagged from dense marks.
 double band_of_cut_ball(double unit) {
-    constexpr int kSize = 40;
-    const Vec3 center{20, 20, 34};  // the end is at 39.5
-    constexpr double kRadius = 12;
+    constexpr int kSize = 24;
+    const Vec3 center{12, 12, 20};  // the end is at 23.5
+    constexpr double kRadius = 7;
     ImageGeometry g;
     g.size = {kSize, kSize, kSize};
     g.spacing = {unit, unit, unit};
@@ -114,7 +114,7 @@ double band_of_cut_ball(double unit) {
     std::mt19937_64 random(3);
     std::normal_distribution<double> normal;
     std::vector<Vec3> marks;
-    while (marks.size() < 1500) {
+    while (marks.size() < 500) {
         const Vec3 d{normal(random), normal(random), normal(random)};
         const double to = kRadius / std::hypot(d[0], d[1], d[2]);
         const Vec3 index{center[0] + to * d[0], center[1] + to * d[1], center[2] + to * d[2]};
@@ -122,6 +122,7 @@ double band_of_cut_ball(double unit) {
     }
     SegmentOptions options;
     options.start = TagStart{};
+    options.evolve.max_steps = 5;
     const SegmentResult found = segment(Image::from_values(g, values.data()), marks, options);
     double count = 0;
     for (auto value = found.surface->cbeginValueOn(); value; ++value) count += *value < 0;
@@ -150,9 +151,9 @@ TEST_CASE("units and origin") {
 }
 
 TEST_CASE("units of a tagged body that the image cuts") {
-    const double unit = GENERATE(1e-3, 1e3), plain = band_of_cut_ball(1);
+    const double plain = band_of_cut_ball(1);
     CHECK(plain > 0);
-    CHECK(band_of_cut_ball(unit) == Approx(plain).epsilon(0.001));
+    CHECK(band_of_cut_ball(1e-3) == Approx(plain).epsilon(0.001));
 }
 
 TEST_CASE("an origin far away") { CHECK(dice_of({.origin = {1e6, -1e6, 1e6}}) == Approx(plain()).margin(kMaxDice)); }
