@@ -122,7 +122,7 @@ double band_of_cut_ball(double unit) {
     }
     SegmentOptions options;
     options.start = TagStart{};
-    options.evolve.max_steps = 5;
+    options.model = Model::Paper;  // without inference, which takes long
     const SegmentResult found = segment(Image::from_values(g, values.data()), marks, options);
     double count = 0;
     for (auto value = found.surface->cbeginValueOn(); value; ++value) count += *value < 0;
