@@ -98,37 +98,6 @@ double dice_of(const View& view) {
     return 2 * both / sum;
 }
 
-/// The number of the band's voxels inside a ball that the image's end cuts, tagged from dense marks.
-double band_of_cut_ball(double unit) {
-    constexpr int kSize = 24;
-    const Vec3 center{12, 12, 20};  // the end is at 23.5
-    constexpr double kRadius = 7;
-    ImageGeometry g;
-    g.size = {kSize, kSize, kSize};
-    g.spacing = {unit, unit, unit};
-    std::vector<float> values;
-    for (int k = 0; k < kSize; ++k)
-        for (int j = 0; j < kSize; ++j)
-            for (int i = 0; i < kSize; ++i)
-                values.push_back(std::hypot(i - center[0], j - center[1], k - center[2]) < kRadius ? 160.0F : 100.0F);
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> normal;
-    std::vector<Vec3> marks;
-    while (marks.size() < 500) {
-        const Vec3 d{normal(random), normal(random), normal(random)};
-        const double to = kRadius / std::hypot(d[0], d[1], d[2]);
-        const Vec3 index{center[0] + to * d[0], center[1] + to * d[1], center[2] + to * d[2]};
-        if (index[2] < kSize - 0.5) marks.push_back(g.index_to_world(index));
-    }
-    SegmentOptions options;
-    options.start = TagStart{};
-    options.model = Model::Paper;  // without inference, which takes long
-    const SegmentResult found = segment(Image::from_values(g, values.data()), marks, options);
-    double count = 0;
-    for (auto value = found.surface->cbeginValueOn(); value; ++value) count += *value < 0;
-    return count;
-}
-
 double plain() {
     static const double dice = dice_of({});
     return dice;
@@ -148,12 +117,6 @@ TEST_CASE("units and origin") {
     CHECK(dice_of({.unit = unit}) == Approx(plain()).margin(kMaxDice));
     CHECK(dice_of({.unit = unit, .origin = {500 * unit, -700 * unit, 1100 * unit}}) ==
           Approx(plain()).margin(kMaxDice));
-}
-
-TEST_CASE("units of a tagged body that the image cuts") {
-    const double plain = band_of_cut_ball(1);
-    CHECK(plain > 0);
-    CHECK(band_of_cut_ball(1e-3) == Approx(plain).epsilon(0.001));
 }
 
 TEST_CASE("an origin far away") { CHECK(dice_of({.origin = {1e6, -1e6, 1e6}}) == Approx(plain()).margin(kMaxDice)); }
