@@ -9,6 +9,7 @@
 #include "cloud/orientation/filled.h"
 #include "covol/error.h"
 #include "covol/scan_noise.h"
+#include "points/heuristics.h"
 #include "segment/heuristics.h"
 
 namespace covol {
@@ -90,8 +91,7 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
 
 // A thick layer of points, or several adjacent layers, are replaced by the surface in their middle.
 std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
-    // Layers closer than that lie in the band of a single surface.
-    const double radius = kHalfWidthVoxels * h, thickness = measure_layer_thickness(points, radius, run);
+    const double radius = kScan.plane_voxels * h, thickness = measure_layer_thickness(points, radius, run);
     if (!(thickness > kAutomatic.noticeable_voxels * h)) return points;
     points = average_layers(points, radius, run);
     remarks.choose("points_averaged", "within " + number(radius),
