@@ -58,15 +58,15 @@ struct Tagger {
 
 // ---- bodies that the image cuts off -------------------------------------------------------------------------------
 
-/// A domain on the same lattice that contains all points, extended by some layers.
-Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
+/// A domain on the same lattice that contains all points, extended by a margin in world units.
+Domain around(Domain domain, const std::vector<Vec3>& points, double margin) {
     const WorldBox box = bounding_box(points);
     const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
     for (int a = 0; a < 3; ++a) {
         domain.min[a] = std::min(domain.min[a], int(std::floor(low[a])));
         domain.max[a] = std::max(domain.max[a], int(std::ceil(high[a])));
     }
-    return widened(domain, layers);
+    return widened(domain, int(std::ceil(margin / domain.voxel_size)));
 }
 
 /// A tagged body that extends beyond the image.

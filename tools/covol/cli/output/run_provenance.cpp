@@ -4,6 +4,7 @@
 #include "cli/options/parsed_options.h"
 #include "cli/output/grid_metadata.h"
 #include "cli/output/provenance.h"
+#include "covol/evolve.h"
 #include "covol/safe_text.h"
 #include "covol/version.h"
 
