@@ -75,6 +75,12 @@ std::unique_ptr<serve::WebServer> start_server(serve::Options options, const ser
     }
 }
 
+/// Stops a server also after an error: its handlers use objects that are destroyed next.
+struct StopAtEnd {
+    serve::WebServer& server;
+    ~StopAtEnd() { server.stop(); }
+};
+
 struct MarkJob {
     std::string image_path, study;
     ImageFlags image;
@@ -116,6 +122,8 @@ struct MarkJob {
         auto seen =
             std::make_unique<PageImage>(levels, view.title, is_anatomical(image_path, image.options, session.run()),
                                         channels(info, session), quiet(session.run()));
+        // Destroyed after the session, whose solver sends to it until its thread has ended.
+        std::unique_ptr<serve::WebServer> server;
         MarkSession mark(
             std::move(opened), std::move(seen), [&] { return for_jobs.get(); }, std::move(view), session.run());
         std::latch started(1);  // a browser may connect before the study is loaded
@@ -134,7 +142,8 @@ struct MarkJob {
         };
         handlers.message = [&](serve::Client client, std::string_view text) { mark.message(client, text); };
         handlers.on_error = [&](const std::string& line) { session.warn(line); };
-        const std::unique_ptr<serve::WebServer> server = start_server(std::move(options), handlers, folder);
+        server = start_server(std::move(options), handlers, folder);
+        const StopAtEnd stop{*server};
         mark.start([&](serve::Client client, std::string text) { server->send(client, std::move(text)); },
                    [&](std::string text) { server->broadcast(std::move(text)); });
         started.count_down();
@@ -143,7 +152,7 @@ struct MarkJob {
         if (!link || !link->open()) std::cout << "open " << server->url() << std::endl;
         session.note("the study is " + folder + "; every action is saved immediately. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        server->stop();
+        server->stop();  // its requests are cancelled by the interrupt
         accept_interrupt();
     }
 
