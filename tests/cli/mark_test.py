@@ -90,18 +90,6 @@ class Study(MarkCase):
         self.assertEqual(page.get("/export?structure=0&format=passwd")[0], 400)
         self.assertEqual(page.get("/export?structure=9&format=mask.nrrd")[0], 400)
 
-    def test_ctrl_c_while_surfaces_are_computed(self):
-        program, page = self.start()
-        live = self.open(page)
-        self.marked(live)
-        for wait in range(15):
-            program.send_signal(signal.SIGINT)
-            self.assertEqual(program.wait(timeout=30), 0)
-            # Without the stored surface, each start computes it.
-            shutil.rmtree(self.out / "ball.nrrd.covol" / "surfaces", ignore_errors=True)
-            program, _ = self.start()
-            time.sleep(0.008 * wait)
-
     def test_the_program_gives_the_same_bits_without_a_page(self):
         program, page = self.start()
         live = self.open(page)
