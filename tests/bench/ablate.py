@@ -9,6 +9,10 @@ A mechanism is switched off by COVOL_SCALE (base/heuristics.h), which makes its 
 - clouds: 16 shapes of reconstruct/compare.py, 5,000 points each, without noise and with 0.25 and 1 %; the error is the sum of both
   mean distances between mesh and truth in % of the diagonal (--rivals measures it). Needs COVOL_DATA for nine of the shapes.
 - marks: twelve structures of real images with 20 and with 60 marks (sensitivity_jobs.REAL); the error is 1 - Dice. Needs COVOL_DATA.
+- scans: the scenes of reconstruct/scenes.py (rooms, fronts of houses, terrain, bodies with edges) from points alone, from points with
+  noise, and from points with normals; the error is the mean distance to the true surface and back in % of the spacing, plus the % of
+  the area that faces the wrong side. With COVOL_DATA also four scanned objects, of which the genus is known; their error is the mean
+  distance from the points to the surface, or, for a ball, from the surface to the sphere.
 - jobs: all small jobs of sensitivity_jobs.JOBS: clouds, scans of one side, given normals, contours, painted slices, guesses, growth.
 
 `--scale "layers.max_gain=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
@@ -26,6 +30,7 @@ import sys
 import tempfile
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 import sensitivity_jobs as jobs
 from tables import markdown
@@ -34,12 +39,16 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "reconstruct"))
 import clouds  # noqa: E402
 import ply  # noqa: E402
+import scenes  # noqa: E402
 import shapes  # noqa: E402
 
 MAX_SECONDS = 120   # of processor time
 NOTICEABLE = 0.05   # a case is better or worse if its error changes by this fraction of itself, and by MINIMUM[panel]
-MINIMUM = {"clouds": 0, "marks": 0.2, "jobs": 0.1}  # percentage points
+MINIMUM = {"clouds": 0, "scans": 1, "marks": 0.2, "jobs": 0.1}  # percentage points
 NOISES = (0, 0.25, 1)
+SCENE_FRACTION = 0.4  # of the points of scenes.py: for time
+SCANNED = {"apc_rawlings_baseball": 0, "apc_scotch_duct_tape": 1, "apc_fitness_gear_3lb_dumbbell": 0, "apc_cloud_b_plush_bear": 0}  # genus
+BALL = "apc_rawlings_baseball", (-0.0003, -0.0014, 0.0049), 0.0355  # metres
 # name: (what is switched off, COVOL_SCALE, panels)
 MECHANISMS = {
     "agreement": ("a guess that agrees with the image is kept", "inference.agreement=2", ("marks",)),
@@ -66,6 +75,8 @@ class Panel:
         self.name, self.options, self.folder, self.cases = name, options, folder, {}
         if name == "clouds":
             self._draw()
+        elif name == "scans":
+            self._scan()
         else:
             real = name == "marks"
             self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items() if (kind == "real") == real}
@@ -84,11 +95,55 @@ class Panel:
                 self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply"]
                 self.truths[case] = truth
 
+    def _scan(self):
+        folder = self.folder / "scans"
+        folder.mkdir()
+        self.truths = {}
+        for name, (make, count) in scenes.SCENES.items():
+            for kind, noise, given in (("", 0, False), ("noisy", 0.2, False), ("with normals", 0, True)):
+                scene = scenes.Scene(self.options.seed)
+                make(scene)
+                points, normals = scene.points(int(SCENE_FRACTION * count))
+                apart = np.sqrt(sum(face[0] for face in scene.faces) / len(points))
+                case = f"{name} {kind}".strip()
+                path = folder / f"{case.replace(' ', '_')}.ply"
+                scenes.write_points(path, points + scene.random.normal(0, noise * apart, points.shape), normals if given else None)
+                self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
+                self.truths[case] = (*scene.points(300_000), apart)
+        for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("clouds/*.ply")):
+            if path.stem in SCANNED:
+                self.cases[path.stem] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
+                self.truths[path.stem] = ply.read(path)[0]
+
+    def _scan_error(self, case, out):
+        vertices, triangles = ply.read(out / "s.ply")
+        random = np.random.default_rng(3)
+        found, normals = clouds.sample_with_normals(vertices, triangles, 100_000, random)
+        truth = self.truths[case]
+        if case in SCANNED:
+            surface = json.loads((out / "s.json").read_text())["surface"]
+            right = surface["components"] == 1 and surface["genus"] == SCANNED[case]
+            if case == BALL[0]:
+                return 100 * float(np.abs(np.linalg.norm(found - BALL[1], axis=1) - BALL[2]).mean()) / BALL[2], right
+            distinct = np.unique(truth, axis=0)
+            apart = 2 * np.median(cKDTree(distinct).query(distinct, k=2)[0][:, 1])
+            return 100 * float(cKDTree(found).query(distinct)[0].mean()) / apart, right
+        places, outward, apart = truth
+        away, nearest = cKDTree(places).query(found)
+        off = np.abs(np.einsum("ij,ij->i", found - places[nearest], outward[nearest]))
+        near = away < 3 * apart
+        to = float(np.where(near, np.minimum(off, away), away).mean() / apart)
+        back = float(cKDTree(found).query(places[:100_000])[0].mean() / apart)
+        against = float((np.einsum("ij,ij->i", normals, outward[nearest])[near] < 0).mean()) if near.any() else 1
+        return 100 * (to + back + against), None
+
     def output(self, case, out):
-        return out / "s.ply" if self.name == "clouds" else jobs.output_of(case, out)
+        return out / "s.ply" if self.name in ("clouds", "scans") else jobs.output_of(case, out)
 
     def error(self, case, out):
         """(error in percent, whether the topology is right; None if it is not known)"""
+        if self.name == "scans":
+            return self._scan_error(case, out)
         if self.name != "clouds":
             return jobs.error_of(case, self.folder / "in", out), None
         found = json.loads(subprocess.run([self.options.rivals, "measure", str(out / "s.ply"), str(self.truths[case])], check=True, capture_output=True, text=True).stdout)
@@ -137,7 +192,7 @@ def compared(panel, before, after):
         if abs(new - old) > NOTICEABLE * old and abs(new - old) > MINIMUM[panel]:
             (worse if new > old else better).append((abs(new - old), case))
     median_old, median_new = (np.median([r["error"] for r in results.values() if r["error"] is not None]) for results in (before, after))
-    right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if panel == "clouds" else None
+    right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if panel in ("clouds", "scans") else None
 
     def text(case):
         return f"{case}: " + " → ".join("fails" if results[case]["error"] is None else f"{results[case]['error']:.3g}" for results in (before, after))

@@ -286,7 +286,7 @@ REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] i
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
 PLAN = {  # step: the jobs that exercise it
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
-    **dict.fromkeys(("cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "torn", "consistency", "areas", "propagation", "spacing", "local_fit", "crease", "blend", "join_pieces", "hold_topology", "winding_field", "neighbours", "cleanup"), CLOUDS),
+    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],

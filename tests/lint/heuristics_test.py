@@ -14,7 +14,8 @@ from heuristics import read_heuristics  # noqa: E402
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat", 
+    "cloud/indicator/iteration.cpp:kSteady", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/surface/hold_topology.cpp:kHeld",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMaxReach",
@@ -29,7 +30,7 @@ ALLOWED = {
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "meshing/relax.cpp:kGain", "meshing/relax.cpp:kStep", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
-    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain", 
+    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain",
 }
 
 

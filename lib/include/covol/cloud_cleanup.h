@@ -28,7 +28,8 @@ struct CloudCleanupOptions {
     double simplify = 0;  ///< > 0: keeps one point in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
     double wlop_fraction = 0.25;  ///< Fraction of the points that WLOP creates, in (0,1].
-    /// Radius of WLOP's neighbourhoods, world units, > 0; automatic: 2.5 mean spacings of the new points.
+    /// Radius of WLOP's neighbourhoods, world units, > 0; automatic: twice the mean distance of the new points
+    /// to their eight neighbours.
     std::optional<double> wlop_radius;
     int neighbours = 24;  ///< For outliers and jets, >= 6.
 

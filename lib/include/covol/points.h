@@ -126,9 +126,10 @@ struct IsolatedPoint {
     std::size_t index = 0;  ///< among the points
     double distance = 0;    ///< to the nearest of those that are not isolated
 };
-/// Among 10 to 4,000 marks, those that lie apart from all others, alone or at most three together, at most a tenth of
-/// them: probably accidental clicks. Single linkage: the link from such marks to the others is more than twice as long
-/// as the longest link between the others, or six times the median link. @return the farthest first
+/// Among at most 4,000 marks, those that lie apart from all others, alone or at most three together, at most a tenth
+/// of them, and so none among fewer than 10: probably accidental clicks. Single linkage: the link from such marks to
+/// the others is more than twice as long as the longest link between the others, or six times the median link.
+/// @return the farthest first
 [[nodiscard]] COVOL_API std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points);
 
 /// Writes .xyz, .csv or binary .ply, by the file extension; completely or not at all.

@@ -15,12 +15,12 @@ namespace covol {
 [[nodiscard]] COVOL_API double measure_layer_thickness(const std::vector<Vec3>& points, double radius,
                                                        const RunContext& run = {});
 
-/// The voxel size that a scan supports, and how it was found. Of the sizes spacing * 1.25^k, k = 0..7, from the largest
-/// downwards, it is the last in the first sequence of sizes at which points are on average within 0.35 voxels of the
-/// plane through the points within 2.5 voxels of them. If larger sizes fail this because the surface itself bends, the
-/// sequence begins at 0.25 voxels, which noise never satisfies. Only sizes whose 2.5 voxels are at most half the second
-/// longest edge of the points' box are considered, because beyond that a plane fits the whole shape. If none passes, it
-/// is the largest considered.
+/// The voxel size that a scan supports, and how it was found. Of the sizes spacing * 2^(k/2), k = 0..5, from the
+/// largest downwards, it is the last in the first sequence of sizes at which points are on average within 0.35 voxels
+/// of the plane through the points within 2.5 voxels of them. If larger sizes fail this because the surface itself
+/// bends, the sequence begins at 0.25 voxels, which noise never satisfies. Only sizes whose 2.5 voxels are at most half
+/// the second longest edge of the points' box are considered, because beyond that a plane fits the whole shape. If none
+/// passes, it is the largest considered.
 struct ScanVoxelSize {
     double voxel_size = 0;
     double thickness = 0;  ///< measure_layer_thickness() at it
@@ -29,7 +29,7 @@ struct ScanVoxelSize {
                                                              const RunContext& run = {});
 
 /// Moves each point along the normal onto the plane fitted, with weights that decrease to 0 at `radius`, to the points
-/// around it; twice. Adjacent layers of one scan are merged. The order is kept; points with fewer than six others
+/// around it; twice. Adjacent layers of one scan are merged. The order is kept; points with fewer than eleven others
 /// around them do not move.
 /// @throws Error InvalidOptions (radius <= 0, not finite).
 [[nodiscard]] COVOL_API std::vector<Vec3> average_layers(const std::vector<Vec3>& points, double radius,

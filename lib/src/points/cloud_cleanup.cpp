@@ -14,9 +14,9 @@
 #include <sstream>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "covol/points.h"
-#include "points/heuristics.h"
 
 namespace covol {
 namespace {
@@ -43,7 +43,7 @@ public:
 
     void remove_outliers(CloudCleanupReport& report) {
         report.outliers += remove_isolated();
-        while (report.outlier_passes < kCleanup.max_passes && entries_.size() >= kFewest) {
+        while (report.outlier_passes < kCommon.rounds && entries_.size() >= kFewest) {
             run_.check();
             const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
             run_.check();
@@ -83,11 +83,12 @@ public:
     void smooth_by_wlop(CloudCleanupReport& report) {
         if (entries_.size() < kFewest) return;
         run_.check();
-        const double radius = options_.wlop_radius
-                                  ? *options_.wlop_radius
-                                  : kCleanup.rings *
-                                        CGAL::compute_average_spacing<Tag>(entries_, kCleanup.ring, parameters()) /
-                                        std::sqrt(options_.wlop_fraction);
+        // Two rings of new neighbours; CGAL's default of 8 spacings flattens curved surfaces.
+        const auto automatic = [&] {
+            const double ring = CGAL::compute_average_spacing<Tag>(entries_, unsigned(kCommon.ring), parameters());
+            return 2 * ring / std::sqrt(options_.wlop_fraction);
+        };
+        const double radius = options_.wlop_radius ? *options_.wlop_radius : automatic();
         run_.check();
         std::vector<Point> points;
         CGAL::wlop_simplify_and_regularize_point_set<Tag>(

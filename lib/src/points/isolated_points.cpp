@@ -5,12 +5,15 @@
 #include <numeric>
 
 #include "base/disjoint_sets.h"
+#include "base/heuristics.h"
 #include "covol/points.h"
 #include "points/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
 namespace {
+
+constexpr std::size_t kMaxPoints = 4000;  // more are a cloud instead of marks; the time is quadratic
 
 struct Link {
     double length;
@@ -70,7 +73,8 @@ public:
     }
 
 private:
-    [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.max_group; }
+    /// Four points already enclose a volume.
+    [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] >= 4; }
 
     detail::DisjointSets sets_;
     std::vector<std::size_t> size_;  ///< distinct positions in each group
@@ -96,17 +100,17 @@ std::vector<IsolatedPoint> points_outside(std::uint32_t group, Groups& groups, c
 }  // namespace
 
 std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points) {
-    if (points.size() < kIsolated.min_points || points.size() > kIsolated.max_points) return {};
+    if (points.size() < 2 || points.size() > kMaxPoints) return {};
     const std::vector<Link> links = shortest_tree(points);
     Groups groups(points.size());
     // Marks that were read or clicked twice are merged first: compared with the distance between them, every other link
     // would be long.
     const auto first =
-        std::size_t(std::upper_bound(links.begin(), links.end(), kIsolated.same_place * links.back().length,
+        std::size_t(std::upper_bound(links.begin(), links.end(), kCommon.same_place * links.back().length,
                                      [](double length, const Link& link) { return length < link.length; }) -
                     links.begin());
     for (std::size_t n = 0; n < first; ++n) groups.merge(links[n]);
-    if (groups.places() < kIsolated.min_points) return {};
+    if (groups.places() < 2) return {};
     const double usual = links[(first + links.size()) / 2].length;
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);

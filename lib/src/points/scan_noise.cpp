@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "points/heuristics.h"
 
@@ -85,7 +86,7 @@ Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
         squares += w * v * v.transpose();
         ++plane.points;
     });
-    if (plane.points <= kScan.min_neighbours || !(total > 0)) return {};
+    if (plane.points < kCommon.quadric || !(total > 0)) return {};
     sum /= total;
     const Eigen::Matrix3d covariance = squares / total - sum * sum.transpose();
     plane.center = origin + sum;
@@ -111,7 +112,7 @@ double measure_layer_thickness(const std::vector<Vec3>& points, double radius, c
     expect_radius(radius, "measure_layer_thickness");
     if (points.empty()) return 0;
     const Neighbourhoods cloud(points, radius);
-    const std::size_t step = (points.size() + kScan.samples - 1) / kScan.samples;
+    const std::size_t step = (points.size() + kCommon.sample - 1) / kCommon.sample;
     std::vector<double> distance((points.size() + step - 1) / step, -1.0);
     run.check();
     tbb::parallel_for(std::size_t(0), distance.size(), [&](std::size_t n) {
@@ -137,7 +138,7 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     // Starts from the coarsest size: in a ball of a few spacings, even points that fill space are few enough to fit a
     // plane.
     for (int k = kScan.coarsest; k >= 0; --k) {
-        const double h = spacing * std::pow(kScan.growth, k);
+        const double h = spacing * std::pow(kCommon.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;
         const ScanVoxelSize finer{h, measure_layer_thickness(points, kScan.plane_voxels * h, run)};
         const bool holds = finer.thickness <= (thick && !thin ? kScan.clean_fraction : kScan.thin_fraction) * h;

@@ -8,10 +8,10 @@
 #include <limits>
 #include <numeric>
 
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/points.h"
-#include "points/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -81,7 +81,7 @@ std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std:
 
 SpacingStatistics measure_spacing(const std::vector<Vec3>& points) {
     if (points.size() < 2) return {};
-    const std::size_t step = (points.size() + kPointSpacing.queries - 1) / kPointSpacing.queries;
+    const std::size_t step = (points.size() + kCommon.sample - 1) / kCommon.sample;
     const detail::KdTree tree(points);
     std::vector<double> distances((points.size() + step - 1) / step);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, distances.size(), 256), [&](const auto& range) {

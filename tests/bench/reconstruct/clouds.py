@@ -2,13 +2,20 @@
 import numpy as np
 
 
+def sample_with_normals(vertices, triangles, count, random):
+    """Points on the triangles, uniform by area, and the unit normals there."""
+    corners = vertices[triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(across, axis=1)
+    drawn = random.choice(len(triangles), count, p=areas / areas.sum())
+    a, b, c = np.moveaxis(corners[drawn], 1, 0)
+    root, fraction = np.sqrt(random.random((count, 1))), random.random((count, 1))
+    return a * (1 - root) + b * root * (1 - fraction) + c * root * fraction, across[drawn] / areas[drawn, None]
+
+
 def sample(vertices, triangles, count, random):
     """Points on the triangles, uniform by area."""
-    corners = vertices[triangles]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    a, b, c = np.moveaxis(corners[random.choice(len(triangles), count, p=areas / areas.sum())], 1, 0)
-    root, fraction = np.sqrt(random.random((count, 1))), random.random((count, 1))
-    return a * (1 - root) + b * root * (1 - fraction) + c * root * fraction
+    return sample_with_normals(vertices, triangles, count, random)[0]
 
 
 def cloud(mesh, count, noise=0, outliers=0, seed=1):

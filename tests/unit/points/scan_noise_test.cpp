@@ -50,7 +50,7 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
 }
 
 TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
-    // 2.5 voxels of 4.8 spacings cover the whole sphere, or a large part of it.
+    // 2.5 voxels of 5.7 spacings cover the whole sphere, or a large part of it.
     for (const int count : {50, 100, 300, 1000}) {
         const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
         const double spacing = 6 * std::sqrt(M_PI / count);
@@ -64,10 +64,10 @@ TEST_CASE("choose_scan_voxel_size: two sides of a plate are no noise, points tha
     const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
     plate.insert(plate.end(), above.begin(), above.end());
     CHECK(choose_scan_voxel_size(plate, 1).voxel_size == Approx(1));
-    // If the plate is filled, the mean distance of points from its middle plane is 5/4: 1.25^6 is the first size for
-    // which 0.35 voxels exceed it.
+    // If the plate is filled, the mean distance of points from its middle plane is 5/4: 4 is the first power of the
+    // square root of 2 of which 0.35 voxels exceed it.
     const std::vector<Vec3> filled = test::box_cloud(50000, {{0, 0, 0}, {100, 100, 5}}, 7);
-    CHECK(choose_scan_voxel_size(filled, 1).voxel_size == Approx(std::pow(1.25, 6)));
+    CHECK(choose_scan_voxel_size(filled, 1).voxel_size == Approx(4));
 }
 
 TEST_CASE("choose_scan_voxel_size: the spacing for a clean scan, coarser than the noise for a noisy one") {

@@ -2,19 +2,18 @@
 #include <cmath>
 #include <vector>
 
-#include "cloud/indicator/heuristics.h"
+#include "base/heuristics.h"
 #include "covol/domain.h"
-#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
 
-/// Area of the surface around each point, world units squared, from the disc that reaches to its eighth neighbour. A
-/// density on a lattice would also count points of the opposite side of thin parts.
+/// Area of the surface around each point, world units squared, from the disc that reaches to the last neighbour of its
+/// ring. A density on a lattice would also count points of the opposite side of thin parts.
 [[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<double> areas(points.size());
-    for_nearest(cells, spacing, kAreas.neighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+    for_nearest(cells, spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         areas[point] = near.empty() ? spacing * spacing : M_PI * near.back().squared / double(near.size());
     });
     return areas;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/indicator/patches.h"
@@ -15,6 +16,9 @@
 
 namespace covol::cloud {
 namespace {
+
+// Mean change of the normals, 1 - cosine, at which they have converged: further updates do not change the surface.
+constexpr double kSteady = 1e-4;
 
 /// The mean of the indicator over each cell's points, minus 1/2.
 std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
@@ -47,18 +51,18 @@ void Iteration::run(const Stage& stage, Orientation& result) {
     if (last_) field.start_from(last_->indicator());
     stage_ = stage;
     if (result.normals.empty()) estimate_normals(stage.cell, result);
-    for (int n = 0; n < stage.iterations; ++n) {
+    for (int n = 0; n < kIteration.updates; ++n) {
         ++result.iterations;
-        if (turn(field, result, kIteration.cycles) < kIteration.steady) break;
+        if (turn(field, result, 1) < kSteady) break;
     }
     turn_patches(field, result);
-    if (stage.is_last) turn(field, result, kIteration.last_cycles);
+    if (stage.is_last) turn(field, result, kConvergedCycles);
     last_.emplace(std::move(field));
 }
 
 void Iteration::mend(double spacing, Orientation& result) {
     result.mended = repair_torn(points_, spacing, result.normals);
-    if (result.mended > 0) solve(*last_, result, kIteration.last_cycles);
+    if (result.mended > 0) solve(*last_, result, kConvergedCycles);
 }
 
 void Iteration::estimate_normals(double cell, Orientation& result) const {
@@ -99,9 +103,9 @@ double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
 /// indicator differs from 1/2. All such patches are therefore turned at once on trial, and those stay turned whose mean
 /// comes closer to 1/2.
 void Iteration::turn_patches(WindingField& field, Orientation& result) {
-    const PointCells cells(points_, kIteration.patch_cells * field.indicator().stack().cell());
+    const PointCells cells(points_, kCloud.coarse * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
-    for (int round = 0; round < kIteration.patch_rounds; ++round) {
+    for (int round = 0; round < kCommon.rounds; ++round) {
         turn(field, result, kIteration.patch_cycles);  // makes the indicator that of the current normals
         const std::vector<double> off = mean_off(cells, field.indicator());
         const std::vector<int> patch = patches_of(beside, sides_of(off));
@@ -129,8 +133,9 @@ void Iteration::turn_patches(WindingField& field, Orientation& result) {
             else
                 result.normals[point] = before[point];
         });
-        for (int n = 0; n < kIteration.after_turning; ++n) turn(field, result, kIteration.patch_cycles);
-        if (stayed < kIteration.few_stayed * double(points_.size())) return;
+        for (int n = 0; n < kCloud.settling; ++n) turn(field, result, kIteration.patch_cycles);
+        // The remaining patches may alternate.
+        if (stayed < kCloud.few * double(points_.size())) return;
     }
 }
 

@@ -10,8 +10,7 @@ namespace covol::cloud {
 
 /// A stack of grids and the iterations on it.
 struct Stage {
-    double cell;     ///< of the finest grid, world units
-    int iterations;  ///< at most
+    double cell;  ///< of the finest grid, world units
     bool is_last;
     double enclosed;  ///< indicator from which on a point counts as enclosed by another part
 };

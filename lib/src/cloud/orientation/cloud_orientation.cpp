@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "cloud/indicator/consistency.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/filled.h"
 #include "cloud/orientation/given_sides.h"
@@ -25,12 +27,12 @@ using cloud::is_settled;
 
 /// Fraction of the surface that is far from every point.
 double bare_fraction(const CloudOrientation& cloud) {
-    const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    const double reach = kCloud.coarse * std::max(cloud.scale.spacing, cloud.scale.noise);
     return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
 }
 
 bool does_enclose(const CloudOrientation& cloud) {
-    return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
+    return doubt(cloud.orientation) < kCloud.some || bare_fraction(cloud) < kCloud.some;
 }
 /// Recomputes the indicator if it is too coarse for the detail of its normals.
 void refine(CloudOrientation& cloud, const RunContext& run) {
@@ -40,25 +42,24 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
     const double first =
         is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
     const double cell = cloud::indicator_cell(cloud.points, first);
-    if (o.indicator->cell() > kOrientation.coarse * cell)
-        o.indicator = cloud::indicator_of(cloud.points, o, first, run);
-    if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
-        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
-        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
+    if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
+    if (!is_settled(o) && noise < kOrientation.sharp * spacing &&
+        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kCloud.some)
+        o.indicator = cloud::indicator_of(cloud.points, o, first / kCommon.growth, run);
 }
 
 /// For sheets, as in scans of one side or from the air: neighbours agree on one side everywhere, the one from which
 /// most points are seen. @return whether they do and the surface does not miss more points
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
     // With more noise, neighbours may lie above one another, and quadrics form handles where there are no points.
-    if (cloud.scale.noise > kOrientation.noise_of_sheets * cloud.scale.spacing) return false;
+    if (cloud.scale.noise > kOrientation.sharp * cloud.scale.spacing) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
                                               cloud::towards_sky(cloud.points, cloud.scale));
     hints.is_outward = true;
     cloud::GivenSides sheets =
         cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
-    if (!sheets.report.used || sheets.torn > kOrientation.few_torn) return false;
+    if (!sheets.report.used || sheets.torn > kCloud.few) return false;
     cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
     if (fraction_missed(*sheets.orientation.screened, cloud.points, reach) >
         fraction_missed(*cloud.orientation.indicator, cloud.points, reach))
@@ -71,11 +72,12 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 /// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);
-    const bool mostly_bare = bare_fraction(cloud) > kOrientation.mostly_bare;
+    // The surface that closes the gaps is larger than the one with points.
+    const bool mostly_bare = bare_fraction(cloud) > 0.5;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most
     // points.
-    cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
+    cloud.encloses = (!mostly_bare || passed < kCloud.some) &&
                      passed < kOrientation.fewer_passed * fraction_missed(*seen.indicator, cloud.points, reach);
     if (cloud.encloses) return;
     cloud.orientation = std::move(seen);
@@ -113,7 +115,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.has_quadrics = false;
         return;
     }
-    const bool is_certain = report.used && given.torn < kOrientation.few_torn && is_settled(given.orientation);
+    const bool is_certain = report.used && given.torn < kCloud.few && is_settled(given.orientation);
     if (!is_certain) {
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
@@ -121,8 +123,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         // Only given normals identify walls inside a solid, of which some points may remain: they are then not
         // overruled.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
-            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
-                kOrientation.contradicted &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kCloud.some &&
             // In narrow folds it is the computed normals that are wrong, and their surface misses more points.
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
                 fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
@@ -154,7 +155,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
         cloud.points = merge_close_points(points, 0);
         cloud.scale = measure_cloud_scale(cloud.points, run);
         // If there are many stray points, some can be detected only after others were removed.
-        for (int round = 0; round < kOrientation.stray_rounds; ++round) {
+        for (int round = 0; round < kCommon.rounds; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
             std::size_t kept = 0;
             for (std::size_t n = 0; n < stray.size(); ++n)
@@ -162,7 +163,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
             const std::size_t gone = stray.size() - kept;
             cloud.stray += gone;
             cloud.points.resize(kept);
-            if (double(gone) < kOrientation.many_stray * double(stray.size())) break;
+            if (double(gone) < kCloud.few * double(stray.size())) break;
         }
         choose_orientation(cloud, carried(hints, points, cloud.points), run);
     });

@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/indicator/iteration.h"
 #include "cloud/orientation/heuristics.h"
@@ -52,13 +54,13 @@ double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / st
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * kFilled.min_neighbours || !(spacing > 0)) return false;  // an eighth: 12 times the minimum
+    if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth: 12 times the minimum
     const PointCells cells(points, spacing);
-    std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
+    std::vector<Neighbourhood> around(std::min(points.size(), kCommon.sample));
     // Not at regular intervals, which would sample points in rows at the same position of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
-    for (int n = 0; n < kMaxRadii; ++n, radius *= kCloudScale.growth) {
+    for (int n = 0; n < kMaxRadii; ++n, radius *= kCommon.growth) {
         run.check();
         tbb::parallel_for(std::size_t(0), around.size(),
                           [&](std::size_t m) { around[m] = spread_around(cells, at(m), radius); });
@@ -68,7 +70,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
             return median(std::move(values));
         };
         const double count = median_of([](const Neighbourhood& a) { return a.count; });
-        if (count < kFilled.min_neighbours) continue;
+        if (count < double(kCommon.ring)) continue;
         if (count > all / 8) return true;
         const double thickness = median_of([](const Neighbourhood& a) { return a.thickness; });
         if (thickness < std::min(kFilled.min_thickness, kFilled.thick * expected_thickness(count))) return false;
@@ -78,9 +80,9 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
 
 Orientation orient_filled(const std::vector<Vec3>& points, const CloudScale& scale) {
     // For evenly random points, a ball of radius near_reach contains eleven others.
-    const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / 11);
-    StackField density = spread(grid_around(points, {}, kFilled.cell_spacings * spacing), points,
-                                std::vector<double>(points.size(), 1.0));
+    const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / double(kCommon.quadric - 1));
+    StackField density =
+        spread(grid_around(points, {}, kCloud.coarse * spacing), points, std::vector<double>(points.size(), 1.0));
     std::vector<double> values(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = density.value_at(points[n]); });
     const double within = median(std::move(values));

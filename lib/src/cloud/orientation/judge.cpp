@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/points.h"
@@ -13,22 +14,17 @@ namespace covol::cloud {
 
 double finest_cell(const CloudScale& scale, std::size_t points) {
     const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.max_sampled));
-    return std::max(kOrientation.cell_spacings * apart, kOrientation.cell_noises * scale.noise);
+    return std::max(kOrientation.cell_spacings * apart, scale.noise);
 }
 
 double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
     return std::max(finest_cell(scale, points.size()), indicator_side(points) / kOrientation.first_along);
 }
-namespace {
 
-double weighted_doubt(const Orientation& o, double weight) {
-    return o.turned + weight * std::max(0.0, o.off_half - kOrientation.off_half);
-}
+// The mean of the indicator deviates by at most 1/2, and twice its deviation is thus a fraction as well.
+double doubt(const Orientation& o) { return o.turned + 2 * std::max(0.0, o.off_half - kCloud.some); }
 
-}  // namespace
-
-double doubt(const Orientation& o) { return weighted_doubt(o, kOrientation.off_weight); }
-bool is_settled(const Orientation& o) { return weighted_doubt(o, 1) < kGivenSides.few_turned; }
+bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }
 
 double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     std::vector<char> passed(points.size());

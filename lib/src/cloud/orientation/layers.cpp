@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
@@ -76,7 +77,7 @@ private:
 /// The indicator's surface.
 struct Level {
     Level(const WindingField& field, const PointCells& points) {
-        const double cell = field.indicator().stack().cell(), reach = kLayers.bare_cells * cell;
+        const double cell = field.indicator().stack().cell(), reach = kCloud.coarse * cell;
         make_indicator(field)->crossed([&](const WorldBox& box) {
             middles.push_back(times(0.5, plus(box.min, box.max)));
             const double side = (box.max[0] - box.min[0]) / cell;
@@ -96,17 +97,17 @@ void turn(const Patch& patch, Orientation& orientation) {
 std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& points, const std::vector<Vec3>& free,
                               double between, Orientation& orientation, const RunContext& run) {
     std::vector<char> turned(points.size(), 0);
-    const PointCells cells(points, kLayers.cell * between);
+    const PointCells cells(points, kCloud.coarse * between);
     std::vector<Patch> patches = Opposed(cells, free, between).patches();
     patches.resize(std::min<std::size_t>(patches.size(), kLayers.max_patches));
     const double cell = field.indicator().stack().cell();
     double bare = Level(field, cells).bare;
     for (const Patch& patch : patches) {
-        if (patch.size() < kLayers.min_points) break;
+        if (patch.size() < kCommon.quadric) break;
         run.check();
         turn(patch, orientation);
         WindingField now(field.indicator().shared_stack());
-        solve(now, points, orientation, kIndicator.cycles_from_nothing, run);
+        solve(now, points, orientation, kConvergedCycles, run);
         scale_to_half(now, points);
         const Level level(now, cells);
         const PointCells surface(level.middles, kLayers.farthest_layer * between);

@@ -5,9 +5,10 @@
 #include <cmath>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
-#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
@@ -17,28 +18,28 @@ constexpr std::size_t kBeside = 16;
 
 /// Median distance to the last neighbour, over a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
-    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kCommon.sample);
     std::vector<double> reach(count, -1);
     for_nearest(
-        cells, spacing, kStray.neighbours,
+        cells, spacing, kCommon.ring,
         [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-            reach[point] = near.size() < kStray.neighbours ? 1e300 : std::sqrt(near.back().squared);
+            reach[point] = near.size() < kCommon.ring ? 1e300 : std::sqrt(near.back().squared);
         },
         [&](std::size_t n) { return n % step == 0; });
     std::erase(reach, -1);
     return median(std::move(reach));
 }
 
-/// Whether fewer than kStray.neighbours points lie within a distance.
+/// Whether fewer than kCommon.ring points lie within a distance.
 bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
     const Vec3& p = cells.sorted()[n];
     std::size_t found = 0;
     const auto has_enough_neighbours = [&](std::size_t begin, std::size_t end) {
-        for (std::size_t m = begin; m < end && found < kStray.neighbours; ++m) {
+        for (std::size_t m = begin; m < end && found < kCommon.ring; ++m) {
             const Vec3 to = minus(cells.sorted()[m], p);
             found += m != n && dot(to, to) <= distance * distance;
         }
-        return found >= kStray.neighbours;
+        return found >= kCommon.ring;
     };
     // For most points, the neighbours in the sorted order are sufficient.
     if (has_enough_neighbours(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
@@ -52,8 +53,9 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
 
 std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
-    if (points.size() <= 2 * kStray.neighbours) return stray;
-    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, kStray.cell_noises * scale.noise));
+    if (points.size() <= 2 * kCommon.ring) return stray;
+    // In a layer several spacings thick, a cell of about one spacing has few points.
+    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, scale.noise));
     const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> isolated(points.size());
@@ -63,10 +65,10 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
     });
     run.check();
     for_nearest(
-        cells, scale.spacing, kStray.neighbours,
+        cells, scale.spacing, kCommon.ring,
         [&](std::uint32_t point, const std::vector<Neighbour>& near) {
             stray[point] = 1;
-            if (near.size() < kStray.neighbours) return;
+            if (near.size() < kCommon.ring) return;
             const auto [whole, squares] = moments_of(cells, points[point], near);
             const double count = double(near.size());
             const Eigen::Vector3d mean = whole / count;
@@ -75,7 +77,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
                          reach = std::sqrt(near.back().squared);
             // The farther the neighbours, the flatter they must be.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
-            stray[point] = off * reach / far_reach > kStray.off_plane;
+            stray[point] = off * reach / far_reach > kCloud.flat;
         },
         [&](std::size_t n) { return isolated[n] != 0; });
     return stray;

@@ -7,11 +7,12 @@
 #include <cstring>
 
 #include "cloud/poisson/block_kernel.h"
-#include "cloud/poisson/heuristics.h"
 #include "cloud/poisson/spread.h"
 
 namespace covol::cloud {
 namespace {
+
+constexpr int kCoarsestSweeps = 32;  // of Gauss-Seidel on the coarsest grid, one block, which are almost its solution
 
 template <typename Visit>
 void for_blocks(std::size_t count, Visit visit) {
@@ -196,7 +197,7 @@ void WindingField::cycle(std::size_t l) {
     set_ghosts(l);
     if (l + 1 == levels_.size()) {
         const std::array<int, 3>& end = solution_.stack().end();
-        for (int n = 0; n < kWinding.coarsest_sweeps; ++n) {
+        for (int n = 0; n < kCoarsestSweeps; ++n) {
             sweep(l);
             for (int at = 0; at < int(kBlockNodes); ++at) {
                 const int i = at / 64, j = at / 8 % 8, k = at % 8;
@@ -206,13 +207,13 @@ void WindingField::cycle(std::size_t l) {
         }
         return;
     }
-    for (int n = 0; n < kWinding.sweeps; ++n) sweep(l);
+    sweep(l);
     find_residual(l);
     restrict_from(l + 1);
     cycle(l + 1);
     correct(l);
     set_ghosts(l);
-    for (int n = 0; n < kWinding.sweeps; ++n) sweep(l);
+    sweep(l);
 }
 
 void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles,

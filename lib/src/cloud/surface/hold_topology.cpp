@@ -11,14 +11,15 @@
 #include <queue>
 #include <vector>
 
-#include "cloud/surface/heuristics.h"
-
 namespace covol::cloud {
 namespace {
 
 using openvdb::Coord;
 
 constexpr std::size_t kCheckEvery = 10'000;  // voxels between two checks for cancellation
+// [voxels] Distance from the surface of voxels that keep their sign: far less than a voxel, so that its value cannot be
+// seen, but not 0, so that triangles do not degenerate.
+constexpr double kHeld = 0.1;
 
 /// The 26 neighbours of a voxel, one bit each, with their adjacency.
 struct Neighbourhood {
@@ -180,7 +181,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
             queue.push({depth_at.getValue(beside), beside});
         }
     }
-    const auto small = float(kHold.held_voxels * target.voxelSize()[0]);
+    const auto small = float(kHeld * target.voxelSize()[0]);
     for (auto value = kept.cbeginValueOn(); value; ++value) {
         const Coord at = value.getCoord();
         target_at.setValue(at, target_at.getValue(at) < 0 ? small : -small);

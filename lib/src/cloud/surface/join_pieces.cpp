@@ -118,11 +118,11 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
     const double voxel = domain_of(level_set).voxel_size;
     const PointCells cells(points, apart);
     std::vector<PointCells::Range> ranges;
+    // Otherwise the surface ends there.
     const auto has_points_along = [&](const Gap& gap) {
         const int steps = 1 + int(2 * gap.length / voxel);
         for (int n = 0; n <= steps; ++n)
-            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))),
-                                  kJoin.near * apart))
+            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))), apart))
                 return false;
         return true;
     };
@@ -138,12 +138,13 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
             continue;
         }
         std::vector<double> around;
-        cells.find(box_around(gap, kJoin.around * apart), ranges);
+        cells.find(box_around(gap, apart), ranges);
         for (const PointCells::Range& range : ranges)
             for (std::uint32_t n = range.begin; n < range.end; ++n)
-                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kJoin.around * apart)
+                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < apart)
                     around.push_back(off);
-        fill(level_set, gap, std::max(std::min(median(std::move(around)), kJoin.thickest * apart), voxel));
+        // Parts that are thicker than the distance between points do not tear.
+        fill(level_set, gap, std::max(std::min(median(std::move(around)), 0.5 * apart), voxel));
         ++joined;
         const detail::KdTree own(std::move(next->surface));
         small.erase(next);
