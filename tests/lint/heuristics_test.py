@@ -12,9 +12,10 @@ from heuristics import read_heuristics  # noqa: E402
 
 # Floating-point constants in a .cpp of a folder that has a heuristics.h. Those that are not heuristic: tolerances of solvers, mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
+DECLARED = re.compile(r"^(?:struct|COVOL_HEURISTICS \w+) (\w+)", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
-    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat", 
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMaxReach",
@@ -29,7 +30,7 @@ ALLOWED = {
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "meshing/relax.cpp:kGain", "meshing/relax.cpp:kStep", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
-    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain", 
+    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain",
 }
 
 
@@ -48,6 +49,9 @@ def findings(root):
             yield f"{h.name}: docs/heuristics.md has {values[h.name]}, the header {h.text}; run tests/bench/sensitivity.py"
     for name in sorted(rows - {h.name for h in heuristics}):
         yield f"docs/heuristics.md: {name}: no such constant"
+    declared = [name for path in sorted((root / "lib/src").rglob("heuristics.h")) for name in DECLARED.findall(path.read_text())]
+    for name in sorted({name for name in declared if declared.count(name) > 1}):
+        yield f"lib/src: {name} is declared more than once: the linker would merge them in the build that measures"
     for h in {h.name: h for h in heuristics}.values():
         if sum(other.name == h.name for other in heuristics) > 1:
             yield f"{h.name}: more than once"
