@@ -12,6 +12,7 @@ from heuristics import read_heuristics  # noqa: E402
 
 # Floating-point constants in a .cpp of a folder that has a heuristics.h. Those that are not heuristic: tolerances of solvers, mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
+DECLARED = re.compile(r"^(?:struct|COVOL_HEURISTICS \w+) (\w+)", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
     "cloud/indicator/iteration.cpp:kSteady", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
@@ -49,6 +50,9 @@ def findings(root):
             yield f"{h.name}: docs/heuristics.md has {values[h.name]}, the header {h.text}; run tests/bench/sensitivity.py"
     for name in sorted(rows - {h.name for h in heuristics}):
         yield f"docs/heuristics.md: {name}: no such constant"
+    declared = [name for path in sorted((root / "lib/src").rglob("heuristics.h")) for name in DECLARED.findall(path.read_text())]
+    for name in sorted({name for name in declared if declared.count(name) > 1}):
+        yield f"lib/src: {name} is declared more than once: the linker would merge them in the build that measures"
     for h in {h.name: h for h in heuristics}.values():
         if sum(other.name == h.name for other in heuristics) > 1:
             yield f"{h.name}: more than once"

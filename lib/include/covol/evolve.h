@@ -53,7 +53,7 @@ inline constexpr auto kOptions<EvolveOptions> = std::tuple{
     Option{"epsilon", &EvolveOptions::epsilon, kPositive, Group::Numerics, "regularises the norm of grad u"},
     Option{"attraction_range", &EvolveOptions::attraction_range, kLength, Group::Flow,
            "the points attract fully up to half of this distance, and not at all beyond it; 0: unlimited",
-           "after tagging 8vx, or 0 if the image has no weight; else 5vx", "0"},
+           "6vx; 0 after tagging without an image; 3 spacings after the start 'cloud'", "0"},
     Option{"edge_epsilon", &EvolveOptions::edge_epsilon, kPositive, with_image(Group::Numerics),
            "regularises the norm of grad g"},
     Option{"image_yields", &EvolveOptions::image_yields, kFraction, with_image(Group::Flow),

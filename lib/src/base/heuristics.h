@@ -41,7 +41,8 @@ template <typename T>
 
 /// Principles that all steps share: samples, neighbourhoods, significance, repetition and margins.
 struct CommonHeuristics {
-    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %.
+    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %. Also the
+    /// maximum for steps whose time grows with the square of the number.
     std::size_t sample = heuristic("common.sample", 4000);
     /// [points] Nearest neighbours that show what is around a point of a surface: about one ring.
     std::size_t ring = heuristic("common.ring", 8);
@@ -49,7 +50,8 @@ struct CommonHeuristics {
     std::size_t quadric = heuristic("common.quadric", 12);
     /// [standard errors] Difference from which on a measured value is not explained by chance.
     double errors = heuristic("common.errors", 4.0);
-    /// [rounds] Maximum number in which a repair is repeated until it changes nothing.
+    /// [rounds] Maximum number in which a step is repeated until it changes nothing: a repair, a reweighted fit, the
+    /// body of marks and image, the passes of the image between contours.
     int rounds = heuristic("common.rounds", 4);
     /// [ratio] Of a length to the one before it when a suitable scale is searched: an area doubles.
     double growth = heuristic("common.growth", 1.4142135623730951);
@@ -60,8 +62,8 @@ struct CommonHeuristics {
     double same_place = heuristic("common.same_place", 1e-3);
     /// [fraction] Of a whole, that is negligible.
     double negligible = heuristic("common.negligible", 0.02);
-    /// [cosine] Minimum between the normals of a triangle, or of neighbouring sheets, before and after a change: 60
-    /// degrees.
+    /// [cosine] Minimum between the normals of a triangle before and after a change, of neighbouring sheets, and between
+    /// a path that leaves a surface and its normal: 60 degrees.
     double turn = heuristic("common.turn", 0.5);
 };
 COVOL_HEURISTICS CommonHeuristics kCommon{};

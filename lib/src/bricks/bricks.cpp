@@ -53,7 +53,7 @@ Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domai
     if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
     // A body that the image cuts off is solved beyond the image's end, too.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
-    return beyond > 2 * coarse.voxel_size ? widened(own, kCommon.beyond_voxels) : own;
+    return beyond > 2 * coarse.voxel_size ? widened(own, int(kCommon.beyond_voxels)) : own;
 }
 
 /// The fine band at a sample of the coarse band's leaves, spread over all of it.

@@ -81,9 +81,9 @@ public:
 private:
     void read(const PointCloud& cloud);
     void check_inside(const Line& line) const;
-    /// Maximum deviation of marks from their common slice: of the image, or relative to the marks' extent.
-    [[nodiscard]] double same_slice(double spacing, double extent) const {
-        return has_image_ ? kContours.same_slice * spacing : kCommon.same_place * extent;
+    /// Maximum deviation of marks from their common slice: relative to the image's spacing, or else to a length.
+    [[nodiscard]] double same_slice(double spacing, double length) const {
+        return has_image_ ? kContours.same_slice * spacing : kCommon.same_place * length;
     }
     void find_planes(Line& line) const;
     void choose_plane();

@@ -82,7 +82,7 @@ public:
 
 private:
     FloatGridPtr guess_;
-    double exact_;  ///< below it no voxel from which the distance is interpolated is clamped
+    double exact_;  ///< below it hardly any voxel from which the distance is interpolated is clamped
     detail::KdTree surface_;
 };
 

@@ -22,8 +22,8 @@ constexpr double kExact = 1e-3;
 // Weight of the whole among the parts, in weights of a part at its centre: it only has to continue them at their ends.
 constexpr double kWholeWeight = 1e-3;
 
-/// Number of marks whose normals are optimised without initial values: the time grows with the cube of the number, so
-/// that several initial values for a third of the marks take about as long as the whole.
+/// Number of marks whose normals are optimised first, without known normals: the time grows with the cube of the
+/// number, so that several attempts with a third of the marks take less time than one with the whole.
 std::size_t oriented_marks() { return kMarks.whole / 3; }
 
 /// Number of marks in a part: its core, a fourth of them, lies within half of its radius and is described by a quadric.

@@ -360,7 +360,8 @@ void Guide::weigh(bool first) {
     }
     std::vector<ValidationResult> validations;
     if (first) {
-        for (int n = 0; n < kCommon.rounds; ++n)
+        constexpr int kPriors = 4;  // each half as wide as the one before
+        for (int n = 0; n < kPriors; ++n)
             validations.push_back(cross_validate(field, broad_ * std::pow(0.5, n)));
     } else {
         validations.push_back(cross_validate(field, prior_));

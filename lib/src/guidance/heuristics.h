@@ -26,12 +26,12 @@ struct GuidanceHeuristics {
 COVOL_HEURISTICS GuidanceHeuristics kGuide{};
 
 /// From one image of a time-lapse to the next one: motion.cpp.
-struct MotionHeuristics {
+struct TimeLapseHeuristics {
     /// [of the mismatch] Maximum that a translation may leave; otherwise it is rejected.
-    double min_gain = heuristic("motion.min_gain", 0.9);
+    double min_gain = heuristic("time_lapse.min_gain", 0.9);
     /// [of the radius of the body] Correlation length of the offsets.
-    double alike = heuristic("motion.alike", 0.5);
+    double alike = heuristic("time_lapse.alike", 0.5);
 };
-COVOL_HEURISTICS MotionHeuristics kMotion{};
+COVOL_HEURISTICS TimeLapseHeuristics kTimeLapse{};
 
 }  // namespace covol

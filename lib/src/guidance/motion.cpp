@@ -269,14 +269,14 @@ void Motion::translate() {
             run_.check();
         }
     // A small gain may result from noise alone.
-    if (!(best < kMotion.min_gain * standing)) translation_ = {0, 0, 0};
+    if (!(best < kTimeLapse.min_gain * standing)) translation_ = {0, 0, 0};
 }
 
 /// Matches in two passes: an estimated offset is a few percent too short, because the positions between the old surface
 /// and the new one resemble neither.
 void Motion::match() {
     offset_.assign(patches_.size(), 0.0);
-    const OffsetField field(patches_, std::max(kMotion.alike * radius(), 4 * h_));
+    const OffsetField field(patches_, std::max(kTimeLapse.alike * radius(), 4 * h_));
     const std::vector<Mismatch> of_itself = compare(known_.templates);
     for (int pass = 0; pass < kGuide.iterations; ++pass) {
         const std::vector<Mismatch> now = compare(read_now());

@@ -160,8 +160,8 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
     for (std::size_t i = 0; i < held.marks.size(); ++i)
         if (wrong[i] > 0.5) suspects.push_back(held.marks[i]);
     // Several suspects close to each other lie on a part that the body lacks. At random positions on a surface with
-    // this mean distance between nearest ones, a ring of marks lies within that radius.
-    const double beside = std::sqrt(4 * double(kCommon.ring) / std::numbers::pi) * marks_.spacing;
+    // this median distance between nearest ones, a ring of marks lies within that radius.
+    const double beside = std::sqrt(double(kCommon.ring) / std::numbers::ln2) * marks_.spacing;
     std::vector<Vec3> all = wrong_;
     for (const Vec3& suspect : suspects) {
         const auto neighbours = std::count_if(suspects.begin(), suspects.end(), [&](const Vec3& other) {

@@ -47,7 +47,8 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
     const double maximum = away[away.size() * 99 / 100];
-    if (far < kMaxReach * h || maximum >= kMaxReach * h) return;  // without it the others would not fit either
+    // Otherwise the others hardly fit without it: the voxels are too small.
+    if (far < kMaxReach * h || maximum >= kMaxReach / 2 * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
                                         " times as far as 99 % of them; remove it if it is a mistake");

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "covol/domain.h"
 #include "segment/problem.h"
 #include "segment/step.h"
 

@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "base/disjoint_sets.h"
+#include "covol/domain.h"
 #include "grid/leaf_columns.h"
 #include "grid/sign_masks.h"
 #include "surface/heuristics.h"

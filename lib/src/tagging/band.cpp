@@ -36,7 +36,7 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
     if (tagging.has_core(h)) {
         report.leaks = closes_at(tag_distance + h);
     } else {
-        // If a smaller D, down to about half of it, still gives a core, the body is thin and closed; otherwise there
+        // If a smaller D, down to 0.6 of it, still gives a core, the body is thin and closed; otherwise there
         // are only walls.
         report.leaks = true;
         double smaller = tag_distance;

@@ -74,7 +74,7 @@ FloatGridPtr grown_exterior(const FloatGrid& body, const std::vector<Vec3>& surf
 
 FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const RunContext& run) {
     const Domain domain = domain_of(band);
-    const double reach = kCommon.beyond_voxels * domain.voxel_size;
+    const double reach = (detail::kTrackingWidth + 1) * domain.voxel_size;
     FloatGridPtr closed;
     with_threads(run, [&] {
         std::vector<Vec3> surface;

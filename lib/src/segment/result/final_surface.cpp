@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "cloud/surface/hold_topology.h"
 #include "cloud/surface/sharp_mesh.h"
 #include "covol/clip.h"
@@ -18,7 +19,6 @@
 #include "holes/share_beyond.h"
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
-#include "segment/heuristics.h"
 
 namespace covol::pipeline {
 namespace {

@@ -170,7 +170,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
         // If it ended at the image's end, the flow would turn the wall to a right angle.
-        facts.domain = widened(domain, kCommon.beyond_voxels);
+        facts.domain = widened(domain, int(kCommon.beyond_voxels));
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
     Remarks& remarks = facts.report.remarks;
