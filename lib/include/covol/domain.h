@@ -48,11 +48,12 @@ struct Domain {
 /// @throws Error InvalidInput (an empty box, or one that reaches more than 2^23 voxels from voxel (0,0,0)).
 [[nodiscard]] COVOL_API Domain covering(const Domain& lattice, const WorldBox& box);
 
-/// The voxels of edge h that cover `box`, on a lattice that does not depend on `box`: two parts of an image or of a
-/// cloud share it, so that their grids can be joined.
-/// @param image   the world box of the image, whose voxels are the lattice's if h is their spacing; none: the lattice
-///     begins at the world's origin, or, for a box more than 2^22 voxels from it, at a multiple of 2^22 voxels
-/// @param origin  the centre of voxel (0,0,0) instead, if given
+/// The voxels of edge h that cover `box`. Their lattice does not depend on `box`, so the grids of two parts of an image
+/// or of a cloud can be joined.
+/// @param image   world box of the image: if h is its spacing, the voxels of the lattice are those of the image.
+///     Without an image, the lattice begins at the world's origin or, for a box more than 2^22 voxels from it, at a
+///     multiple of 2^22 voxels
+/// @param origin  centre of voxel (0,0,0); if it is given, it takes precedence over the rules for `image`
 /// @throws Error InvalidOptions, InvalidInput as make_domain and covering.
 [[nodiscard]] COVOL_API Domain choose_domain(const WorldBox& box, double voxel_size,
                                              const std::optional<WorldBox>& image, const std::optional<Vec3>& origin);

@@ -31,7 +31,7 @@ struct PaintedImage {
 /// Finds the labels. @throws Error as find_painted_labels().
 [[nodiscard]] COVOL_API PaintedImage make_painted(const Image& image, const PaintedOptions& options = {});
 
-/// The result of another tool, which marks correct.
+/// A mask, mesh or level set of another program, from which the segmentation starts and which is corrected by marks.
 struct GivenGuess {
     Start start;                ///< as SegmentOptions::guess
     std::optional<Image> mask;  ///< if it is a mask: the mask as in its file, placed on the image

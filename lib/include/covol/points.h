@@ -33,8 +33,8 @@ struct ReadPointsOptions {
     PointSpace space = PointSpace::Unstated;  ///< Unstated: as the format specifies, else World.
     PointOrder order = PointOrder::Unstated;  ///< Unstated: as the format specifies, else XYZ.
     double scale = 1;                         ///< Multiplies lengths (not voxels): 0.001 for micrometres to mm.
-    /// The slice is z / channels: Fiji also counts a multi-point's positions through the channels of a hyperstack. Only
-    /// for points in voxels.
+    /// Number of channels of the hyperstack on which a Fiji multi-point was set. Fiji counts the positions of such
+    /// points through all channels of all slices, so the slice is z / channels. Only for points in voxels.
     int channels = 1;
 };
 

@@ -35,7 +35,7 @@ std::string percent(double fraction) {
     return text.str();
 }
 
-/// The structures while they are made disjoint.
+/// Makes structures disjoint: holds their level sets while overlaps are found and removed.
 class Separation {
 public:
     Separation(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run)

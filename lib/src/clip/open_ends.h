@@ -10,7 +10,7 @@ namespace covol::detail {
 struct ImageFace {
     HalfSpace plane;
     double spacing = 1;
-    /// Depth of a position inside, >= 0.
+    /// Distance of a position from the face, world units; positive inside the image.
     [[nodiscard]] double depth(const Vec3& x) const;
 };
 [[nodiscard]] std::vector<ImageFace> faces_of(const ImageGeometry& geometry);

@@ -314,7 +314,7 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    // An open end may widen by as much as its height.
+    // Beyond an open end the wall slopes outward by at most 45 degrees: the body widens by at most its height there.
     double wider = 0;
     for (const SolidSlice* end : {&slices.front(), &slices.back()})
         if (end->open) wider = std::max(wider, end->end);

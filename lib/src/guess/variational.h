@@ -20,8 +20,9 @@ struct Constraints {
     std::vector<double> seed_value;
     /// Beyond its end nothing is known of the body, which may continue there. Empty: the world has no end.
     Clip world;
-    /// A function known beforehand by its value and gradient at the marks: the energy is that of what f adds to it, and
-    /// value() excludes it. Empty: none.
+    /// Value and gradient, at the marks, of a function that is known beforehand. The constraints at the marks then
+    /// apply to the sum of this function and f, while the energy and value() are those of f alone. Empty: no such
+    /// function.
     std::vector<double> known_value;
     std::vector<Vec3> known_gradient;
     /// For each mark a line along which its normal probably lies, in either direction; the square of its length is the

@@ -7,8 +7,8 @@
 
 namespace covol::guidance {
 
-/// The signed distance to a surface in a wide band: that of the start within its band, beyond it that to the nearest
-/// vertex.
+/// The signed distance to a surface in a wide band. Within the narrow band of the start these are the start's own
+/// values; beyond it, the distance to the nearest vertex of the mesh.
 class WideDistance {
 public:
     /// @param start     a signed distance in a band of kHalfWidthVoxels, negative inside

@@ -13,8 +13,9 @@ struct InferenceHeuristics {
     double coarse_nodes = heuristic("inference.coarse_nodes", 60000);
     /// [voxels] Maximum of a box around the marks: a larger one takes long to read.
     double max_voxels = heuristic("inference.max_voxels", 6.4e7);
-    /// [marks] From which guesses are made, the others are predicted; also the maximum number of positions known to be
-    /// inside, or outside, that are used. They are as far apart as possible.
+    /// [marks] Maximum number from which a guess is made; such a guess predicts the remaining marks. It is also the
+    /// maximum number of positions known to be inside, or outside, that are used. All are chosen as far apart as
+    /// possible.
     std::size_t guess_marks = heuristic("inference.guess_marks", 150);
     /// [spacings] Height above the marks' convex hull, from which a body is improbable.
     double above_hull = heuristic("inference.above_hull", 0.5);
@@ -34,10 +35,11 @@ struct InferenceHeuristics {
     double farthest_miss = heuristic("inference.farthest_miss", 30);
     /// [bits] Minimum information of the image about the sides of a guess, for the image to redraw it.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
-    /// [Dice] Of guess and body, above which they count as equal.
+    /// [Dice] Coefficient between guess and body, above which they count as equal.
     double agreement = heuristic("inference.agreement", 0.9);
-    /// [1 - Dice] Of a result whose error times its area is its volume: fitted to 118 runs of 20 structures with 20, 60
-    /// and 300 marks; of 66 runs of 11 other structures, not used for the fit, 92 % lie in the interval.
+    /// [1 - Dice] Expected value for a result whose error times its area equals its volume. It was fitted to 118 runs
+    /// of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were not used for the fit,
+    /// 92 % lie in the interval.
     double expected_scale = heuristic("inference.expected_scale", 0.47);
     /// [power] With which 1 - Dice increases with that error.
     double expected_power = heuristic("inference.expected_power", 1.15);

@@ -27,8 +27,9 @@ struct IsolatedHeuristics {
     /// [ratio] Minimum of the shortest link to one of them to the longest link among the others: for marks on seven
     /// structures, evenly distributed and on outlines, successive links differ by a factor of at most 1.4.
     double gap = heuristic("isolated.gap", 2.0);
-    /// [median links] Alternative minimum of that shortest link, for several points apart at different places: for
-    /// marks on these structures, links are at most 2.6.
+    /// [median links] Alternative to `gap`: minimum length of the shortest link to an isolated point, because the gap
+    /// may be hidden by several isolated points at different places. For marks on the same seven structures, links are
+    /// at most 2.6.
     double far = heuristic("isolated.far", 6.0);
 };
 COVOL_HEURISTICS IsolatedHeuristics kIsolated{};

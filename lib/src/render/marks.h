@@ -14,7 +14,7 @@ struct Ball {
     Color color;
 };
 
-/// Pixels: the more marks, the smaller.
+/// Radius of the balls in pixels: proportional to the height of the text, and smaller if there are more marks.
 [[nodiscard]] double mark_radius(double text, std::size_t count);
 
 /// Draws the balls that no surface hides; one may lie up to `slack` (world units) behind the surface that it marks.

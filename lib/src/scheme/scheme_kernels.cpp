@@ -309,7 +309,7 @@ void mean_gradient(const float* u, float* out) {
     for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
-/// The arrival of the front along one axis: from the value v at the distance 1/q.
+/// A front that arrives along one axis, from a position at the distance of 1/q voxels whose value is v.
 struct Arrival {
     Lanes v, q;
 };

@@ -135,9 +135,9 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
     }
 }
 
-/// Whether ImageJ would show an image; it would show labels without a display range as black.
+/// Whether ImageJ would show the voxels of an image: it shows labels as black if the file states no display range.
 bool has_display_range(const std::string& path, const FileFacts& facts, double maximum) {
-    constexpr double kLabels = 32;  // grey values of an image exceed this
+    constexpr double kLabels = 32;  // if the maximum is larger, the voxels are taken for grey values
     return facts.format != "ImageJ TIFF" || maximum > kLabels || header_holds(path, "\nmax=");
 }
 

@@ -17,7 +17,7 @@ struct CloudFlags : Given<CloudCleanupOptions> {
 
     /// @param with_inputs  includes --most-points
     void bind(CLI::App& command, bool with_inputs);
-    /// @throws Error InvalidOptions for values that are invalid for every h.
+    /// @throws Error InvalidOptions for values that are invalid whatever the voxel size is.
     void check() const;
     /// @throws UsageError if an option is given, but there is no cloud.
     void check_used(bool has_cloud) const;

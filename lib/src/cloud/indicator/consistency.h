@@ -10,10 +10,11 @@
 
 namespace covol::cloud {
 
-/// The winding number of a solid's border is 1/2 on it and 0 or 1 elsewhere (Xu et al., Globally consistent normal
-/// orientation for point clouds by regularizing the winding-number field, ACM Trans. Graph. 42(4), 2023). It is -1 or 2
-/// in a part that is turned as a whole and in between along the rim of that part. Points of two walls that were
-/// mistaken for one lie inside.
+/// Measures how far the winding number of oriented points is from that of a solid, which is 1/2 on the solid's border
+/// and 0 or 1 elsewhere (Xu et al., Globally consistent normal orientation for point clouds by regularizing the
+/// winding-number field, ACM Trans. Graph. 42(4), 2023). If all normals of a part are reversed, the winding number is
+/// -1 or 2 in that part, with intermediate values along the part's rim. If two walls were mistaken for one, their
+/// points lie inside the solid, where the winding number is not 1/2.
 class Consistency {
 public:
     /// @param points, areas  all of them, world units squared; points and run must outlive the object

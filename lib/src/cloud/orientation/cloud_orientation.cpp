@@ -120,8 +120,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
         const double reach = kOrientation.passed_reach * cloud.scale.spacing;
-        // Only given normals identify walls inside a solid, of which some points may remain: they are then not
-        // overruled.
+        // Walls inside a solid can be identified only by given normals, and some points of such walls may remain.
+        // Therefore given normals are not overruled if they have identified enclosed points.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kCloud.some &&
             // In narrow folds it is the computed normals that are wrong, and their surface misses more points.
@@ -139,7 +139,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.encloses = true;
     }
     report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
-    // Normals of faces do not show the edges between them, and quadrics through one face would extend beyond its edges.
+    // Only the sides of given normals are kept. They may be the normals of flat faces, which do not show where the
+    // edges between the faces are: quadrics fitted to one face would extend beyond its edges.
     if (report.used) cloud::take_directions(*cloud.orientation.indicator, cloud.points, cloud.orientation.normals);
 }
 

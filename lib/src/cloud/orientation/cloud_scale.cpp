@@ -36,7 +36,7 @@ double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matr
     return std::sqrt(std::max(0.0, left) / double(points.size() - 6));
 }
 
-/// The same over the best-fitting plane.
+/// Standard deviation of points from the best-fitting quadric over their best-fitting plane.
 double off_sheet(const std::vector<Eigen::Vector3d>& points) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();

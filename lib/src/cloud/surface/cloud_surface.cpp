@@ -104,8 +104,8 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     const auto minimum = std::size_t(
         std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);
-    // Joins before the indicator's topology is imposed, which may lack torn parts, and after, since that may tear
-    // others.
+    // Pieces that were torn off are joined before the indicator's topology is imposed, because the indicator may lack
+    // them, and again afterwards, because imposing it may tear off others.
     const auto join = [&] {
         const std::size_t joined = cloud::join_pieces(field, cloud.points, std::max(report.spacing, report.noise), run);
         report.joined_pieces += joined;

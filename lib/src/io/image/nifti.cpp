@@ -156,7 +156,7 @@ NiftiAffine qform_of(const NiftiHeader& header) {
     return qform;
 }
 
-/// If neither form has a code: x points to the left, and the image's middle is at 0.
+/// The affine map if sform_code and qform_code are both 0: x points to the left, and the centre of the image is at 0.
 NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     const Vec3 step = pixdim_of(header);
     NiftiAffine base;
@@ -189,7 +189,7 @@ bool is_invertible(const NiftiAffine& affine) {
 
 std::string steps_text(const Vec3& v) { return number(v[0]) + " x " + number(v[1]) + " x " + number(v[2]); }
 
-/// Chooses the form, reports the choice, and warns if the header is inconsistent.
+/// Chooses between sform, qform and pixdim, reports the choice, and warns if the header is inconsistent.
 class NiftiPlace {
 public:
     NiftiPlace(const std::string& path, const NiftiHeader& header, ImageInfo& info, const RunContext& run)

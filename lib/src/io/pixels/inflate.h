@@ -73,7 +73,7 @@ public:
     IndexedInflater(const IndexedInflater&) = delete;
     IndexedInflater& operator=(const IndexedInflater&) = delete;
 
-    /// False if the stream ends before, or is damaged.
+    /// Returns false if the stream is damaged, or ends before `count` bytes.
     bool read(char* out, std::uint64_t count);
     bool skip(std::uint64_t count);
 

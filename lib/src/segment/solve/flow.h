@@ -23,7 +23,7 @@ struct Solution {
     [[nodiscard]] bool has_vanished() const { return solve.stop_reason == StopReason::Vanished; }
 };
 
-/// Intermediate results when a step fails, for SegmentFailed.
+/// The grids that exist when a step fails, for SegmentFailed.
 struct Reached {
     FloatGridPtr start, u, distance, edge;
 };

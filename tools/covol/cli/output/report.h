@@ -38,7 +38,8 @@ namespace covol::tool {
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
 [[nodiscard]] std::string one_line(const MeshDeviation& deviation);
 [[nodiscard]] std::string plain_mesh_line(std::uint64_t triangles);
-/// @param smallest_angle  degrees: 1st percentile. @param deviation  from the level set, voxels
+/// @param smallest_angle  1st percentile of the smallest angles of the triangles, degrees
+/// @param deviation       from the level set, voxels
 [[nodiscard]] std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation);
 
 }  // namespace covol::tool
