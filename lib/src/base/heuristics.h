@@ -41,8 +41,8 @@ template <typename T>
 
 /// Principles that all steps share: samples, neighbourhoods, significance, repetition and margins.
 struct CommonHeuristics {
-    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %. Also the
-    /// maximum for steps whose time grows with the square of the number.
+    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %. Also
+    /// the maximum for steps whose time grows with the square of the number.
     std::size_t sample = heuristic("common.sample", 4000);
     /// [points] Nearest neighbours that show what is around a point of a surface: about one ring.
     std::size_t ring = heuristic("common.ring", 8);
@@ -62,8 +62,8 @@ struct CommonHeuristics {
     double same_place = heuristic("common.same_place", 1e-3);
     /// [fraction] Of a whole, that is negligible.
     double negligible = heuristic("common.negligible", 0.02);
-    /// [cosine] Minimum between the normals of a triangle before and after a change, of neighbouring sheets, and between
-    /// a path that leaves a surface and its normal: 60 degrees.
+    /// [cosine] Minimum between the normals of a triangle before and after a change, of neighbouring sheets, and
+    /// between a path that leaves a surface and its normal: 60 degrees.
     double turn = heuristic("common.turn", 0.5);
 };
 COVOL_HEURISTICS CommonHeuristics kCommon{};

@@ -361,8 +361,7 @@ void Guide::weigh(bool first) {
     std::vector<ValidationResult> validations;
     if (first) {
         constexpr int kPriors = 4;  // each half as wide as the one before
-        for (int n = 0; n < kPriors; ++n)
-            validations.push_back(cross_validate(field, broad_ * std::pow(0.5, n)));
+        for (int n = 0; n < kPriors; ++n) validations.push_back(cross_validate(field, broad_ * std::pow(0.5, n)));
     } else {
         validations.push_back(cross_validate(field, prior_));
     }
