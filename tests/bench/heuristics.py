@@ -5,7 +5,7 @@ import re
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 STRUCT = re.compile(r"((?:///[^\n]*\n)*)struct (\w+)Heuristics \{\n(.*?)\n\};\nCOVOL_HEURISTICS \w+ (\w+)\{\};", re.S)
-FIELD = re.compile(r"((?:    ///[^\n]*\n)*)    ([\w:]+) (\w+) =\s*heuristic\(\"([\w.]+)\", ([^;]+)\);")
+FIELD = re.compile(r"((?:    ///[^\n]*\n)*)    ([\w:]+) (\w+) =\s*(heuristic|limit)\(\"([\w.]+)\", ([^;]+)\);")
 
 
 @dataclasses.dataclass
@@ -19,6 +19,7 @@ class Heuristic:
     folder: str
     step: str      # the comment of the struct
     problem: str   # with the declaration; empty: none
+    is_limit: bool = False  # of time or memory
 
     def scaled(self, factor):
         return max(1, int(self.value * factor + 0.5)) if self.is_count else self.value * factor
@@ -34,13 +35,13 @@ def read_heuristics(source=SOURCE):
         text = path.read_text()
         before = len(found)
         for comment, _, body, _ in STRUCT.findall(text):
-            for about, kind, field, name, value in FIELD.findall(body + "\n"):
+            for about, kind, field, what, name, value in FIELD.findall(body + "\n"):
                 plain = re.sub(r"(?<=\d)[FU]\b|'", "", value)
                 match = re.match(r"\[([^]]+)\] (.+)", words(about), re.S)
                 problem = "expected a comment '[unit] meaning'" if not match else "" if name.endswith("." + field) else f"its name is {name}"
                 unit, meaning = match.groups() if match else ("", "")
                 found.append(Heuristic(name, float(eval(plain, {"__builtins__": {}})), plain.replace(" ", ""), kind not in ("double", "float"), unit, meaning,
-                                       path.parent.relative_to(source / "lib/src").as_posix(), words(comment), problem))
-        if len(found) - before != len(re.findall(r"\bheuristic\(\"", text)) or not re.search(r"struct", text):
+                                       path.parent.relative_to(source / "lib/src").as_posix(), words(comment), problem, what == "limit"))
+        if len(found) - before != len(re.findall(r"\b(?:heuristic|limit)\(\"", text)) or not re.search(r"struct", text):
             found.append(Heuristic(str(path), 0, "", False, "", "", "", "", "a field that is not read: expected `type field = heuristic(\"step.field\", value);` in a struct"))
     return found

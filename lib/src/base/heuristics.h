@@ -13,8 +13,10 @@
 #include <type_traits>
 
 #define COVOL_HEURISTICS inline const
+#define COVOL_CONSTANT inline
 #else
 #define COVOL_HEURISTICS inline constexpr
+#define COVOL_CONSTANT constexpr
 #endif
 
 namespace covol {
@@ -39,6 +41,12 @@ template <typename T>
 }
 #endif
 
+/// A limit of time or memory: only inputs that reach it get a different result.
+template <typename T>
+[[nodiscard]] COVOL_CONSTANT T limit(const char* name, T value) {
+    return heuristic(name, value);
+}
+
 /// Principles that all steps share: samples, neighbourhoods, significance, repetition and margins.
 struct CommonHeuristics {
     /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %. Also
@@ -58,10 +66,17 @@ struct CommonHeuristics {
     /// [voxels] By which a surface is continued beyond the place where it is cut, so that its band is right up to
     /// there: twice the half width of a band.
     double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
+    /// [voxels] Precision of a position that is given by voxels, and thus the smallest length that has to be resolved.
+    double precision_voxels = heuristic("common.precision_voxels", 0.5);
     /// [ratio] Of a distance to the relevant length, below which two positions are the same one.
     double same_place = heuristic("common.same_place", 1e-3);
+    /// [ratio] From which on one length or size is clearly larger than another.
+    double clear_ratio = heuristic("common.clear_ratio", 2.0);
     /// [fraction] Of a whole, that is negligible.
     double negligible = heuristic("common.negligible", 0.02);
+    /// [fraction] Of a whole, that is a small part of it: exceptions are fewer, and two things that differ by less
+    /// count as equal.
+    double minority = heuristic("common.minority", 0.1);
     /// [cosine] Minimum between the normals of a triangle before and after a change, of neighbouring sheets, and
     /// between a path that leaves a surface and its normal: 60 degrees.
     double turn = heuristic("common.turn", 0.5);

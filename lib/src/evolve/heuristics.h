@@ -17,8 +17,6 @@ COVOL_HEURISTICS EvolveHeuristics kEvolve{};
 struct MotionHeuristics {
     /// [voxels] Mean motion in a leaf at which the surface has left the band's middle.
     double left_by = heuristic("motion.left_by", 0.75);
-    /// [fraction of the leaves with the surface in them] Leaves that it must have left before the band follows.
-    double fraction_left = heuristic("motion.fraction_left", 0.1);
 };
 COVOL_HEURISTICS MotionHeuristics kMotion{};
 

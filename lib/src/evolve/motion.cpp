@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "evolve/change_kernel.h"
 #include "evolve/heuristics.h"
@@ -224,7 +225,7 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
         deep |= states[leaf] == kDeepDown;
         if (states[leaf] >= kLeaving) leaving.push_back(leaf);
     }
-    if (!deep && double(left) < kMotion.fraction_left * double(crossed)) leaving.clear();
+    if (!deep && double(left) < kCommon.minority * double(crossed)) leaving.clear();
     return leaving;
 }
 

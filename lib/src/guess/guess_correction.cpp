@@ -377,7 +377,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
     }
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
-        const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
+        const double precision = options.precision.value_or(kCommon.precision_voxels * h);
         const double minimum = options.min_radius.value_or(kCorrectionVoxels * h);
         std::vector<Target> on_surface;
         on_surface.reserve(marks.size());

@@ -22,8 +22,6 @@ COVOL_HEURISTICS GuessHeuristics kGuess{};
 
 /// A guess corrected by marks: guess_correction.cpp.
 struct CorrectionHeuristics {
-    /// [voxels] Of marks whose precision is not given.
-    double precision_voxels = heuristic("correction.precision_voxels", 0.5);
     /// [distances between mark and guess] Radius of a bump that moves the guess inward: above 2.11 the result is still
     /// a level set (its slope does not change sign), see the public header.
     double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
@@ -36,7 +34,7 @@ COVOL_HEURISTICS CorrectionHeuristics kCorrection{};
 /// The surface through marks, whole and in parts: marks_surface.cpp.
 struct MarksSurfaceHeuristics {
     /// [marks] Maximum in the whole, limited by time, which grows with the cube of the number.
-    std::size_t whole = heuristic("marks_surface.whole", 300);
+    std::size_t whole = limit("marks_surface.whole", 300);
 };
 COVOL_HEURISTICS MarksSurfaceHeuristics kMarks{};
 

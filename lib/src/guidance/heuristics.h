@@ -27,8 +27,6 @@ COVOL_HEURISTICS GuidanceHeuristics kGuide{};
 
 /// From one image of a time-lapse to the next one: motion.cpp.
 struct TimeLapseHeuristics {
-    /// [of the mismatch] Maximum that a translation may leave; otherwise it is rejected.
-    double min_gain = heuristic("time_lapse.min_gain", 0.9);
     /// [of the radius of the body] Correlation length of the offsets.
     double alike = heuristic("time_lapse.alike", 0.5);
 };

@@ -269,7 +269,7 @@ void Motion::translate() {
             run_.check();
         }
     // A small gain may result from noise alone.
-    if (!(best < kTimeLapse.min_gain * standing)) translation_ = {0, 0, 0};
+    if (!(best < (1 - kCommon.minority) * standing)) translation_ = {0, 0, 0};
 }
 
 /// Matches in two passes: an estimated offset is a few percent too short, because the positions between the old surface

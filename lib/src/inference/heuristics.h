@@ -12,7 +12,7 @@ struct InferenceHeuristics {
     /// [nodes] Of the lattice on which candidates are compared; that of the result has cells of half the size.
     double coarse_nodes = heuristic("inference.coarse_nodes", 60000);
     /// [voxels] Maximum of a box around the marks: a larger one takes long to read.
-    double max_voxels = heuristic("inference.max_voxels", 6.4e7);
+    double max_voxels = limit("inference.max_voxels", 6.4e7);
     /// [marks] Maximum number from which a guess is made; such a guess predicts the remaining marks. It is also the
     /// maximum number of positions known to be inside, or outside, that are used. All are chosen as far apart as
     /// possible.
@@ -35,8 +35,6 @@ struct InferenceHeuristics {
     double farthest_miss = heuristic("inference.farthest_miss", 30);
     /// [bits] Minimum information of the image about the sides of a guess, for the image to redraw it.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
-    /// [Dice] Coefficient between guess and body, above which they count as equal.
-    double agreement = heuristic("inference.agreement", 0.9);
     /// [1 - Dice] Expected value for a result whose error times its area equals its volume. It was fitted to 118 runs
     /// of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were not used for the fit,
     /// 92 % lie in the interval.

@@ -462,9 +462,9 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         // worse.
         // The measured errors decide, not those extrapolated to a finer lattice.
         const double worse = Predictions(held, cell, 1).guess_worse();
-        if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
+        if (overlap.dice > 1 - kCommon.minority ? worse <= 1 : worse < -2) {
             keep_guess(
-                overlap.dice > kInference.agreement
+                overlap.dice > 1 - kCommon.minority
                     ? "the surface of minimum bending energy agrees with the image, and predicts held-out marks as well"
                     : "the surface of minimum bending energy predicts held-out marks better");
             return;

@@ -27,8 +27,6 @@ COVOL_HEURISTICS DecimateHeuristics kDecimate{};
 
 /// Projection of vertices onto the level set: level.cpp.
 struct LevelHeuristics {
-    /// [voxels] Maximum length of a step, and of a triangle's side that is collapsed.
-    double longest = heuristic("level.longest", 0.5);
     /// [fraction of the slope of a distance] Minimum slope for estimates of the distance, because it vanishes between
     /// two walls.
     double min_slope = heuristic("level.min_slope", 0.5);

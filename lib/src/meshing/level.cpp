@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "grid/leaf_band.h"
 #include "meshing/heuristics.h"
 
@@ -153,7 +154,7 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
         if (std::abs(here.value) <= kConverged * h * std::sqrt(steep) || here.value == 0) return p;
         if (step == kSteps || !(steep > 0)) return {};
         const double whole = here.value / std::sqrt(steep);
-        const double move = std::clamp(whole, -kLevel.longest * h, kLevel.longest * h);
+        const double move = std::clamp(whole, -kCommon.precision_voxels * h, kCommon.precision_voxels * h);
         gone += std::abs(move);
         if (!(gone <= h)) return {};  // farther away it may be another sheet
         p = plus(p, -move / std::sqrt(steep), g);

@@ -303,7 +303,7 @@ private:
         const unsigned all = holds_[a] | holds_[b];
         const Position &pa = mesh_.vertices[a], &pb = mesh_.vertices[b];
         std::vector<Position> points;
-        if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kLevel.longest * level.voxel_size())
+        if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kCommon.precision_voxels * level.voxel_size())
             return points;
         Position goal;
         for (int k = 0; k < 3; ++k)

@@ -8,12 +8,6 @@ namespace covol {
 struct PaintedHeuristics {
     /// [ratio] Minimum of the widest patch to a run of painted slices, for them to be separate slices.
     int thin_run = heuristic("painted.thin_run", 3);
-    /// [of the largest section] Minimum of a section that counts as equally large.
-    double about_largest = heuristic("painted.about_largest", 0.9);
-    /// [squares of its width] A larger section is longer than wide: a disc has 1.3 to 1.8.
-    double elongated = heuristic("painted.elongated", 2);
-    /// [of the widest ends] Minimum of ends that count as equally wide.
-    double as_wide = heuristic("painted.as_wide", 0.98);
 };
 COVOL_HEURISTICS PaintedHeuristics kPainted{};
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "painted/heuristics.h"
 
 namespace covol::painted {
@@ -23,7 +24,7 @@ End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     // slice beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
     double w = 0;
     for (const std::size_t area : areas) {
-        if (double(area) >= kPainted.about_largest * largest) break;
+        if (double(area) >= (1 - kCommon.minority) * largest) break;
         ++w;
     }
     const double fraction = double(areas.front()) / largest, of_round = (2 * w + 1) / ((w + 1) * (w + 1));
@@ -37,7 +38,7 @@ double blunt_ends(const Paint& piece, int axis) {
     if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
         return 0;
     const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
-    const bool elongated = double(largest) > kPainted.elongated * slice_paint.widest * slice_paint.widest;
+    const bool elongated = double(largest) > kCommon.clear_ratio * slice_paint.widest * slice_paint.widest;
     std::vector<End> ends;
     if (piece.box().min[axis] > 0) ends.push_back(end_of(slice_paint.voxels, elongated));
     if (piece.box().max[axis] < piece.image_size()[axis] - 1)
@@ -71,7 +72,7 @@ std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geom
         if (2 * blunt[a] <= double(paint.voxels)) wide[a] = 0;
     const double widest = *std::max_element(wide.begin(), wide.end());
     if (widest == 0) return {};
-    const auto is_widest = [&](int a) { return wide[a] >= kPainted.as_wide * widest; };
+    const auto is_widest = [&](int a) { return wide[a] >= (1 - kCommon.negligible) * widest; };
     const int count = is_widest(0) + is_widest(1) + is_widest(2);
     if (count > 1 && is_cube(paint.box(), geometry.spacing)) return {};
     for (const int a : {2, 1, 0})

@@ -22,11 +22,6 @@ COVOL_HEURISTICS ScanNoiseHeuristics kScan{};
 
 /// Marks from misplaced clicks: isolated_points.cpp.
 struct IsolatedHeuristics {
-    /// [fraction of the points] Maximum that may be apart from the others; it follows that there are at least ten.
-    double max_fraction = heuristic("isolated.max_fraction", 0.1);
-    /// [ratio] Minimum of the shortest link to one of them to the longest link among the others: for marks on seven
-    /// structures, evenly distributed and on outlines, successive links differ by a factor of at most 1.4.
-    double gap = heuristic("isolated.gap", 2.0);
     /// [median links] Alternative to `gap`: minimum length of the shortest link to an isolated point, because the gap
     /// may be hidden by several isolated points at different places. For marks on the same seven structures, links are
     /// at most 2.6.

@@ -69,7 +69,7 @@ public:
     [[nodiscard]] std::uint32_t largest() const { return largest_; }
     /// Whether all other groups are small enough to be misplaced clicks, and contain few points in total.
     [[nodiscard]] bool largest_is_all_but_few() const {
-        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.max_fraction) * double(places_);
+        return large_ == 1 && double(size_[largest_]) >= (1 - kCommon.minority) * double(places_);
     }
 
 private:
@@ -115,7 +115,7 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);
         const double next = links[n + 1].length;
-        const bool is_long = next > kIsolated.gap * links[n].length || next > kIsolated.far * usual;
+        const bool is_long = next > kCommon.clear_ratio * links[n].length || next > kIsolated.far * usual;
         if (is_long && groups.largest_is_all_but_few()) return points_outside(groups.largest(), groups, points);
     }
     return {};

@@ -195,10 +195,10 @@ Resolved resolve(const Problem& problem) {
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
         // If a cloud encloses nothing, or fills a solid, its surface is that of the indicator alone.
-        const double h = c.cloud->has_quadrics ? 0 : kAutomatic.detail_voxel * c.cloud->orientation.screened->cell();
+        const double h = c.cloud->has_quadrics ? 0 : kCommon.precision_voxels * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
-            remarks.choose("voxel_size", number(h), number(kAutomatic.detail_voxel) + " cells of the indicator", run);
+            remarks.choose("voxel_size", number(h), number(kCommon.precision_voxels) + " cells of the indicator", run);
         }
         // The surface that closes a scan may be much larger than the part that the points lie on.
         const double area =
@@ -256,9 +256,9 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     if (distinct.size() > kAutomatic.max_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
-        const double h = kAutomatic.detail_voxel * scale.noise;
+        const double h = kCommon.precision_voxels * scale.noise;
         if (h <= scale.nearest) return nearest(scale.nearest);
-        return {h, number(kAutomatic.detail_voxel) + " times the noise of the points, " + number(scale.noise)};
+        return {h, number(kCommon.precision_voxels) + " times the noise of the points, " + number(scale.noise)};
     }
     const double spacing = measure_spacing(distinct).median;
     // A guess is well defined between its points, whatever the noise: its surface gets as many voxels as that of the

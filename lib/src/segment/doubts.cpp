@@ -115,7 +115,7 @@ bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGr
     const std::vector<double> levels = detail::levels_at(u, start.marks.trusted);
     const auto far =
         std::count_if(levels.begin(), levels.end(), [&](double level) { return std::abs(level) > beyond; });
-    return double(far) > kDoubts.missed_fraction * double(start.marks.trusted.size());
+    return double(far) > kCommon.minority * double(start.marks.trusted.size());
 }
 
 }  // namespace covol::pipeline

@@ -9,21 +9,18 @@ namespace covol {
 /// Automatic choices: choices.cpp.
 struct AutomaticHeuristics {
     /// [marks] Maximum for a guess, or for the correction of a start: more take long, and are dense enough for tagging.
-    std::size_t max_guess_marks = heuristic("automatic.max_guess_marks", 4000);
+    std::size_t max_guess_marks = limit("automatic.max_guess_marks", 4000);
     /// [voxels] Displacement of a surface from which on it is noticeable: closer points are merged, and thicker layers
     /// of them are averaged.
     double noticeable_voxels = heuristic("automatic.noticeable_voxels", 0.25);
-    /// [of the finest detail] Minimum voxel size of a cloud: of its noise, or of a cell of the indicator if the cloud
-    /// encloses nothing, or fills a solid.
-    double detail_voxel = heuristic("automatic.detail_voxel", 0.5);
     /// [points] With fewer tagged points, the voxel size is reduced until the surface has as many voxels as with this
     /// many.
     double few_points = heuristic("automatic.few_points", 1000);
     /// [voxels] Maximum on the sides of the box around few points, to limit the time. A ball has 35,000, thin parts ten
     /// times as many; points on curves would give more, the closer they lie.
-    double max_box_voxels = heuristic("automatic.max_box_voxels", 3e5);
+    double max_box_voxels = limit("automatic.max_box_voxels", 3e5);
     /// [voxels] Maximum number on the surface for each point; clouds on closed surfaces have 4 to 8.
-    double max_facets = heuristic("automatic.max_facets", 20);
+    double max_facets = limit("automatic.max_facets", 20);
     /// [voxels] Weight of curvature after tagging with an image.
     double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.5);
     /// [voxels] Presmoothing of the image after tagging.
@@ -42,7 +39,7 @@ struct FlowHeuristics {
     /// thin structures may be lost.
     int min_coarsened = heuristic("flow.min_coarsened", 64);
     /// [steps] Maximum number of steps of the approach by the points alone.
-    int approach_steps = heuristic("flow.approach_steps", 40);
+    int approach_steps = limit("flow.approach_steps", 40);
     /// [distances between marked slices] Range within which the image may move the body between contours in one pass.
     double contour_range = heuristic("flow.contour_range", 0.25);
 };
@@ -50,9 +47,6 @@ COVOL_HEURISTICS FlowHeuristics kFlow{};
 
 /// Warnings about marks: doubts.cpp and result/report.cpp.
 struct DoubtsHeuristics {
-    /// [fraction] Maximum of the marks that a surface may miss, of the surface that is far from every mark, and of the
-    /// given normals that contradict the result.
-    double missed_fraction = heuristic("doubts.missed_fraction", 0.1);
     /// [radii of the largest ball inside a guess] Distance of a mark from the guess, above which the guess is
     /// unreliable there: of 60 masks of five thin structures that lacked a quarter, with 5 to 30 marks, 15 had a mark
     /// that lay farther; 9 of these became worse, as did 3 of the others.
@@ -76,10 +70,6 @@ struct DoubtsHeuristics {
     /// labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as large, for 25 if it is 1.5 times
     /// as large.
     double border_fraction = heuristic("doubts.border_fraction", 0.6);
-    /// [reaches] Deviation of twelve neighbouring points of a cloud from a quadric, below which they form a sheet: 0.33
-    /// if they fill a ball, 0.26 and more if the noise is as large as the distance between nearest points, 0.11 to
-    /// 0.247 in folds that were smoothed as noise.
-    double sheet = heuristic("doubts.sheet", 0.25);
     /// [ratio] Of the estimated noise to that deviation, above which folds were mistaken for noise: up to 1.5 for noise
     /// of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
     double folded_noise = heuristic("doubts.folded_noise", 1.75);

@@ -8,19 +8,14 @@ namespace covol {
 
 /// The tag distance D: tag_distance.cpp.
 struct TagDistanceHeuristics {
-    /// [ratio] Minimum of peak to saddle for a core that is a structure, not a pocket in a wall.
-    double clear_ratio = heuristic("tag_distance.clear_ratio", 2.0);
     /// [ratio] The same for a core with a large fraction of the cloud's area.
     double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
-    /// [fraction of the cloud's area, and volumes of the most important core] Minimum that counts as large, and of a
-    /// core that D has to close.
-    double large_fraction = heuristic("tag_distance.large_fraction", 0.1);
     /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
     /// [ratio] Of D to the largest gap that it closes, in addition to half a cell, by which the gap is uncertain.
     double margin = heuristic("tag_distance.margin", 1.05);
     /// [voxels] Maximum in the tube on the last grid, to limit time and memory.
-    std::int64_t max_tube_voxels = heuristic("tag_distance.max_tube_voxels", 1'500'000);
+    std::int64_t max_tube_voxels = limit("tag_distance.max_tube_voxels", 1'500'000);
 };
 COVOL_HEURISTICS TagDistanceHeuristics kTagDistance{};
 

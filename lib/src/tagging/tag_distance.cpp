@@ -47,9 +47,9 @@ MainCores judge(const Cores& analysis) {
     const auto is_significant = [&](const Core& c) {
         // Gaps below half a voxel are closed by the grid itself.
         const double ratio = c.peak / std::max(c.saddle, 0.5);
-        return c.peak >= 1.0 && (ratio >= kTagDistance.clear_ratio ||
-                                 (ratio >= kTagDistance.significant_ratio &&
-                                  c.full_area() >= kTagDistance.large_fraction * cloud_area(c.saddle)));
+        return c.peak >= 1.0 &&
+               (ratio >= kCommon.clear_ratio ||
+                (ratio >= kTagDistance.significant_ratio && c.full_area() >= kCommon.minority * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)
@@ -57,7 +57,7 @@ MainCores judge(const Cores& analysis) {
     if (!primary) return verdict;
     double area = 0;
     for (const Core& c : analysis.cores) {
-        if (!is_significant(c) || c.full_volume() < kTagDistance.large_fraction * primary->full_volume()) continue;
+        if (!is_significant(c) || c.full_volume() < kCommon.minority * primary->full_volume()) continue;
         verdict.saddle = std::max(verdict.saddle, c.saddle);
         area += c.full_area();
         ++verdict.cores;

@@ -45,9 +45,9 @@ struct OrientationHeuristics {
     double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
     /// [cells] Maximum along the longest side in the first attempts, and of the cells that block a view: limits time
     /// and memory.
-    double first_along = heuristic("orientation.first_along", 192);
+    double first_along = limit("orientation.first_along", 192);
     /// [points] Maximum number used in the iteration: limits the time.
-    double max_sampled = heuristic("orientation.max_sampled", 100000);
+    double max_sampled = limit("orientation.max_sampled", 100000);
     /// [spacings] Noise below which the points of a sheet lie beside one another, not above.
     double sharp = heuristic("orientation.sharp", 0.3);
     /// [ratio] Of the points missed by a doubtful orientation to those missed by the orientation from views, below
@@ -72,7 +72,7 @@ COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
 /// Normals of local planes, with signs propagated from neighbour to neighbour: propagation.cpp.
 struct PropagationHeuristics {
     /// [points] Maximum to which a plane is fitted: limits the time.
-    double maximum = heuristic("propagation.maximum", 100);
+    double maximum = limit("propagation.maximum", 100);
 };
 COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 
@@ -99,7 +99,7 @@ struct LayersHeuristics {
     /// near side, unlike the hole of a ring.
     double max_gain = heuristic("layers.max_gain", 1.5);
     /// [patches] Maximum number tried; each requires a solution.
-    int max_patches = heuristic("layers.max_patches", 12);
+    int max_patches = limit("layers.max_patches", 12);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};
 

@@ -67,8 +67,6 @@ COVOL_HEURISTICS CloudSurfaceHeuristics kBlend{};
 
 /// Reconnection of small torn pieces: join_pieces.cpp.
 struct JoinPiecesHeuristics {
-    /// [volumes of the largest piece] Maximum volume of a piece that counts as torn off.
-    double small = heuristic("join_pieces.small", 0.1);
     /// [distances between points] Maximum length of a gap that is closed.
     double max_gap = heuristic("join_pieces.max_gap", 4);
 };

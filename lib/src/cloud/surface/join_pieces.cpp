@@ -9,6 +9,7 @@
 
 #include "base/disjoint_sets.h"
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "cloud/surface/heuristics.h"
 #include "covol/mesh.h"
@@ -60,7 +61,7 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
 /// The pieces are sorted by size, the largest first.
 std::vector<Piece>::iterator first_small_of(std::vector<Piece>& pieces) {
     return std::find_if(pieces.begin(), pieces.end(),
-                        [&](const Piece& p) { return p.volume < kJoin.small * pieces.front().volume; });
+                        [&](const Piece& p) { return p.volume < kCommon.minority * pieces.front().volume; });
 }
 
 /// Squared distance from the gap's segment.

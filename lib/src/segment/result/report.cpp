@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "covol/compare.h"
 #include "grid/levels_at.h"
 #include "image/support.h"
@@ -86,7 +87,7 @@ private:
                                           [&](const Vec3& place) { return tree.nearest(place) > far * far; });
         const double fraction = double(beyond) / double(std::max<std::size_t>(1, places.size()));
         report_.surface_beyond_marks = fraction;
-        if (fraction > kDoubts.missed_fraction)
+        if (fraction > kCommon.minority)
             warn(number(std::round(100 * fraction)) + " % of the surface is farther than " + number(far) +
                  " (half of the extent of the marks) from every mark: it extends beyond the marked region; add marks "
                  "there, or give a position outside the body (`outside`)");
@@ -97,7 +98,7 @@ private:
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
-            cloud.near_noise < kDoubts.sheet * cloud.near_reach)
+            cloud.near_noise < kCloud.flat * cloud.near_reach)
             warn("the surface is smoothed for a noise of " + number(cloud.noise) +
                  ", but neighbouring points lie on sheets (" + number(cloud.near_noise) + " from them within " +
                  number(cloud.near_reach) +

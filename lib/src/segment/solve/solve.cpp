@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "covol/error.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
@@ -105,7 +106,7 @@ Solution guess_instead(const Problem& problem, const Choices& choices, Solution 
     guess->facts.report = report;
     solution.report.remarks.warn(
         std::string("the surface ") +
-            (vanished ? "vanished" : "left more than " + number(100 * kDoubts.missed_fraction) + " % of the marks") +
+            (vanished ? "vanished" : "left more than " + number(100 * kCommon.minority) + " % of the marks") +
             ": the result is the surface of minimum bending energy through the marks instead",
         problem.run);
     Solution guessed = flow(problem, std::move(*guess), solution.edges.options, reached);

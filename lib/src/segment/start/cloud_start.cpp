@@ -36,7 +36,7 @@ void report_hints(const HintsReport& hints, Remarks& remarks, const RunContext& 
                    number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
                        (hints.inward ? ", after all were flipped, because they pointed inwards" : ""),
                    run);
-    if (1 - hints.agree > kDoubts.missed_fraction)
+    if (1 - hints.agree > kCommon.minority)
         remarks.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the " +
                          (normals ? "given normals" : "normals computed from the sensor positions") +
                          " point to the wrong side",
