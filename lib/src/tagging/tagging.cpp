@@ -6,15 +6,20 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/heuristics.h"
 #include "tagging/heuristics.h"
 
 namespace covol::detail {
 namespace {
 
-/// @param core      volume, voxels
-/// @param distance  voxels
-bool is_structure(double core, double distance) {
-    return std::cbrt(core / (4.0 / 3.0 * std::numbers::pi)) > kTagging.significant_radius * distance;
+/// @param core, enclosed  volumes, voxels; the core, dilated by the distance, is not a negligible part of what is
+/// enclosed
+/// @param distance        voxels
+bool is_structure(double core, double enclosed, double distance) {
+    constexpr double kBall = 4.0 / 3.0 * std::numbers::pi;
+    const double radius = std::cbrt(core / kBall);
+    return radius > kTagging.significant_radius * distance &&
+           kBall * std::pow(radius + distance, 3) > kCommon.negligible * enclosed;
 }
 
 std::int64_t voxels_of(const LeafColumns::Piece& run) { return std::int64_t(run.end - run.begin) * kLeafSize; }
@@ -43,7 +48,9 @@ std::vector<LeafMask> Tube::near(float limit) const {
     return masks;
 }
 
-bool Tagging::has_core(double voxel_size) const { return is_structure(double(core), distance / voxel_size); }
+bool Tagging::has_core(double voxel_size) const {
+    return is_structure(double(core), double(enclosed), distance / voxel_size);
+}
 
 Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seeds) {
     Tagging result;
@@ -78,7 +85,7 @@ bool closes_a_core(const Tube& tube, const Tagging& smaller, const Tagging& larg
     const auto& pieces = tube.columns.pieces();
     for (std::size_t n = 0; n < pieces.size(); ++n)
         if (smaller.exterior.pieces[n] && !larger.exterior.pieces[n]) core += voxels_of(pieces[n]);
-    return is_structure(double(core), larger.distance / tube.domain.voxel_size);
+    return is_structure(double(core), double(larger.enclosed), larger.distance / tube.domain.voxel_size);
 }
 
 LeafArray<float> signed_level(const Tube& tube, const Tagging& tagging) {
