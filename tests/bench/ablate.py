@@ -78,8 +78,8 @@ class Panel:
         elif name == "scans":
             self._scan()
         else:
-            real = name == "marks"
-            self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items() if (kind == "real") == real}
+            self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items()
+                          if kind != "doubt" and (kind == "real") == (name == "marks")}
 
     def _draw(self):
         given = {path.stem: path for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("meshes/*.ply"))}

@@ -59,7 +59,7 @@ class Runner:
             path = jobs.output_of(job, out)
             if code < 0 or not path.exists():
                 return "too slow" if code < 0 else "failed", None, seconds, None
-            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            digest = hashlib.sha256(path.read_bytes() + jobs.warnings_of(job, out)).hexdigest()
             same = self.known.get(job)
             if same and same[3] == digest:
                 return "same", same[1], seconds, digest
@@ -81,6 +81,8 @@ def measure(options):
     there = {(row["name"], float(row["factor"]), row["job"]) for row in read_rows(options.csv)}
     heuristics = collections.defaultdict(list)
     for h in read_heuristics():
+        if h.is_limit:
+            continue
         heuristics[h.name.split(".")[0]].append(h)
     for step in set(options.only or []) - set(jobs.PLAN):
         raise SystemExit(f"--only {step}: expected one of {', '.join(jobs.PLAN)}")
@@ -148,6 +150,8 @@ class Measured:
         return max(grown, key=lambda g: g[0]) if grown else None
 
     def rating(self):
+        if self.constant.is_limit:
+            return "limit"
         if not self.errors:
             return "not run"
         if self.same:
@@ -176,7 +180,7 @@ def write_page(path, rows):
         by_name[row["name"]].append(row)
     found = [Measured([row for row in by_name[h.name] if row["value"] == h.text], as_is, h) for h in read_heuristics()]
     ratings = collections.Counter(m.rating().strip("*") for m in found)
-    summary = ", ".join(f"{ratings[rating]} {rating}" for rating in ("fails", "sensitive", "flat", "no effect", "not run") if ratings[rating])
+    summary = ", ".join(f"{ratings[rating]} {rating}" for rating in ("fails", "sensitive", "flat", "no effect", "not run", "limit") if ratings[rating])
     text = f"""# Heuristic constants
 
 Thresholds, factors and counts that were chosen by judgement or measurement and that affect results. Each constant is defined in the `heuristics.h` of its folder of `lib/src`, in one struct for each step, with its unit and meaning. This page is generated from these files and from measurements by [`tests/bench/sensitivity.py`](../tests/bench/sensitivity.py):
@@ -191,7 +195,7 @@ Such a build multiplies constants by the factors in the environment variable `CO
 
 - **fails**: a job ends with an error or takes more than {MAX_SECONDS} s of processor time, or its error grows to more than three times its value and by more than one percentage point;
 - **sensitive**: an error grows by more than a tenth of its value, and by more than {POINTS} percentage points;
-- flat: none of these; no effect: all meshes of clouds and masks of phantoms are identical, bit by bit, in the jobs that were run; not run: run the command again, which continues where it ended.
+- flat: none of these; no effect: all meshes of clouds and masks of phantoms are identical, bit by bit, in the jobs that were run; not run: run the command again, which continues where it ended; limit: of time or memory, which only larger inputs reach.
 
 {len(found)} constants: {summary}. A cosine or a fraction that is doubled to more than 1 makes its condition hold always or never. Sizes, formats and tolerances of solvers are not heuristics and are defined where they are used.
 """

@@ -1,4 +1,5 @@
 """The jobs of sensitivity.py: clouds and phantoms with known truth, each of about a second, and the error of their results."""
+import json
 import os
 import pathlib
 import shlex
@@ -156,12 +157,20 @@ def read_nrrd(path):
     return np.frombuffer(body, kind).reshape([int(n) for n in fields["sizes"].split()][::-1]), head
 
 
+MOVED = {"round": (2, -3, 1), "torus": (1, 2, 2), "two": (-2, 1, 0)}  # voxels along z, y and x, from one image of a time-lapse to the next
+
+
 def make_phantoms(folder, covol):
     for name, kind, count, noise in (("round", "sphere-round", 60, 0.1), ("torus", "torus", 80, 0.3), ("two", "two-spheres", 60, 0.2), ("slit", "sphere-slit", 60, 0),
                                      ("many", "torus", 350, 0.2), ("dense", "torus", 1500, 0.2), ("box", "box", 60, 0.2), ("sphere", "sphere", 300, 0.2)):
         subprocess.run([covol, "phantom", kind, "--size", "44", "-o", f"p_{name}.nrrd", "--points", f"p_{name}.csv", "--labels", f"l_{name}.nrrd",
                         "--count", str(count), "--noise", str(noise), "--seed", "3"], cwd=folder, check=True, capture_output=True)
         labels, head = read_nrrd(folder / f"l_{name}.nrrd")
+        if name in MOVED:
+            for kind in "pl":
+                values, own = read_nrrd(folder / f"{kind}_{name}.nrrd")
+                moved = np.roll(values, MOVED[name], (0, 1, 2))
+                (folder / f"{kind}_{name}_moved.nrrd").write_bytes(own.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n" + np.ascontiguousarray(moved).tobytes())
         if name in ("torus", "round", "box"):
             raw = head.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n"
             wrong = np.roll(labels, (1, 2, 0), (0, 1, 2)) if name == "torus" else labels & np.roll(labels, 3, 0)
@@ -177,11 +186,12 @@ def make_phantoms(folder, covol):
         for number, radius in enumerate((0.75 + wide ** 0.5, 0.75 - wide ** 0.5) if wide > 0 else ()):
             rows += [(k, number, 21.5 + radius * np.cos(t) * 44 / 2.6, 21.5 + radius * np.sin(t) * 44 / 2.6) for t in np.arange(0, 6.28, 0.35)]
     np.savetxt(folder / "contours.csv", rows, "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
+    np.savetxt(folder / "contours_few.csv", [row for row in rows if row[0] % 8 == 0], "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
 
 
-def mask_error(folder, out, name):
+def mask_error(folder, path, name):
     """1 - Dice, in %."""
-    truth, mask = read_nrrd(folder / f"l_{name}.nrrd")[0] > 0, read_nrrd(out / "m.nrrd")[0] > 0
+    truth, mask = read_nrrd(folder / f"l_{name}.nrrd")[0] > 0, read_nrrd(path)[0] > 0
     return 100 * (1 - 2 * float((truth & mask).sum()) / max(1, float(truth.sum() + mask.sum())))
 
 
@@ -194,8 +204,21 @@ REAL_COUNTS = (60, 20)
 REAL_DRAW = 11
 
 
+DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4  # marks; of their extent
+
+
 def real_name(structure, count):
     return f"{structure} {count}"
+
+
+def doubt_name(structure, kind):
+    return f"{structure} {kind}"
+
+
+def doubt_error(out, kind):
+    """Number of warnings of right marks, or 10 without a warning of wrong ones."""
+    warnings = len(json.loads((out / "r.json").read_text())["warnings"])
+    return warnings if kind == "right" else 10 * (warnings == 0)
 
 
 def make_real(folder):
@@ -212,6 +235,14 @@ def make_real(folder):
                 arguments = ["segment", str(structure.image), *structure.options, "--points", f"../in/{name}.csv", "--points-space", "index",
                              "-o", "s.vdb", "--mask", "m.tif"]
                 JOBS[name] = (shlex.join(arguments), "real", structure.name)
+                if count == DOUBT_COUNT:
+                    moved = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
+                    moved += DOUBT_SHIFT * np.ptp(moved, 0)
+                    np.savetxt(folder / f"{name}_wrong.csv", moved, "%.5f", ",", header="x,y,z", comments="")
+                    for kind, marks in (("right", name), ("wrong", f"{name}_wrong")):
+                        with_report = [*arguments, "--json", "r.json"]
+                        with_report[with_report.index("--points") + 1] = f"../in/{marks}.csv"
+                        JOBS[doubt_name(structure.name, kind)] = (shlex.join(with_report), "doubt", kind)
 
 
 def real_error(folder, out, structure):
@@ -267,6 +298,18 @@ JOBS = {  # name: (arguments, kind of truth, shape, more)
     "m init": (MARKS.format("dense") + " --init sphere:0,0,0,1.1", "mask", "dense"),
     "m guess": (MARKS.format("torus").replace("p_torus.csv", "ten_torus.csv") + " --guess ../in/g_torus.nrrd", "mask", "torus"),
     "m guess seed": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --inside -0.8,0,0", "mask", "box"),
+    "m guess round": (MARKS.format("round").replace("p_round.csv", "ten_round.csv") + " --guess ../in/g_round.nrrd", "mask", "round"),
+    "m guess box": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --rho 0", "mask", "box"),
+    "m guess many": (MARKS.format("torus") + " --guess ../in/g_torus.nrrd --rho 0", "mask", "torus"),
+    "m guess many round": (MARKS.format("round") + " --guess ../in/g_round.nrrd --rho 0", "mask", "round"),
+    "m grow torus": ("segment ../in/p_torus.nrrd --theta 0 --inside 0.75,0,0 -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m grow round": ("segment ../in/p_round.nrrd --theta 0 --inside 0,0,0 -o s.vdb --mask m.nrrd", "mask", "round"),
+    "m grow wide": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,1.15 -o s.vdb --mask m.nrrd", "mask", "sphere"),
+    "m grow slit": ("segment ../in/p_slit.nrrd --theta 0 --inside 0.3,0.3,0.3 -o s.vdb --mask m.nrrd", "mask", "slit"),
+    **{f"m lapse {name}": (f"segment ../in/p_{name}.nrrd ../in/p_{name}_moved.nrrd --points ../in/p_{name}.csv -o s.vdb --mask m.nrrd", "lapse", f"{name}_moved")
+       for name in MOVED},
+    "m contours few": ("segment ../in/p_torus.nrrd --contours ../in/contours_few.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m painted round": ("segment ../in/p_round.nrrd --painted ../in/s_round.nrrd -o s.vdb --mask m.nrrd", "mask", "round"),
     "m contours": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m contours alone": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv --rho 0 -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m painted": ("segment ../in/p_torus.nrrd --painted ../in/s_torus.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
@@ -279,20 +322,24 @@ GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "half open
 TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere", "spikes tag"]
 ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours alone"]
 GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
-CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box"]
+CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box", "m contours few", "m painted round"]
+CORRECTED = ["m guess", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
+GROWN = ["m grow", "m grow box", "m grow torus", "m grow round", "m grow wide", "m grow slit"]
+LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
 REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
+DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
 PLAN = {  # step: the jobs that exercise it
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": ["m guess", "m guess seed"],
-    "guidance": GUESSED + REAL_FEW, "inference": REAL_FEW, "doubts": REAL_FEW,
-    **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": ["m grow", "m grow box"],
-    **dict.fromkeys(("edge", "evolve", "motion", "flow"), FLOWS), "pieces": GUESSED,
+    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": CORRECTED,
+    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": REAL_FEW, "doubts": DOUBTED,
+    **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
+    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]), "pieces": GUESSED,
     "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
     **dict.fromkeys(("holes", "cut", "relax", "decimate", "level"), MESHES),
 }
@@ -312,13 +359,20 @@ def arguments_of(job):
 
 
 def output_of(job, out):
-    return out / {"mask": "m.nrrd", "real": "m.tif"}.get(JOBS[job][1], "s.ply")
+    return out / {"mask": "m.nrrd", "lapse": "m_t001.nrrd", "real": "m.tif", "doubt": "m.tif"}.get(JOBS[job][1], "s.ply")
+
+
+def warnings_of(job, out):
+    """Part of the result of jobs that are about warnings."""
+    return json.dumps(json.loads((out / "r.json").read_text())["warnings"]).encode() if JOBS[job][1] == "doubt" else b""
 
 
 def error_of(job, folder, out):
     _, kind, shape, *more = JOBS[job]
-    if kind == "mask":
-        return mask_error(folder, out, shape)
+    if kind in ("mask", "lapse"):
+        return mask_error(folder, output_of(job, out), shape)
+    if kind == "doubt":
+        return doubt_error(out, shape)
     if kind == "real":
         return real_error(folder, out, shape)
     return cloud_error(folder, out, shape, np.genfromtxt(folder / more[0], delimiter=",", skip_header=1)[:, :3] if kind == "open" else None)
