@@ -78,7 +78,7 @@ class Bricks(Case):
 
     def test_a_folder_as_an_input(self):
         self.run_covol("phantom", "sphere", "--size", "40", "--count", "5000", "-o", "t.zarr", "--points", "t.xyz")
-        self.run_covol("brick", "plan", "segment", "t.zarr", "--points", "t.xyz", "--model", "paper", "--brick-voxels", "20000", "-o", "plan")
+        self.run_covol("brick", "plan", "segment", "t.zarr", "--points", "t.xyz", "--model", "paper", "--up", "y", "--brick-voxels", "20000", "-o", "plan")
         self.run_covol("brick", "run", "plan")
         self.run_covol("brick", "join", "plan", "-o", "t.vdb")
 

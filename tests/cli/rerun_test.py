@@ -19,7 +19,7 @@ class Rerun(Case):
         self.run_covol("segment", "ball.nrrd", "--points", "marks with space.xyz", "--init", "tag", "-o", "s.vdb", "--mesh", "s.ply", *more)
 
     def test_the_same_bits(self):
-        self.make("--delta", "0.7vx", "--max-steps", "20", "--density", "s.vdb")
+        self.make("--delta", "0.7vx", "--max-steps", "20", "--density", "s.vdb", "--up", "y", "--unit-scale", "0.5")
         before = self.files()
         done = self.run_covol("rerun", "s.vdb", "--threads", "2", "--quiet", "-o", "again.vdb", "--json", "r.json")
         self.assertIn("bit-identical", done.stdout)

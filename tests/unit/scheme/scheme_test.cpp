@@ -7,7 +7,7 @@
 #include "support/dense_reference.h"
 #include "support/shapes.h"
 
-// The scheme of DESIGN.md, section 1, on the dense reference: closed forms, and for each erratum of the printed paper
+// The scheme of docs/method.md on the dense reference: closed forms, and for each erratum of the printed paper
 // an identity that the corrected form and evolve() satisfy and the printed form violates.
 
 using namespace covol;

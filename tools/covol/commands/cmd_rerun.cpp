@@ -18,6 +18,7 @@
 #include "covol/file_set.h"
 #include "covol/safe_text.h"
 #include "covol/version.h"
+#include "flags/bindings.h"
 
 namespace covol::tool {
 namespace fs = std::filesystem;
@@ -180,7 +181,8 @@ private:
     std::vector<std::pair<std::string, std::string>> found_;
 };
 
-/// The job with the current locations of its inputs. Its .vdb outputs are placed in `folder`; the others are omitted.
+/// The job with the current locations of its inputs. Its .vdb outputs are placed in `folder`; the others are omitted,
+/// together with the settings that are refused without a mesh.
 /// @throws Error for options that a file may not set
 JobOptions job_here(const std::string& path, const JobOptions& given, const CLI::App& command, const Inputs& inputs,
                     const fs::path& folder) {
@@ -188,6 +190,7 @@ JobOptions job_here(const std::string& path, const JobOptions& given, const CLI:
     bool makes_vdb = false;
     for (const auto& [name, values] : given.values) {
         const OptionRole role = role_of(option_of_job(command, name, path));
+        if (MeshFlags::needs_mesh(name)) continue;
         Words placed;
         for (const std::string& value : values) {
             if (role == OptionRole::Input) placed.push_back(inputs.placed(name, value));

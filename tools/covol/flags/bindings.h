@@ -148,7 +148,9 @@ struct MeshFlags : Given<WriteMeshOptions> {
     void bind_plain(CLI::App& command);
     /// @param path  of the mesh, or empty. @throws UsageError if its format cannot be streamed.
     void check_plain(const std::string& path) const;
-    /// @throws UsageError if an option of meshes is given, but no mesh is written.
+    /// Whether an option, by its name, is refused by a run that writes no mesh.
+    [[nodiscard]] static bool needs_mesh(std::string_view option) { return option == "up" || option == "unit-scale"; }
+    /// @throws UsageError if such an option is given, but no mesh is written.
     void check_used(bool writes) const;
     [[nodiscard]] WriteMeshOptions write_options(const Session& session) const;
 };

@@ -212,7 +212,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
                 const BrickPlan plan = folder.read_plan();
                 return join(job, *make_job(image, structure, run), plan, folder, session);
             });
-    job.check_options();
+    job.check_settings();
     add_starts(job, structures, session.run());
     std::optional<Image> image;
     if (!job.images.empty()) image = job.read(job.images.front(), job.image.options, session);

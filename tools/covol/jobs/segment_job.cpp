@@ -51,9 +51,13 @@ bool SegmentJob::needs_mesh() const {
 }
 
 void SegmentJob::check_options() const {
+    check_settings();
+    mesh.check_used(!mesh_path.empty());
+}
+
+void SegmentJob::check_settings() const {
     require_valid_flags(resolve(1.0));
     cloud.check();
-    mesh.check_used(!mesh_path.empty());
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
         throw UsageError("--plain: excludes --evidence, --suggest and --report, which need the whole mesh");

@@ -80,6 +80,8 @@ struct SegmentJob {
     [[nodiscard]] bool needs_mesh() const;
     /// Detects options that are invalid for every h before any file is read.
     void check_options() const;
+    /// The same for a job in bricks: it may have settings of a mesh that another of its commands writes.
+    void check_settings() const;
     /// The given flags that had no effect; empty if all had one.
     [[nodiscard]] std::string unused(const SegmentReport& report) const;
     /// Reads the image, and adds it to the report.

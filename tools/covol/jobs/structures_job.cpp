@@ -134,7 +134,10 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     check_outputs(job, structures, {}, outputs);
     check_scene(job, outputs);
     outputs.check("--table", job.table_path, OutputKind::Table);
-    job.check_options();
+    if (session.brick())
+        job.check_settings();
+    else
+        job.check_options();
 
     add_starts(job, structures, session.run());
     ReadImageOptions reading = job.image.options;
