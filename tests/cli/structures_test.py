@@ -466,7 +466,7 @@ class Evidence(Case):
         report = json.loads((self.out / "r.json").read_text())["evidence"]
         self.assertEqual(len(lines), len(report["suggestions"]))
         self.assertGreaterEqual(len(lines), 2)
-        self.assertEqual(report["reach"], 5 * H)
+        self.assertEqual(report["reach"], 6 * H)
         for s in report["suggestions"]:
             self.assertGreater(s["world"][2], 0)
             self.assertAlmostEqual(s["index"][2], s["slice"], places=2)

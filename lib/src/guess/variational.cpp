@@ -352,7 +352,8 @@ bool span_space(const std::vector<Vec3>& marks) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    return axes[0] > kCommon.same_place * kCommon.same_place * axes[2];
+    constexpr double kRounding = 1e-8;  // relative; thin clouds, such as two balls far apart, are not flat
+    return axes[0] > kRounding * axes[2];
 }
 
 std::vector<Vec3> points_around(const std::vector<Vec3>& marks, double times) {

@@ -3,6 +3,7 @@
 
 #include "cli/output/report.h"
 #include "commands/commands.h"
+#include "covol/domain.h"
 #include "covol/edge.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
@@ -16,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kReachVoxels = 5.0;  // reach of marks, as for attraction without a limit
+constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // the automatic attraction range of marks
 
 /// One level set of the file, and the marks and evidence that it is compared with.
 struct Shown {
