@@ -3,13 +3,15 @@
 #include <vector>
 
 #include "base/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "covol/domain.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
 
-/// Area of the surface around each point, world units squared, from the disc that reaches to the last neighbour of its
-/// ring. A density on a lattice would also count points of the opposite side of thin parts.
+/// Area of the surface around each point, world units squared, from the disc that reaches to its eighth neighbour. A
+/// density on a lattice would also count points of the opposite side of thin parts.
 [[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<double> areas(points.size());

@@ -1,5 +1,7 @@
 #pragma once
 // The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
+#include <cstddef>
+
 #include "base/heuristics.h"
 
 namespace covol {
@@ -13,11 +15,9 @@ struct CloudHeuristics {
     double flat = heuristic("cloud.flat", 0.25);
     /// [fraction of the points] That is explained by single points.
     double few = heuristic("cloud.few", 0.002);
-    /// [fraction of the points, of the area, or of the indicator's step] That is not explained by noise: orientations
-    /// of closed shapes have less, those of scans of one side more. Their doubt is up to 0.013 and from 0.026 on, their
-    /// area without points below 0.01 and from 0.14 on.
+    /// [fraction of the points, or of the area] That is not explained by noise.
     double some = heuristic("cloud.some", 0.02);
-    /// [iterations] After sides of normals changed, until their directions agree with the indicator.
+    /// [rounds] After sides of normals changed, until their directions agree with the indicator.
     int settling = heuristic("cloud.settling", 3);
 };
 COVOL_HEURISTICS CloudHeuristics kCloud{};
@@ -28,22 +28,36 @@ struct IndicatorHeuristics {
     double beyond = heuristic("indicator.beyond", 0.2);
     /// [cells] Minimum number along the longest side.
     int min_cells = heuristic("indicator.min_cells", 48);
-    /// [spacings around a point] Maximum cell size there, since sparser points use coarser grids; and the minimum cell
-    /// of any attempt, since smaller cells show single points.
+    /// [spacings around a point] Maximum cell size there; sparser points use coarser grids.
     double local_cells = heuristic("indicator.local_cells", 0.5);
+    /// [V-cycles] Of multigrid without an initial solution.
+    int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
 };
 COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
 
 /// Alternating updates of the normals and their indicator: iteration.cpp. The iteration follows Hou et al., Iterative
 /// Poisson surface reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022; the turning of patches is added here.
 struct IterationHeuristics {
-    /// [iterations] Maximum number of updates of all normals on one lattice.
-    int updates = heuristic("iteration.updates", 10);
     /// [indicator] Deviation of a patch's mean from 1/2 from which on turning the patch is tried.
     double patch_off = heuristic("iteration.patch_off", 0.12);
-    /// [V-cycles] Of multigrid after a change of sides.
+    /// [V-cycles] Of multigrid after each turning of patches.
     int patch_cycles = heuristic("iteration.patch_cycles", 2);
+    /// [1 - cosine] Mean change of the normals at which the iteration ends.
+    double steady = heuristic("iteration.steady", 1e-4);
+    /// [V-cycles] Of multigrid in each iteration.
+    int cycles = heuristic("iteration.cycles", 1);
+    /// [V-cycles] Of multigrid in the last iteration.
+    int last_cycles = heuristic("iteration.last_cycles", 4);
 };
 COVOL_HEURISTICS IterationHeuristics kIteration{};
+
+/// Repair of normals that are reversed or tangential to their sheet, for clouds without noise: torn.cpp.
+struct TornHeuristics {
+    /// [ratio] Of the smallest to the middle variance of the neighbours, above which they are not a sheet.
+    double flat = heuristic("torn.flat", 0.06);
+    /// [cosine] Minimum between the normals of sheets that continue each other.
+    double same_sheet = heuristic("torn.same_sheet", 0.9);
+};
+COVOL_HEURISTICS TornHeuristics kTorn{};
 
 }  // namespace covol

@@ -5,10 +5,6 @@
 
 namespace covol::cloud {
 
-/// V-cycles of multigrid after which the indicator has converged, from any initial value: half as many give the same
-/// surface.
-constexpr int kConvergedCycles = 8;
-
 /// The longest side of the box in which the indicator is computed.
 [[nodiscard]] double indicator_side(const std::vector<Vec3>& points);
 /// `cell`, or a smaller one if the longest side would have too few cells.

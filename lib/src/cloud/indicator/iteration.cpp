@@ -17,9 +17,6 @@
 namespace covol::cloud {
 namespace {
 
-// Mean change of the normals, 1 - cosine, at which they have converged: further updates do not change the surface.
-constexpr double kSteady = 1e-4;
-
 /// The mean of the indicator over each cell's points, minus 1/2.
 std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     std::vector<double> off(cells.cell_count());
@@ -51,18 +48,18 @@ void Iteration::run(const Stage& stage, Orientation& result) {
     if (last_) field.start_from(last_->indicator());
     stage_ = stage;
     if (result.normals.empty()) estimate_normals(stage.cell, result);
-    for (int n = 0; n < kIteration.updates; ++n) {
+    for (int n = 0; n < stage.iterations; ++n) {
         ++result.iterations;
-        if (turn(field, result, 1) < kSteady) break;
+        if (turn(field, result, kIteration.cycles) < kIteration.steady) break;
     }
     turn_patches(field, result);
-    if (stage.is_last) turn(field, result, kConvergedCycles);
+    if (stage.is_last) turn(field, result, kIteration.last_cycles);
     last_.emplace(std::move(field));
 }
 
 void Iteration::mend(double spacing, Orientation& result) {
     result.mended = repair_torn(points_, spacing, result.normals);
-    if (result.mended > 0) solve(*last_, result, kConvergedCycles);
+    if (result.mended > 0) solve(*last_, result, kIteration.last_cycles);
 }
 
 void Iteration::estimate_normals(double cell, Orientation& result) const {
@@ -134,7 +131,6 @@ void Iteration::turn_patches(WindingField& field, Orientation& result) {
                 result.normals[point] = before[point];
         });
         for (int n = 0; n < kCloud.settling; ++n) turn(field, result, kIteration.patch_cycles);
-        // The remaining patches may alternate.
         if (stayed < kCloud.few * double(points_.size())) return;
     }
 }

@@ -10,7 +10,8 @@ namespace covol::cloud {
 
 /// A stack of grids and the iterations on it.
 struct Stage {
-    double cell;  ///< of the finest grid, world units
+    double cell;     ///< of the finest grid, world units
+    int iterations;  ///< at most
     bool is_last;
     double enclosed;  ///< indicator from which on a point counts as enclosed by another part
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -9,26 +10,29 @@
 #include "base/geometry.h"
 #include "base/heuristics.h"
 #include "cloud/indicator/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
 namespace {
 
+constexpr std::size_t kNeighbours = 12;
+
 /// The sheet at each point, and which neighbouring points are on the same one.
 class Sheets {
 public:
     Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
-        const std::size_t count = kCommon.quadric;
         const PointCells cells(points, kNear.first_radius * spacing);
-        for_nearest(cells, spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-            for (const Neighbour& other : near) beside_[point].push_back(cells.order()[other.at]);
-            if (near.size() < count) return;
+        for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+            for (std::size_t n = 0; n < kNeighbours; ++n)
+                beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
+            if (near.size() < kNeighbours) return;
             const auto [sum, squares] = moments_of(cells, points[point], near);
-            const double all = double(near.size()) + 1;  // the point itself
-            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / all -
-                                                                       sum * sum.transpose() / (all * all));
-            if (shape.eigenvalues()[0] > kCloud.flat * kCloud.flat * shape.eigenvalues()[1]) return;
+            const double count = double(near.size()) + 1;  // the point itself
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count -
+                                                                       sum * sum.transpose() / (count * count));
+            if (shape.eigenvalues()[0] > kTorn.flat * shape.eigenvalues()[1]) return;
             const Eigen::Vector3d axis = shape.eigenvectors().col(0);
             axes_[point] = {axis[0], axis[1], axis[2]};
         });
@@ -40,15 +44,13 @@ public:
     /// visit(neighbour) for the neighbours on the same sheet.
     template <typename Visit>
     void for_beside(std::size_t n, Visit visit) const {
-        // Each of two sheets that continue each other is at most kCloud.flat off the line between their points.
-        const double same_sheet = 1 - 2 * kCloud.flat * kCloud.flat;
         for (const std::uint32_t other : beside_[n])
-            if (std::abs(dot(axes_[n], axes_[other])) > same_sheet) visit(other);
+            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kTorn.same_sheet) visit(other);
     }
 
 private:
     std::vector<Vec3> axes_;
-    std::vector<std::vector<std::uint32_t>> beside_;
+    std::vector<std::array<std::uint32_t, kNeighbours>> beside_;
 };
 
 /// @return how many were changed
@@ -127,7 +129,7 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
 }  // namespace
 
 std::size_t repair_torn(const std::vector<Vec3>& points, double spacing, std::vector<Vec3>& normals) {
-    if (points.size() <= kCommon.quadric) return 0;
+    if (points.size() <= kNeighbours) return 0;
     const Sheets sheets(points, spacing);
     const std::size_t upright = set_upright(sheets, normals);
     return upright + turn_smaller(sheets, normals);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/heuristics.h"
 #include "cloud/indicator/consistency.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
@@ -32,7 +31,7 @@ double bare_fraction(const CloudOrientation& cloud) {
 }
 
 bool does_enclose(const CloudOrientation& cloud) {
-    return doubt(cloud.orientation) < kCloud.some || bare_fraction(cloud) < kCloud.some;
+    return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
 }
 /// Recomputes the indicator if it is too coarse for the detail of its normals.
 void refine(CloudOrientation& cloud, const RunContext& run) {
@@ -42,17 +41,18 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
     const double first =
         is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
     const double cell = cloud::indicator_cell(cloud.points, first);
-    if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
-    if (!is_settled(o) && noise < kOrientation.sharp * spacing &&
+    if (o.indicator->cell() > kOrientation.coarse * cell)
+        o.indicator = cloud::indicator_of(cloud.points, o, first, run);
+    if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
         fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kCloud.some)
-        o.indicator = cloud::indicator_of(cloud.points, o, first / kCommon.growth, run);
+        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
 /// For sheets, as in scans of one side or from the air: neighbours agree on one side everywhere, the one from which
 /// most points are seen. @return whether they do and the surface does not miss more points
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
     // With more noise, neighbours may lie above one another, and quadrics form handles where there are no points.
-    if (cloud.scale.noise > kOrientation.sharp * cloud.scale.spacing) return false;
+    if (cloud.scale.noise > kOrientation.noise_of_sheets * cloud.scale.spacing) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
                                               cloud::towards_sky(cloud.points, cloud.scale));
@@ -123,7 +123,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         // Walls inside a solid can be identified only by given normals, and some points of such walls may remain.
         // Therefore given normals are not overruled if they have identified enclosed points.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
-            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kCloud.some &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
+                kOrientation.contradicted &&
             // In narrow folds it is the computed normals that are wrong, and their surface misses more points.
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
                 fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
@@ -156,7 +157,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
         cloud.points = merge_close_points(points, 0);
         cloud.scale = measure_cloud_scale(cloud.points, run);
         // If there are many stray points, some can be detected only after others were removed.
-        for (int round = 0; round < kCommon.rounds; ++round) {
+        for (int round = 0; round < kCloud.settling; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
             std::size_t kept = 0;
             for (std::size_t n = 0; n < stray.size(); ++n)
@@ -164,7 +165,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
             const std::size_t gone = stray.size() - kept;
             cloud.stray += gone;
             cloud.points.resize(kept);
-            if (double(gone) < kCloud.few * double(stray.size())) break;
+            if (double(gone) < kOrientation.many_stray * double(stray.size())) break;
         }
         choose_orientation(cloud, carried(hints, points, cloud.points), run);
     });

@@ -9,7 +9,6 @@
 
 #include "base/heuristics.h"
 #include "base/median.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
@@ -17,6 +16,9 @@
 
 namespace covol {
 namespace {
+
+constexpr double kCellRadii = 2;      // edge of the cells for sorting points, in initial radii
+constexpr std::size_t kNearest = 12;  // twice the unknowns of a quadric
 
 /// Standard deviation of points from the best-fitting quadric over the plane of the last two axes.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
@@ -56,8 +58,8 @@ Eigen::Vector3d from_to(const Vec3& from, const Vec3& to) {
 
 struct Around {
     double reach = 0;  ///< radius that contains the points
-    double count = 0;  ///< number of points
-    double noise = 0;  ///< their standard deviation from a quadric; 0 if they are too few for one
+    double count = 0;  ///< number of points; 0: too few
+    double noise = 0;  ///< their standard deviation from a quadric
 };
 
 Around measure_around(const cloud::PointCells& cells, const Vec3& at, double radius) {
@@ -69,7 +71,8 @@ Around measure_around(const cloud::PointCells& cells, const Vec3& at, double rad
             const Eigen::Vector3d v = from_to(at, cells.sorted()[p]);
             if (v.squaredNorm() <= radius * radius) near.emplace_back(v / radius);
         }
-    return {radius, double(near.size()), near.size() < kCommon.quadric ? 0 : radius * off_sheet(near)};
+    if (near.size() < kCommon.quadric) return {};
+    return {radius, double(near.size()), radius * off_sheet(near)};
 }
 
 /// Examines a sample of the points with the nearest neighbours of each.
@@ -77,14 +80,14 @@ std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud
                                     std::size_t step) {
     tbb::concurrent_vector<Around> around;  // the order does not affect the medians
     cloud::for_nearest(
-        cells, 2 * nearest, kCommon.quadric - 1,
+        cells, 2 * nearest, kNearest - 1,
         [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
-            if (near.size() + 1 < kCommon.quadric) return;
+            if (near.size() + 1 < kNearest) return;
             const double reach = std::sqrt(near.back().squared);
             std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
             for (const cloud::Neighbour& other : near)
                 places.push_back(from_to(points[point], cells.sorted()[other.at]) / reach);
-            around.push_back({reach, double(kCommon.quadric), reach * off_sheet(places)});
+            around.push_back({reach, kNearest, reach * off_sheet(places)});
         },
         [&](std::size_t n) { return n % step == 0; });
     return {around.begin(), around.end()};
@@ -104,32 +107,28 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const double nearest = scale.nearest = measure_spacing(points).median;
     scale.spacing = 2 * nearest;  // the expected value for points that are distributed evenly at random
     if (!(nearest > 0)) return scale;
-    const std::size_t step = std::max<std::size_t>(1, points.size() / kCommon.sample);
-    const cloud::PointCells cells(points, kNear.first_radius * scale.spacing);
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
+    double radius = kCloudScale.first_spacings * nearest, best = 1;
+    const cloud::PointCells cells(points, kCellRadii * radius);
     const std::vector<Around> closest = measure_nearest(points, cells, nearest, step);
     scale.near_reach = median_of(closest, [](const Around& a) { return a.reach; });
     scale.near_noise = median_of(closest, [](const Around& a) { return a.noise; });
-    // From a disc with about as many points as a quadric requires to the whole cloud.
-    const double widest = longest_side(bounding_box(points));
-    double radius = kCloud.coarse * scale.spacing, best = 1;
-    do {
+    for (int n = 0; n < kCloudScale.radii; ++n, radius *= kCommon.growth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);
         tbb::parallel_for(std::size_t(0), around.size(),
                           [&](std::size_t m) { around[m] = measure_around(cells, points[m * step], radius); });
-        // Of all neighbourhoods: those with enough points for a quadric are the denser ones.
-        const double count = median_of(around, [](const Around& a) { return a.count; });
-        if (count < double(kCommon.quadric)) continue;
-        std::erase_if(around, [](const Around& a) { return a.count < double(kCommon.quadric); });
+        std::erase_if(around, [](const Around& a) { return a.count == 0; });
+        if (2 * around.size() * step < points.size()) continue;  // too few neighbours yet
         const double noise = median_of(around, [](const Around& a) { return a.noise; });
         if (noise / radius < best) {
             best = noise / radius;
-            scale.spacing = radius * std::sqrt(M_PI / count);
+            scale.spacing = median_of(around, [&](const Around& a) { return radius * std::sqrt(M_PI / a.count); });
             scale.noise = noise;
         }
         // In wider neighbourhoods, only the surface's own curvature would add to the deviation.
         if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
-    } while ((radius *= kCommon.growth) < widest);
+    }
     return scale;
 }
 

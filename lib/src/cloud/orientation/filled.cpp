@@ -56,7 +56,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
     const auto all = double(points.size());
     if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth: 12 times the minimum
     const PointCells cells(points, spacing);
-    std::vector<Neighbourhood> around(std::min(points.size(), kCommon.sample));
+    std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
     // Not at regular intervals, which would sample points in rows at the same position of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
@@ -80,7 +80,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
 
 Orientation orient_filled(const std::vector<Vec3>& points, const CloudScale& scale) {
     // For evenly random points, a ball of radius near_reach contains eleven others.
-    const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / double(kCommon.quadric - 1));
+    const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / 11);
     StackField density =
         spread(grid_around(points, {}, kCloud.coarse * spacing), points, std::vector<double>(points.size(), 1.0));
     std::vector<double> values(points.size());

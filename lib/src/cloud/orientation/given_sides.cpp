@@ -15,12 +15,15 @@
 #include "cloud/orientation/propagation.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
+#include "points/heuristics.h"
 #include "points/kd_tree.h"
 #include "points/neighbours.h"
 
 namespace covol {
 namespace cloud {
 namespace {
+
+constexpr double kHalfwayInside = 0.75;  // indicator halfway between the border, 1/2, and the inside, 1
 
 std::size_t count_known(const std::vector<Vec3>& directions) {
     return std::size_t(std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
@@ -72,7 +75,7 @@ public:
     /// Reverses single normals that the indicator contradicts; points without a normal take the direction in which the
     /// indicator decreases.
     void resolve_contradictions() {
-        for (int n = 0; n < kCommon.rounds; ++n) {
+        for (int n = 0; n < kCloud.settling; ++n) {
             compute_indicator(std::vector<char>(points_.size(), 1));
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -102,7 +105,7 @@ private:
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
             vectors[n] = selected[n] ? times(oriented_.areas[n], oriented_.normals[n]) : Vec3{0, 0, 0};
-        field_.solve(points_, vectors, kConvergedCycles, run_);
+        field_.solve(points_, vectors, kIndicator.cycles_from_nothing, run_);
         scale_to_half(field_, points_);
     }
 
@@ -121,7 +124,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
     for_nearest(cells, spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         for (const Neighbour& other : near) {
             const double up = dot(minus(cells.sorted()[other.at], points[point]), normals[point]);
-            if (up * up < kCloud.flat * kCloud.flat * other.squared &&
+            if (up * up < kGivenSides.flat * kGivenSides.flat * other.squared &&
                 dot(normals[point], normals[cells.order()[other.at]]) < -kCommon.turn)
                 is_torn[point] = 1;
         }
@@ -131,7 +134,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
 
 /// Computes the indicator of an orientation's normals and scales the areas accordingly.
 void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result, const RunContext& run) {
-    solve(field, points, result, kConvergedCycles, run);
+    solve(field, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(field, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(field);
@@ -145,7 +148,7 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
     HeldOutHints held_out(points, given, scale, run);
     result.report.predicted = held_out.predicted(result.report, is_outward);
     result.report.why_not.clear();
-    if (result.report.predicted < kGivenSides.min_right) {
+    if (result.report.predicted < kGivenSides.min_predicted) {
         result.report.why_not = "one half of them does not predict the sides of the other half";
         return false;
     }
@@ -156,10 +159,10 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);
     // Noise that moves points across a thin part leaves them with normals of the opposite side.
-    for (int n = 0; own.turned > kCloud.few && n < kCloud.settling; ++n) {
+    for (int n = 0; own.turned > kCloud.few && n < kGivenSides.smoothings; ++n) {
         for (std::size_t p = 0; p < points.size(); ++p)
             own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
-        if (n + 1 < kCloud.settling) find_indicator(field, points, own, run);
+        if (n + 1 < kGivenSides.smoothings) find_indicator(field, points, own, run);
     }
     result.report.used = true;
     return true;
@@ -170,12 +173,11 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
 std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                                 const Indicator& indicator, const CloudScale& scale, double reach) {
     std::vector<char> alone(points.size()), enclosed(points.size());
-    const double halfway = (0.5 + 1) / 2;  // from the border to the inside
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         if (normals[n] == Vec3{0, 0, 0}) return;  // its sides are not known
         const Vec3 away = times(reach, normals[n]);
         alone[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
-                             indicator.inside(minus(points[n], away))}) > halfway;
+                             indicator.inside(minus(points[n], away))}) > kHalfwayInside;
     });
     // Noise moves single points into the solid, whereas the points of a wall inside it are next to each other.
     const PointCells cells(points, kNear.first_radius * scale.spacing);
@@ -204,13 +206,13 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     if (points.size() < 4 || !(scale.spacing > 0)) return result;
     result.report.normals = count_known(hints.normals);
     result.report.sensors = count_known(hints.to_sensor);
-    // Those of fewer than half of the points are not used.
-    if (2 * result.report.normals >= points.size() &&
+    const double minimum = 0.5 * double(points.size());  // normals or sensors of a minority are not used
+    if (double(result.report.normals) >= minimum && result.report.normals > 0 &&
         use(points, hints.normals, hints.is_outward, scale, cell, result, run))
         return result;
     run.check();
-    if (2 * result.report.sensors < points.size()) return result;
-    if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_right) {
+    if (double(result.report.sensors) < minimum || result.report.sensors == 0) return result;
+    if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_free_views) {
         if (result.report.normals == 0) result.report.why_not = "most points are not visible from the sensor";
         return result;
     }

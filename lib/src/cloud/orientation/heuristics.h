@@ -1,11 +1,19 @@
 #pragma once
 // The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
+#include <cstddef>
+
 #include "base/heuristics.h"
 
 namespace covol {
 
 /// Spacing and noise of a cloud from quadrics fitted to neighbourhoods of increasing size: cloud_scale.cpp.
 struct CloudScaleHeuristics {
+    /// [points] Number of sampled points from whose neighbourhoods the medians are computed.
+    std::size_t samples = heuristic("cloud_scale.samples", 2000);
+    /// [count] Maximum number of radii that are tried.
+    int radii = heuristic("cloud_scale.radii", 14);
+    /// [median distances to the nearest point] The first radius.
+    double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
     /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; it is 0.45 for points that
     /// fill a ball.
     double sheet = heuristic("cloud_scale.sheet", 0.15);
@@ -16,13 +24,23 @@ COVOL_HEURISTICS CloudScaleHeuristics kCloudScale{};
 
 /// Points that lie on no sheet: stray.cpp.
 struct StrayHeuristics {
+    /// [points] Sample for the median distance to the last of these neighbours.
+    std::size_t samples = heuristic("stray.samples", 20000);
+    /// [noises] Minimum edge of the search cells: in a layer several spacings thick, a cell of one spacing has few
+    /// points.
+    double cell_noises = heuristic("stray.cell_noises", 0.5);
     /// [median distances to the last neighbour] Distance of the last neighbour from which on a point is isolated.
     double far = heuristic("stray.far", 2.5);
+    /// [distances to the last neighbour] Deviation of the neighbours or of the point from their plane, from which on an
+    /// isolated point is on no sheet.
+    double off_plane = heuristic("stray.off_plane", 0.25);
 };
 COVOL_HEURISTICS StrayHeuristics kStray{};
 
 /// Points that fill a solid: filled.cpp.
 struct FilledHeuristics {
+    /// [points] Number of sampled points whose neighbourhoods are examined.
+    std::size_t samples = heuristic("filled.samples", 400);
     /// [radii] Minimum standard deviation along any direction, at all radii, for points that fill a solid: measured
     /// 0.29 to 0.42 for balls, boxes, tori and lattices, at most 0.24 for surfaces with noise and thin parts.
     double min_thickness = heuristic("filled.min_thickness", 0.27);
@@ -43,13 +61,46 @@ struct OrientationHeuristics {
     double surely_enclosed = heuristic("orientation.surely_enclosed", 1.2);
     /// [spacings] Cell of the finest lattice: with smaller ones single points may turn, larger ones lose thin parts.
     double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
-    /// [cells] Maximum along the longest side in the first attempts, and of the cells that block a view: limits time
-    /// and memory.
+    /// [spacings] Minimum cell of any attempt.
+    double min_spacings = heuristic("orientation.min_spacings", 0.5);
+    /// [ratio] Weight of the deviation beyond that, relative to the fraction of normals that turned, in the comparison
+    /// of attempts: fewer normals turn at walls that merge than at unstable ones.
+    double off_weight = heuristic("orientation.off_weight", 2);
+    /// [cells of the first attempt] Cell of the lattice on which attempts are compared: fine enough to keep walls
+    /// separate.
+    double strain_cells = heuristic("orientation.strain_cells", 0.67);
+    /// [cells of the first attempt] Cell of the last attempt: noise makes the first cells wider than thin walls.
+    double thin_cells = heuristic("orientation.thin_cells", 0.44);
+    /// [cells of the first attempt] Cell above which the chosen lattice is refined because it is too coarse for its
+    /// normals.
+    double coarse = heuristic("orientation.coarse", 1.2);
+    /// [spacings] Noise below which a surface may be as fine as the lattice on which attempts are compared.
+    double little_noise = heuristic("orientation.little_noise", 0.5);
+    /// [points] Number used in the iteration per area of a lattice cell's face.
+    double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
+    /// [cells] Maximum along the longest side in the first attempts.
     double first_along = limit("orientation.first_along", 192);
     /// [points] Maximum number used in the iteration: limits the time.
     double max_sampled = limit("orientation.max_sampled", 100000);
-    /// [spacings] Noise below which the points of a sheet lie beside one another, not above.
-    double sharp = heuristic("orientation.sharp", 0.3);
+    /// [points] Minimum number used in the iteration: for parts so far apart that each lies in one cell of the lattice.
+    std::size_t min_sampled = heuristic("orientation.min_sampled", 100);
+    /// [spacings] Edge of the cells by which points are ordered for sampling.
+    double sample_spacings = heuristic("orientation.sample_spacings", 4);
+    /// [spacings] Noise below which the nearest points determine the sheet of a point.
+    double sharp = heuristic("orientation.sharp", 0.2);
+    /// [spacings] Noise up to which points that enclose nothing are oriented from neighbour to neighbour.
+    double noise_of_sheets = heuristic("orientation.noise_of_sheets", 0.3);
+    /// [fraction of the points] Minimum that a round must remove for another one.
+    double many_stray = heuristic("orientation.many_stray", 0.005);
+    /// [fraction of the points] Maximum whose given normals contradict an orientation that has settled; it is above 0.1
+    /// if a part of them is turned as a whole.
+    double contradicted = heuristic("orientation.contradicted", 0.03);
+    /// [fraction of the points] Doubt below which points enclose a solid: up to 0.013 for closed shapes, 0.026 to 0.19
+    /// for scans of one side.
+    double settled = heuristic("orientation.settled", 0.014);
+    /// [fraction of the area] Without points, below which points enclose a solid in spite of doubt: less than 0.01 for
+    /// closed shapes, 0.14 to 0.4 for scans of one side.
+    double bare = heuristic("orientation.bare", 0.05);
     /// [ratio] Of the points missed by a doubtful orientation to those missed by the orientation from views, below
     /// which points enclose a solid nevertheless: 0.06 to 0.21 for closed shapes and shells open at one end, 0.83 to
     /// 0.97 for scans of one side, 0.44 for thin noisy shells.
@@ -61,18 +112,26 @@ COVOL_HEURISTICS OrientationHeuristics kOrientation{};
 
 /// Normals and sensors of the file, checked: given_sides.cpp.
 struct GivenSidesHeuristics {
-    /// [fraction] Minimum of the normals that the other half predicts, and of the points that their sensor sees; at
-    /// least half of meaningless normals are predicted, and a body hides at least half of itself from a wrong position.
-    double min_right = heuristic("given_sides.min_right", 0.65);
+    /// [fraction of the normals] Minimum that must be predicted by the other half; half of meaningless normals are.
+    double min_predicted = heuristic("given_sides.min_predicted", 0.65);
+    /// [fraction of the points] Minimum that their sensor must see: a body hides at least half of itself from a wrong
+    /// position.
+    double min_free_views = heuristic("given_sides.min_free_views", 0.7);
     /// [indicator's step over a cell] Slope from which on the indicator contradicts a normal.
     double speaks_against = heuristic("given_sides.speaks_against", 0.1);
+    /// [rounds] Of smoothing normals that are mixed by noise.
+    int smoothings = heuristic("given_sides.smoothings", 2);
+    /// [sine] Of a neighbour's elevation from the tangent plane, below which both points are on one sheet.
+    double flat = heuristic("given_sides.flat", 0.3);
 };
 COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
 
 /// Normals of local planes, with signs propagated from neighbour to neighbour: propagation.cpp.
 struct PropagationHeuristics {
-    /// [points] Maximum to which a plane is fitted: limits the time.
+    /// [points] Maximum in it.
     double maximum = limit("propagation.maximum", 100);
+    /// [points] Neighbours from which a point may take its sign.
+    std::size_t neighbours = heuristic("propagation.neighbours", 10);
 };
 COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 
@@ -80,8 +139,22 @@ COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 struct ViewsHeuristics {
     /// [rays] From each cell, evenly distributed over the sphere.
     int rays = heuristic("views.rays", 96);
+    /// [cells] Maximum along the longest side: limits memory.
+    int max_view_cells = limit("views.max_view_cells", 256);
+    /// [cells] Start of a ray, beyond the point's own sheet.
+    double first_step = heuristic("views.first_step", 2.5);
+    /// [spacings or noises] Edge of the cells of the indicator that determines the topology.
+    double coarse_spacings = heuristic("views.coarse_spacings", 2.4);
+    /// [spacings or noises] Edge of the cells of the screened indicator.
+    double fine_spacings = heuristic("views.fine_spacings", 1.2);
+    /// [fraction of the points] With a free view in one direction and not in the opposite one, from which on the
+    /// direction is the sky's.
+    double sky = heuristic("views.sky", 0.01);
     /// [weight] Of each point's own free directions, relative to the sky's.
     double beside_sky = heuristic("views.beside_sky", 0.1);
+    /// [fraction of all directions] Excess of free directions on one side over the other from which a point is seen on
+    /// that side.
+    double min_free = heuristic("views.min_free", 0.01);
     /// [indicator's slope over a cell] Weight of the points in the screened indicator (Kazhdan and Hoppe, Screened
     /// Poisson surface reconstruction, ACM Trans. Graph. 32(3), 2013).
     double screening = heuristic("views.screening", 4);

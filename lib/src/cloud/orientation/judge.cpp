@@ -20,11 +20,16 @@ double finest_cell(const CloudScale& scale, std::size_t points) {
 double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
     return std::max(finest_cell(scale, points.size()), indicator_side(points) / kOrientation.first_along);
 }
+namespace {
 
-// The mean of the indicator deviates by at most 1/2, and twice its deviation is thus a fraction as well.
-double doubt(const Orientation& o) { return o.turned + 2 * std::max(0.0, o.off_half - kCloud.some); }
+double weighted_doubt(const Orientation& o, double weight) {
+    return o.turned + weight * std::max(0.0, o.off_half - kCloud.some);
+}
 
-bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }
+}  // namespace
+
+double doubt(const Orientation& o) { return weighted_doubt(o, kOrientation.off_weight); }
+bool is_settled(const Orientation& o) { return weighted_doubt(o, 1) < kCloud.few; }
 
 double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     std::vector<char> passed(points.size());

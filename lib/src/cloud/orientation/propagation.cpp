@@ -13,6 +13,7 @@
 #include "base/geometry.h"
 #include "base/heuristics.h"
 #include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
@@ -64,9 +65,9 @@ struct Edge {
 
 std::vector<Edge> edges_of(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
-    std::vector<Edge> edges(points.size() * kCommon.ring);
-    for_nearest(cells, spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        std::size_t at = point * kCommon.ring;
+    std::vector<Edge> edges(points.size() * kPropagation.neighbours);
+    for_nearest(cells, spacing, kPropagation.neighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+        std::size_t at = point * kPropagation.neighbours;
         for (const Neighbour& neighbour : near) {
             const std::uint32_t other = cells.order()[neighbour.at];
             const Vec3 way = unit(minus(points[other], points[point]));
@@ -83,7 +84,6 @@ std::vector<Edge> edges_of(const std::vector<Vec3>& points, const std::vector<Ve
 }  // namespace
 
 std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const CloudScale& scale) {
-    // Noise must not be taken for the direction of the plane.
     const double radius = kCommon.errors * scale.noise / scale.spacing;  // in spacings
     const auto count = std::size_t(std::clamp(M_PI * radius * radius, double(kCommon.quadric), kPropagation.maximum));
     const PointCells cells(points, kNear.first_radius * scale.spacing);

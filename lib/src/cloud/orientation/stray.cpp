@@ -7,8 +7,8 @@
 #include "base/geometry.h"
 #include "base/heuristics.h"
 #include "base/median.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
@@ -18,7 +18,7 @@ constexpr std::size_t kBeside = 16;
 
 /// Median distance to the last neighbour, over a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
-    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kCommon.sample);
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
     std::vector<double> reach(count, -1);
     for_nearest(
         cells, spacing, kCommon.ring,
@@ -54,8 +54,7 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
 std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
     if (points.size() <= 2 * kCommon.ring) return stray;
-    // In a layer several spacings thick, a cell of about one spacing has few points.
-    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, scale.noise));
+    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, kStray.cell_noises * scale.noise));
     const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> isolated(points.size());
@@ -77,7 +76,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
                          reach = std::sqrt(near.back().squared);
             // The farther the neighbours, the flatter they must be.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
-            stray[point] = off * reach / far_reach > kCloud.flat;
+            stray[point] = off * reach / far_reach > kStray.off_plane;
         },
         [&](std::size_t n) { return isolated[n] != 0; });
     return stray;

@@ -32,9 +32,9 @@ std::vector<Vec3> directions() {
     return all;
 }
 
-/// Unit directions; 0 if the excess of free rays on one side over the other is less than one ray.
+/// Unit directions; 0 if about as much is free on one side as on the other.
 std::vector<Vec3> towards(std::vector<Vec3> free) {
-    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > 1.0 / kViews.rays ? unit(way) : Vec3{0, 0, 0};
+    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.min_free ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
 
@@ -42,7 +42,7 @@ std::vector<Vec3> towards(std::vector<Vec3> free) {
 class Occupied {
 public:
     Occupied(const std::vector<Vec3>& points, double cell)
-        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kOrientation.first_along)) {
+        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kViews.max_view_cells)) {
         std::size_t all = 1;
         for (std::size_t a = 0; a < 3; ++a) {
             count_[a] = std::ptrdiff_t((box_.max[int(a)] - box_.min[int(a)]) / cell_) + 1;
@@ -55,8 +55,7 @@ public:
     [[nodiscard]] double cell() const { return cell_; }
 
     [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
-        // Starts beyond the point's own sheet.
-        for (double t = kCloud.coarse;; ++t) {
+        for (double t = kViews.first_step;; ++t) {
             const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1],
                                              from[2] + t * cell_ * direction[2]});
             if (at < 0) return true;
@@ -123,7 +122,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
         }
     });
     Vec3 sky{0, 0, 0};
-    if (*std::max_element(seen.begin(), seen.end()) > kCloud.some * double(points.size())) {
+    if (*std::max_element(seen.begin(), seen.end()) > kViews.sky * double(points.size())) {
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
         sky = unit(sky);
     }
@@ -146,7 +145,7 @@ double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& d
 
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
                   const StackField* start, Orientation& result, const RunContext& run) {
-    WindingField fine(indicator_grid(points, result.areas, apart(scale)));
+    WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * apart(scale)));
     const double cell = fine.indicator().stack().cell();
     // A view determines only the side of a normal; its direction is estimated better from its neighbours.
     std::vector<double> screen(points.size());
@@ -161,7 +160,7 @@ void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, cons
     result.turned = double(against) / double(points.size());
     if (start != nullptr) fine.start_from(*start);
     fine.screen(points, screen);
-    solve(fine, points, result, kConvergedCycles, run);
+    solve(fine, points, result, kIndicator.cycles_from_nothing, run);
     result.screened = make_indicator(fine);
 }
 
@@ -172,8 +171,8 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
-    WindingField coarse(indicator_grid(points, result.areas, kCloud.coarse * between));
-    solve(coarse, points, result, kConvergedCycles, run);
+    WindingField coarse(indicator_grid(points, result.areas, kViews.coarse_spacings * between));
+    solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     const std::vector<char> turned = turn_layers(coarse, points, free, between, result, run);

@@ -4,8 +4,8 @@
 #include <catch2/catch.hpp>
 
 #include "cloud/indicator/areas.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
+#include "cloud/orientation/heuristics.h"
 #include "support/clouds.h"
 #include "support/surface_samples.h"
 
@@ -30,7 +30,7 @@ struct Layers {
         orientation.areas = areas_of(points, spacing);
         WindingField field(
             indicator_grid(points, {}, longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond) / 80));
-        solve(field, points, orientation, kConvergedCycles, {});
+        solve(field, points, orientation, kIndicator.cycles_from_nothing, {});
         const double half = scale_to_half(field, points);
         for (double& area : orientation.areas) area *= half;
         const std::vector<char> turned = turn_layers(field, points, free, spacing, orientation, {});
