@@ -186,7 +186,12 @@ def make_phantoms(folder, covol):
         for number, radius in enumerate((0.75 + wide ** 0.5, 0.75 - wide ** 0.5) if wide > 0 else ()):
             rows += [(k, number, 21.5 + radius * np.cos(t) * 44 / 2.6, 21.5 + radius * np.sin(t) * 44 / 2.6) for t in np.arange(0, 6.28, 0.35)]
     np.savetxt(folder / "contours.csv", rows, "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
-    np.savetxt(folder / "contours_few.csv", [row for row in rows if row[0] % 8 == 0], "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
+    sphere = read_nrrd(folder / "l_sphere.nrrd")[0] > 0
+    rows = []
+    for k in range(3, 42, 6):
+        radius = (sphere[k].sum() / np.pi) ** 0.5
+        rows += [(k, 0, 21.5 + radius * np.cos(t), 21.5 + radius * np.sin(t)) for t in np.arange(0, 6.28, 0.35) if radius > 1]
+    np.savetxt(folder / "contours_sphere.csv", rows, "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
 
 
 def mask_error(folder, path, name):
@@ -308,7 +313,7 @@ JOBS = {  # name: (arguments, kind of truth, shape, more)
     "m grow slit": ("segment ../in/p_slit.nrrd --theta 0 --inside 0.3,0.3,0.3 -o s.vdb --mask m.nrrd", "mask", "slit"),
     **{f"m lapse {name}": (f"segment ../in/p_{name}.nrrd ../in/p_{name}_moved.nrrd --points ../in/p_{name}.csv -o s.vdb --mask m.nrrd", "lapse", f"{name}_moved")
        for name in MOVED},
-    "m contours few": ("segment ../in/p_torus.nrrd --contours ../in/contours_few.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m contours sphere": ("segment ../in/p_sphere.nrrd --contours ../in/contours_sphere.csv -o s.vdb --mask m.nrrd", "mask", "sphere"),
     "m painted round": ("segment ../in/p_round.nrrd --painted ../in/s_round.nrrd -o s.vdb --mask m.nrrd", "mask", "round"),
     "m contours": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m contours alone": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv --rho 0 -o s.vdb --mask m.nrrd", "mask", "torus"),
@@ -322,7 +327,7 @@ GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "half open
 TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere", "spikes tag"]
 ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours alone"]
 GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
-CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box", "m contours few", "m painted round"]
+CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box", "m contours sphere", "m painted round"]
 CORRECTED = ["m guess", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
 GROWN = ["m grow", "m grow box", "m grow torus", "m grow round", "m grow wide", "m grow slit"]
 LAPSES = [f"m lapse {name}" for name in MOVED]

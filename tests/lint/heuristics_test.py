@@ -15,7 +15,7 @@ CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re
 DECLARED = re.compile(r"^(?:struct|COVOL_HEURISTICS \w+) (\w+)", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
-    "cloud/indicator/iteration.cpp:kSteady", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/orientation/given_sides.cpp:kHalfwayInside", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
     "cloud/surface/hold_topology.cpp:kHeld",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
@@ -24,7 +24,7 @@ ALLOWED = {
     "edge/edge.cpp:kHaloSigmas", "edge/edge.cpp:kHeatTolerance", "edge/edge.cpp:kLargestHeatStep", "evolve/band_solver.cpp:kDiverged", "evolve/band_solver.cpp:kLocalGoal", "evolve/band_solver.cpp:kMaxOmega", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
     "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/guess_correction.cpp:kVoxelEnd",
     "guess/marks_surface.cpp:kExact", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMaxCells", "guess/marks_surface.cpp:kWholeWeight",
-    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kMinLambda", "guess/variational.cpp:kNoStep",
+    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kMinLambda", "guess/variational.cpp:kNoStep", "guess/variational.cpp:kRounding",
     "guidance/border_profile.cpp:kIgnoredWeight", "guidance/learning.cpp:kSteepest", "guidance/motion.cpp:kFinest", "guidance/motion.cpp:kMinNoise", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kMinSigma", "holes/holes.cpp:kP95OfSpacing", "holes/holes.cpp:kStep", "holes/membrane.cpp:kMinWeight",
     "inference/appearance.cpp:kConverged", "inference/appearance.cpp:kFeatureSigmas", "inference/candidate.cpp:kCells", "inference/candidate.cpp:kFarCells",
     "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMaxCells",

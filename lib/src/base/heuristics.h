@@ -59,7 +59,7 @@ struct CommonHeuristics {
     /// [standard errors] Difference from which on a measured value is not explained by chance.
     double errors = heuristic("common.errors", 4.0);
     /// [rounds] Maximum number in which a step is repeated until it changes nothing: a repair, a reweighted fit, the
-    /// body of marks and image, the passes of the image between contours.
+    /// body of marks and image.
     int rounds = heuristic("common.rounds", 4);
     /// [ratio] Of a length to the one before it when a suitable scale is searched: an area doubles.
     double growth = heuristic("common.growth", 1.4142135623730951);
