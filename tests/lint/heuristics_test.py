@@ -15,7 +15,7 @@ CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re
 DECLARED = re.compile(r"^(?:struct|COVOL_HEURISTICS \w+) (\w+)", re.M)
 ALLOWED = {
     "base/domain.cpp:kAnchorVoxels", "base/domain.cpp:kFarthestVoxel", "base/domain.cpp:kMaxVoxelsPerAxis", "base/domain.cpp:kMin",
-    "cloud/orientation/given_sides.cpp:kHalfwayInside", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/orientation/given_sides.cpp:kHalfwayInside", "cloud/surface/cloud_field.cpp:kMaxLeaves", "cloud/surface/crease.cpp:kFlat",
     "cloud/surface/hold_topology.cpp:kHeld",
     "cloud/surface/sharp_mesh.cpp:kBeside", "cloud/surface/sharp_mesh.cpp:kLineHeight", "cloud/surface/sharp_mesh.cpp:kLongestMove",
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",

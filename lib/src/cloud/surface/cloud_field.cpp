@@ -27,7 +27,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 namespace {
 
-/// Lowest reach of a quadric: half the half width of the band. Nodes of quadrics are half of that apart, so that it is
+/// Minimum reach of a quadric: half the half width of the band. Nodes of quadrics are half of that apart, so that it is
 /// more than the diagonal of their cells.
 double min_reach(double h) { return 0.5 * kHalfWidthVoxels * h; }
 
