@@ -51,7 +51,6 @@ SCANNED = {"apc_rawlings_baseball": 0, "apc_scotch_duct_tape": 1, "apc_fitness_g
 BALL = "apc_rawlings_baseball", (-0.0003, -0.0014, 0.0049), 0.0355  # metres
 # name: (what is switched off, COVOL_SCALE, panels)
 MECHANISMS = {
-    "agreement": ("a guess that agrees with the image is kept", "inference.agreement=2", ("marks",)),
     "redraw": ("a guess is redrawn by the image", "inference.redraw_bits=1000", ("jobs",)),
     "iterations": ("the second iteration of guidance", "guidance.iterations=0.5", ("marks", "jobs")),
     "level_blur": ("blur over levels of intensity", "guidance.level_blur=0.001", ("marks", "jobs")),

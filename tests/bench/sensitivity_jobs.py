@@ -157,7 +157,7 @@ def read_nrrd(path):
     return np.frombuffer(body, kind).reshape([int(n) for n in fields["sizes"].split()][::-1]), head
 
 
-MOVED = {"round": (2, -3, 1), "torus": (1, 2, 2), "two": (-2, 1, 0)}  # voxels along z, y and x, from one image of a time-lapse to the next
+MOVED = {"round": (2, -3, 1), "torus": (1, 2, 2), "two": (-2, 1, 0), "box": (1, -1, 2), "sphere": (3, 0, -2), "many": (0, 2, -2)}  # voxels along z, y and x, from one image of a time-lapse to the next
 
 
 def make_phantoms(folder, covol):
@@ -338,10 +338,10 @@ REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) fo
 DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
 PLAN = {  # step: the jobs that exercise it
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
-    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
+    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "torn", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": CORRECTED,
+    **dict.fromkeys(("guess", "isolated"), ALONE), "correction": CORRECTED,
     "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": REAL_FEW, "doubts": DOUBTED,
     **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
     **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]), "pieces": GUESSED,
