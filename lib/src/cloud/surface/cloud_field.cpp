@@ -9,8 +9,8 @@
 #include <limits>
 
 #include "base/geometry.h"
-#include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/surface/blend_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/local_fit.h"
@@ -25,14 +25,6 @@ namespace covol::cloud {
 using openvdb::Coord;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-namespace {
-
-/// Minimum reach of a quadric: half the half width of the band. Nodes of quadrics are half of that apart, so that it is
-/// more than the diagonal of their cells.
-double min_reach(double h) { return 0.5 * kHalfWidthVoxels * h; }
-
-}  // namespace
-
 /// Quadrics with the distance up to which they apply, sorted into cells.
 class CloudField::Pieces {
 public:
@@ -42,11 +34,11 @@ public:
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
-            // The whole band, and the points that determine the quadric. It was not fitted beyond its radius, and folds
-            // over beyond that of its curvature.
-            const double wanted = std::max({kHalfWidthVoxels * h, q.min_radius, kBlend.reach_of_radius * q.radius});
-            const double maximum = kBlend.valid * std::min(q.radius, 1 / q.curvature());
-            reach_.push_back(float(std::max(min_reach(h), std::min(wanted, maximum))));
+            const double wanted = std::max(
+                {kBlend.reach_voxels * h, kBlend.reach_of_min * q.min_radius, kBlend.reach_of_radius * q.radius});
+            reach_.push_back(float(std::max(
+                kBlend.min_reach_voxels * h,
+                std::min({wanted, kBlend.max_of_radius * q.radius, kBlend.max_of_curvature / q.curvature()}))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
         quadrics_ = std::move(sorted);
@@ -60,7 +52,7 @@ public:
     /// is nearer.
     [[nodiscard]] double own_radius(std::size_t n) const {
         const Quadric& q = quadrics_[n];
-        return std::max({kBlend.valid * q.min_radius, min_reach(h_), 2 * q.apart});  // two cells of nodes
+        return std::max({kBlend.beside_of_min * q.min_radius, kBlend.min_reach_voxels * h_, kCloud.coarse * q.apart});
     }
     /// Half the sides of a box around the foot that contains the piece's own part of the narrow band.
     [[nodiscard]] Vec3 own_box(std::size_t n) const {
@@ -239,7 +231,7 @@ public:
                            domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
         gather(box);
         const double limit = kHalfWidthVoxels * h;
-        blend(near_.data(), near_.size(), float(h), float(kCommon.beyond_voxels * h), leaf_);
+        blend(near_.data(), near_.size(), float(h), float(kBlend.far_bands * limit), leaf_);
         for (int at = 0; at < 512; ++at) {
             double own = 0, trust = 0;
             const std::size_t n = std::size_t(at);
@@ -259,8 +251,7 @@ private:
     [[nodiscard]] double indicator_distance(const Vec3& world, double limit) const {
         const Indicator::Sample at = indicator_.at(world);
         const double off = 0.5 - at.inside, beyond = (std::abs(off) - kBlend.sure) / kBlend.sure;
-        // Two cubic splines in succession, of the points and of the values, have a slope of almost 1/2 per cell.
-        const double far = std::max(2 * at.cell * std::abs(off), limit * beyond);
+        const double far = std::max(std::abs(off) * at.cell / kBlend.slope, limit * beyond);
         return std::copysign(std::min(far, limit), off);
     }
 
@@ -377,12 +368,11 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
 /// Moves the points to the indicator's surface, as far as noise can have displaced them: otherwise there would be nodes
 /// throughout the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
-    constexpr int kSteps = 2;  // of Newton's method, which converges at once: the indicator is almost linear there
-    const double maximum = kCommon.errors * noise;
+    const double maximum = kBlend.max_noises * noise;
     points.squares_off.clear();
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
-        for (int step = 0; step < kSteps; ++step) {
+        for (int step = 0; step < kBlend.level_steps; ++step) {
             const auto [inside, gradient, cell] = indicator.at(place);
             const double steep = dot(gradient, gradient);
             if (!(steep > 0)) return;
@@ -410,8 +400,8 @@ std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, const Indicator&
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F),
                                squared_distances(cloud.points, indicator)};
     std::vector<Quadric> quadrics =
-        quadrics_over(near_level(points, indicator, cloud.scale.noise), points, 0.5 * min_reach(h), cloud.scale.spacing,
-                      cloud.scale.noise, report.bare_nodes, run);
+        quadrics_over(near_level(points, indicator, cloud.scale.noise), points, kBlend.node_voxels * h,
+                      cloud.scale.spacing, cloud.scale.noise, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "base/geometry.h"
-#include "base/heuristics.h"
 #include "base/median.h"
 #include "cloud/surface/heuristics.h"
 
@@ -19,10 +18,11 @@ using Eigen::Vector3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t kPlanePoints = 5;  // minimum on a sheet
-constexpr double kFlat = 1e-3;           // [radii] misfit of a perfect fit
-constexpr int kRobustTurns = 3;          // iterations of reweighting by distance
-constexpr int kTurns = 6;                // maximum number of iterations of k-planes
+constexpr std::size_t kPlanePoints = 5;     // minimum on a sheet
+constexpr std::size_t kQuadricPoints = 10;  // minimum on a curved sheet
+constexpr double kFlat = 1e-3;              // [radii] misfit of a perfect fit
+constexpr int kRobustTurns = 3;             // iterations of reweighting by distance
+constexpr int kTurns = 6;                   // maximum number of iterations of k-planes
 
 /// Points, with the sheet to which each belongs.
 struct Parts {
@@ -95,7 +95,7 @@ struct Parts {
                 sum += weights[n];
                 ++count;
             }
-        if (count < kCommon.quadric) return;
+        if (count < kQuadricPoints) return;
         for (int d = 3; d < 6; ++d) m(d, d) += kFit.ridge * sum;
         const Vector6 x = m.ldlt().solve(right);
         if (!x.allFinite()) return;

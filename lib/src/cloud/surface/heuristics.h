@@ -1,5 +1,7 @@
 #pragma once
 // The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
+#include <cstddef>
+
 #include "base/heuristics.h"
 
 namespace covol {
@@ -13,10 +15,10 @@ struct LocalFitHeuristics {
     double first_spacings = heuristic("local_fit.first_spacings", 2.0);
     /// [radii] Edge of the cells whose points are averaged before the fit.
     double thinned_fraction = heuristic("local_fit.thinned_fraction", 0.2);
-    /// [radii] Maximum misfit of a sheet, distance of its points from a plane through one of them, of its foot from the
-    /// node, and of the points' mean from the node: the misfit is 0.45 for points that fill a ball, and the mean 0.29
-    /// off for half a disc.
-    double sheet = heuristic("local_fit.sheet", 0.33);
+    /// [points] Minimum to which a quadric is fitted.
+    std::size_t min_points = heuristic("local_fit.min_points", 9);
+    /// [radii] Misfit above which the neighbourhood is not a sheet; it is 0.45 for points that fill a ball.
+    double sheet_fraction = heuristic("local_fit.sheet_fraction", 0.3);
     /// [ratio] Of the misfit to the points' distance from the indicator's surface, above which the neighbourhood
     /// contains more than one sheet. Smaller values mistake noise that the indicator follows for sheets; from 4 on some
     /// folds are missed.
@@ -28,23 +30,46 @@ struct LocalFitHeuristics {
     double misfit_growth = heuristic("local_fit.misfit_growth", 1.13);
     /// [fraction of the weights] Added to the equations of the curvatures, for points on a line.
     double ridge = heuristic("local_fit.ridge", 1e-4);
+    /// [radii] Distance from the plane above which points may belong to another sheet.
+    double sheet_height = heuristic("local_fit.sheet_height", 0.15);
+    /// [radii] Maximum distance of a sheet's foot from its node.
+    double max_height = heuristic("local_fit.max_height", 0.4);
+    /// [cosine] Minimum between the given normal and the fitted one.
+    double min_cosine = heuristic("local_fit.min_cosine", 0.4);
+    /// [radii] Minimum standard deviation of the points along any tangential direction; it is 0.35 if they fill the
+    /// disc.
+    double min_spread = heuristic("local_fit.min_spread", 0.16);
+    /// [radii] Maximum distance of the points' mean from the centre: 0.29 for half a disc, more beyond the end of a
+    /// sheet.
+    double max_off_centre = heuristic("local_fit.max_off_centre", 0.33);
+    /// [ratio] Maximum growth of the radius until the points form a sheet.
+    double max_growth = heuristic("local_fit.max_growth", 2.9);
+    /// [points] Minimum for a decision on which side most normals are.
+    double min_majority = heuristic("local_fit.min_majority", 5);
     /// [noises] Maximum correction of the height by which noise displaces points along a curved surface.
     double max_unbent = heuristic("local_fit.max_unbent", 0.5);
-    /// [distances between nodes] Minimum radius, also of creases, for all but the finest nodes: wide
-    /// quadrics need few nodes.
+    /// [ratio] Of the cells of the first nodes to those of the last, a power of two.
+    double widest = heuristic("local_fit.widest", 8);
+    /// [distances between nodes] Minimum radius for all but the finest nodes: wide quadrics need few nodes.
     double wide_of_apart = heuristic("local_fit.wide_of_apart", 7);
-    /// [minimum radii] Maximum radius until the points form a sheet, and ratio to the minimum radius of nearby quadrics
-    /// from more closely spaced points, above which a quadric is dropped.
-    double wider = heuristic("local_fit.wider", 2.5);
+    /// [cosine] Minimum between normals of quadrics of one sheet.
+    double same_sheet = heuristic("local_fit.same_sheet", 0.7);
+    /// [minimum radii] Ratio to the minimum radius of nearby quadrics from more closely spaced points, above which a
+    /// quadric is dropped; values of 2 to 4 give the same surfaces.
+    double lone = heuristic("local_fit.lone", 2.5);
 };
 COVOL_HEURISTICS LocalFitHeuristics kFit{};
 
 /// Sheets that meet: crease.cpp, local_fit.cpp.
 struct CreaseHeuristics {
+    /// [spacings] Radius of the neighbourhoods in which creases are sought: about 50 points.
+    double radius = heuristic("crease.radius", 4.0);
     /// [ratio] Maximum of the misfit of the sheets to that of one quadric.
     double misfit_ratio = heuristic("crease.misfit_ratio", 0.5);
     /// [radii] Misfit above which only noise is divided.
     double max_misfit = heuristic("crease.max_misfit", 0.05);
+    /// [distances between nodes] Minimum radius, as local_fit.wide_of_apart.
+    double wide_of_apart = heuristic("crease.wide_of_apart", 3);
     /// [cosine] Between normals above which sheets meet smoothly.
     double smooth_cosine = heuristic("crease.smooth_cosine", 0.9);
 };
@@ -52,16 +77,46 @@ COVOL_HEURISTICS CreaseHeuristics kCrease{};
 
 /// The blend of the quadrics with the indicator, as a level set: cloud_surface.cpp.
 struct CloudSurfaceHeuristics {
-    /// [radii] Desired minimum reach of a quadric.
+    /// [voxels] Desired minimum reach of a quadric.
+    double reach_voxels = heuristic("blend.reach_voxels", 2.5);
+    /// [minimum radii] The same, relative to the smallest neighbourhood that determines the quadric.
+    double reach_of_min = heuristic("blend.reach_of_min", 1.25);
+    /// [radii] The same, relative to the neighbourhood of the fit.
     double reach_of_radius = heuristic("blend.reach_of_radius", 0.35);
-    /// [radii, radii of curvature] Maximum reach; also the lateral distance, in minimum radii, beyond which there
-    /// should be other quadrics.
-    double valid = heuristic("blend.valid", 0.75);
+    /// [radii] Maximum reach: the quadric was not fitted beyond.
+    double max_of_radius = heuristic("blend.max_of_radius", 0.8);
+    /// [radii of curvature] Maximum reach: a quadric folds over beyond.
+    double max_of_curvature = heuristic("blend.max_of_curvature", 0.7);
+    /// [voxels] Minimum reach in any case.
+    double min_reach_voxels = heuristic("blend.min_reach_voxels", 1.5);
+    /// [minimum radii] Lateral distance beyond which there should be other quadrics.
+    double beside_of_min = heuristic("blend.beside_of_min", 0.75);
+    /// [half widths of the band] Distance from the nearest quadric beyond which no others are evaluated.
+    double far_bands = heuristic("blend.far_bands", 1.5);
     /// [reaches] Distance from which on the indicator gradually replaces the quadric.
     double trusted = heuristic("blend.trusted", 0.6);
+    /// [indicator per cell] Slope at the surface, which converts the indicator to a distance.
+    double slope = heuristic("blend.slope", 0.4);
     /// [indicator] Deviation from 1/2 from which on the surface is assumed to be farther away than the conversion
     /// gives; from twice that on it is out of the band.
     double sure = heuristic("blend.sure", 0.2);
+    /// [voxels] Distance between quadrics.
+    double node_voxels = heuristic("blend.node_voxels", 0.75);
+    /// [noises] Maximum distance by which their nodes are moved to the level.
+    double max_noises = heuristic("blend.max_noises", 3);
+    /// [steps] Of Newton's method for that move.
+    int level_steps = heuristic("blend.level_steps", 2);
+    /// [fraction of the points] The same.
+    double min_resting_fraction = heuristic("blend.min_resting_fraction", 1e-3);
+    /// [spacings] Cells of an indicator for points with gaps.
+    double coarse_spacings = heuristic("blend.coarse_spacings", 2.4);
+    /// [spacings] Distance from all points from which on the surface is bare.
+    double far_spacings = heuristic("blend.far_spacings", 3);
+    /// [fraction of the area] Bare, above which the points have gaps.
+    double open_fraction = heuristic("blend.open_fraction", 0.05);
+    /// [fraction of the points] Minimum on a separate piece if the points enclose nothing: such pieces are not thin
+    /// parts.
+    double min_resting_open = heuristic("blend.min_resting_open", 1e-2);
 };
 COVOL_HEURISTICS CloudSurfaceHeuristics kBlend{};
 

@@ -75,7 +75,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const FitPoints& near = scratch.near;
     keep_near(level, origin, axes, scratch);
     Fit result;
-    if (near.size < kCommon.quadric) return result;
+    if (near.size < kFit.min_points) return result;
     const FitSums sums = fit_sums(near);
     constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
                                    {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
@@ -84,13 +84,12 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
         for (int b = 0; b < 6; ++b) m(a, b) = sums.moments[kMoment[a][b]];
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
-    if (std::hypot(m(0, 1), m(0, 2)) > kFit.sheet * sum) return result;
-    // For narrow bodies, the quadric is undetermined across the points: they must be at least half as wide as points
-    // that fill the disc, whose variance along any direction is 1/8 with these weights.
+    if (std::hypot(m(0, 1), m(0, 2)) > kFit.max_off_centre * sum) return result;
+    // For narrow bodies, the quadric is undetermined across the points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
-    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < 0.25 / 8) return result;
+    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kFit.min_spread * kFit.min_spread) return result;
     for (int d = 3; d < 6; ++d) m(d, d) += kFit.ridge * sum;
     const Eigen::LDLT<Matrix6> solver(m);
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
@@ -110,7 +109,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
 /// Whether most points beside this one on its own sheet have a similar normal; -1: too few points.
 int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
                    const std::vector<PointCells::Range>& ranges) {
-    const double r2 = level.radius * level.radius, height = kFit.sheet * level.radius;
+    const double r2 = level.radius * level.radius, height = kFit.sheet_height * level.radius;
     double same = 0, opposite = 0;
     for (const PointCells::Range& range : ranges)
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
@@ -118,7 +117,7 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
             if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
             (dot(level.normal(n), normal) > 0 ? same : opposite) += level.sorted.count[n];
         }
-    return same + opposite < double(kCommon.ring) ? -1 : same >= opposite;
+    return same + opposite < kFit.min_majority ? -1 : same >= opposite;
 }
 
 /// Root mean square distance of the neighbourhood's points on this side of a sheet to the indicator's surface.
@@ -155,9 +154,9 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             best.min_radius = level.radius;
         }
         if (majority == 0) return best;
-        if (seen.empty() && majority >= 0 && level.radius > kFit.wider * best.min_radius) return best;
+        if (seen.empty() && majority >= 0 && level.radius > kFit.max_growth * best.min_radius) return best;
         Fit now = fit(level, point, best.axes, scratch);
-        if (!now.good || now.misfit > kFit.sheet * level.radius) {
+        if (!now.good || now.misfit > kFit.sheet_fraction * level.radius) {
             if (seen.empty()) continue;
             break;
         }
@@ -180,7 +179,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         });
         if (!agrees) break;
         if (seen.empty() &&
-            (std::abs(now.c[0]) > kFit.sheet * level.radius || dot(best.axes[2], normal) < kCommon.turn))
+            (std::abs(now.c[0]) > kFit.max_height * level.radius || dot(best.axes[2], normal) < kFit.min_cosine))
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
@@ -238,8 +237,7 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
 /// A radius so large that noise keeps the misfit of sheets below its limit, but too small for other creases; 0 if the
 /// noise is too large for both.
 double crease_radius_for(double spacing, double noise) {
-    // Twice the first radius of a quadric, since a crease has more unknowns.
-    const double smallest = 2 * kFit.first_spacings * spacing, widest = 2 * smallest;
+    const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
     if (noise > kCrease.max_misfit * widest) return 0;
     return std::clamp(noise / (0.75 * kCrease.max_misfit), smallest, widest);
 }
@@ -260,7 +258,6 @@ public:
         }
     }
 
-    [[nodiscard]] double widest_radius() const { return levels_.back().radius; }
     /// Radius of the neighbourhoods in which creases are sought; 0: none.
     [[nodiscard]] double crease_radius() const { return every_ ? every_->radius : 0; }
 
@@ -304,7 +301,7 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
                     const Quadric& q = quadrics[cells.order()[at]];
                     const Vec3 to = minus(p, cells.sorted()[at]);
                     covered[n] = dot(to, to) < q.apart * q.apart &&
-                                 dot(nodes.normals[n], q.axes[2]) > (q.crease ? 0 : kCommon.turn);
+                                 dot(nodes.normals[n], q.axes[2]) > (q.crease ? 0 : kFit.same_sheet);
                 }
         }
     });
@@ -335,13 +332,13 @@ std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
         std::vector<PointCells::Range> ranges;
         for (std::size_t n = part.begin(); n < part.end(); ++n) {
             const double r = minimum[n];
-            if (r <= kFit.wider * usual) continue;
+            if (r <= kFit.lone * usual) continue;
             const Vec3& p = feet[n];
             cells.find(p, r, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
                     const Vec3 to = minus(cells.sorted()[at], p);
-                    lone[n] = dot(to, to) < r * r && kFit.wider * minimum[cells.order()[at]] < r;
+                    lone[n] = dot(to, to) < r * r && kFit.lone * minimum[cells.order()[at]] < r;
                 }
         }
     });
@@ -425,18 +422,17 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
     const Fitter fitter(cloud, spacing, noise, run);
     std::vector<Quadric> all;
     bare = 0;
-    // The first nodes are as far apart as the widest neighbourhoods permit.
-    double apart = edge;
-    while (kFit.wide_of_apart * 2 * apart < fitter.widest_radius()) apart *= 2;
-    for (;; apart /= 2) {
+    for (double times = kFit.widest;; times = std::max(1.0, times / 2)) {
+        const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
-        const bool is_last = !(apart > edge);
-        const double minimum = is_last ? 0 : kFit.wide_of_apart * apart;
-        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > minimum, run);
+        const bool is_last = !(times > 1);
+        const double minimum = is_last ? 0 : kFit.wide_of_apart * apart,
+                     min_of_crease = is_last ? 0 : kCrease.wide_of_apart * apart;
+        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > min_of_crease, run);
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
         for (Quadric& q : found) {
-            if (!(q.radius > minimum)) continue;
+            if (!(q.radius > (q.crease ? min_of_crease : minimum))) continue;
             q.apart = apart;
             all.push_back(q);
         }

@@ -48,8 +48,8 @@ struct Quadric : Sheet {
 [[nodiscard]] std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
                                                 const RunContext& run);
 
-/// Quadrics all over a cloud by fit_quadrics(), at nodes from cells of the given edge, or of that edge times a
-/// power of two if the neighbourhoods are so wide that more nodes would add nothing.
+/// Quadrics all over a cloud by fit_quadrics(), at nodes from cells of the given edge, or of two, four or eight times
+/// that edge if the neighbourhoods are so wide that more nodes would add nothing.
 /// @param places  the cloud's points, moved close to the surface; the nodes are means of them
 /// @param spacing as in fit_quadrics()
 /// @param noise   approximate standard deviation along each axis; creases are sought in neighbourhoods wide enough for
