@@ -106,7 +106,8 @@ struct CloudSurfaceHeuristics {
     double max_noises = heuristic("blend.max_noises", 3);
     /// [steps] Of Newton's method for that move.
     int level_steps = heuristic("blend.level_steps", 2);
-    /// [fraction of the points] The same.
+    /// [fraction of the points] Minimum on a separate piece, and no fewer than common.quadric points: noise creates
+    /// spurious pieces.
     double min_resting_fraction = heuristic("blend.min_resting_fraction", 1e-3);
     /// [spacings] Cells of an indicator for points with gaps.
     double coarse_spacings = heuristic("blend.coarse_spacings", 2.4);
