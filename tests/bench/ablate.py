@@ -106,35 +106,30 @@ class Panel:
                 apart = np.sqrt(sum(face[0] for face in scene.faces) / len(points))
                 case = f"{name} {kind}".strip()
                 path = folder / f"{case.replace(' ', '_')}.ply"
-                scenes.write_points(path, points + scene.random.normal(0, noise * apart, points.shape), normals if given else None)
+                points = points + scene.random.normal(0, noise * apart, points.shape)
+                scenes.write_points(path, points, normals if given else None)
                 self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
-                self.truths[case] = (*scene.points(300_000), apart)
+                self.truths[case] = points, scene.points(300_000)
         for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("clouds/*.ply")):
             if path.stem in SCANNED:
                 self.cases[path.stem] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
-                self.truths[path.stem] = ply.read(path)[0]
+                self.truths[path.stem] = ply.read(path)[0], None
 
     def _scan_error(self, case, out):
-        vertices, triangles = ply.read(out / "s.ply")
+        cloud, truth = self.truths[case]
         random = np.random.default_rng(3)
-        found, normals = clouds.sample_with_normals(vertices, triangles, 100_000, random)
-        truth = self.truths[case]
-        if case in SCANNED:
+        measured = scenes.measure(out / "s.ply", cloud, truth, (), random)
+        found, normals = clouds.sample_with_normals(*ply.read(out / "s.ply"), 100_000, random)
+        if truth is None:
             surface = json.loads((out / "s.json").read_text())["surface"]
             right = surface["components"] == 1 and surface["genus"] == SCANNED[case]
             if case == BALL[0]:
                 return 100 * float(np.abs(np.linalg.norm(found - BALL[1], axis=1) - BALL[2]).mean()) / BALL[2], right
-            distinct = np.unique(truth, axis=0)
-            apart = 2 * np.median(cKDTree(distinct).query(distinct, k=2)[0][:, 1])
-            return 100 * float(cKDTree(found).query(distinct)[0].mean()) / apart, right
-        places, outward, apart = truth
-        away, nearest = cKDTree(places).query(found)
-        off = np.abs(np.einsum("ij,ij->i", found - places[nearest], outward[nearest]))
-        near = away < 3 * apart
-        to = float(np.where(near, np.minimum(off, away), away).mean() / apart)
-        back = float(cKDTree(found).query(places[:100_000])[0].mean() / apart)
-        against = float((np.einsum("ij,ij->i", normals, outward[nearest])[near] < 0).mean()) if near.any() else 1
-        return 100 * (to + back + against), None
+            return 100 * measured["mean_from"], right
+        away, nearest = cKDTree(truth[0]).query(found)
+        near = away < 3 * measured["spacing"]
+        against = float((np.einsum("ij,ij->i", normals, truth[1][nearest])[near] < 0).mean()) if near.any() else 1
+        return 100 * (measured["mean_to"] + measured["mean_from"] + against), None
 
     def output(self, case, out):
         return out / "s.ply" if self.name in ("clouds", "scans") else jobs.output_of(case, out)

@@ -341,7 +341,7 @@ PLAN = {  # step: the jobs that exercise it
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "torn", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "isolated"), ALONE), "correction": CORRECTED,
+    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": CORRECTED,
     "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": REAL_FEW, "doubts": DOUBTED,
     **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
     **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]), "pieces": GUESSED,

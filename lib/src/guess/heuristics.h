@@ -34,7 +34,7 @@ COVOL_HEURISTICS CorrectionHeuristics kCorrection{};
 /// The surface through marks, whole and in parts: marks_surface.cpp.
 struct MarksSurfaceHeuristics {
     /// [marks] Maximum in the whole, limited by time, which grows with the cube of the number.
-    std::size_t whole = limit("marks_surface.whole", 300);
+    std::size_t whole = heuristic("marks_surface.whole", 300);
 };
 COVOL_HEURISTICS MarksSurfaceHeuristics kMarks{};
 

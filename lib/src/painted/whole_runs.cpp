@@ -38,6 +38,7 @@ double blunt_ends(const Paint& piece, int axis) {
     if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
         return 0;
     const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
+    // The area of a disc is 1.3 to 1.8 squares of its width.
     const bool elongated = double(largest) > kCommon.clear_ratio * slice_paint.widest * slice_paint.widest;
     std::vector<End> ends;
     if (piece.box().min[axis] > 0) ends.push_back(end_of(slice_paint.voxels, elongated));

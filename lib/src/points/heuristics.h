@@ -1,8 +1,27 @@
 #pragma once
 // The heuristic constants of this folder; docs/heuristics.md shows the effect of halving and doubling each.
+#include <cstddef>
+
 #include "base/heuristics.h"
 
 namespace covol {
+
+/// Search for the nearest neighbours of each point: neighbours.h.
+struct NeighboursHeuristics {
+    /// [spacings] Initial search radius; affects the time, not the result.
+    double first_radius = limit("neighbours.first_radius", 2);
+    /// [spacings] Search radius at which the search ends.
+    double max_radius = limit("neighbours.max_radius", 40);
+};
+COVOL_HEURISTICS NeighboursHeuristics kNear{};
+
+/// Distance to the nearest point: spacing.cpp.
+struct SpacingHeuristics {
+    /// [points] Maximum number of sampled points. All lengths of a cloud are relative to their median, hence more than
+    /// common.sample.
+    std::size_t queries = limit("spacing.queries", 50000);
+};
+COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 
 /// Scans whose layer of points is thicker than their spacing: scan_noise.cpp.
 struct ScanNoiseHeuristics {

@@ -7,18 +7,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "points/heuristics.h"
 #include "points/point_cells.h"
-
-namespace covol {
-
-/// Radii of the search for neighbours, in spacings. The first affects the time and not the result.
-struct NeighbourSearch {
-    double first_radius = 2;  ///< also the edge of the cells that suits it
-    double max_radius = 40;   ///< points that are farther away are no neighbours of anything
-};
-inline constexpr NeighbourSearch kNear{};
-
-}  // namespace covol
 
 namespace covol::cloud {
 
@@ -48,8 +38,8 @@ struct Moments {
 }
 
 /// visit(point, neighbours), from several threads, with the input index of each point and its `count` nearest other
-/// points, the nearest first; fewer if there are no more, or they are farther than kNear.max_radius spacings.
-/// @param cells   with an edge of about kNear.first_radius spacings
+/// points, the nearest first; fewer if there are no more, or they are farther than 40 spacings.
+/// @param cells   with an edge of about two spacings
 /// @param wanted  (sorted position) -> whether that point is visited
 template <typename Visit, typename Wanted>
 void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit, Wanted wanted) {

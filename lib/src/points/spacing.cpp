@@ -11,6 +11,7 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/points.h"
+#include "points/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -79,9 +80,8 @@ std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std:
 }
 
 SpacingStatistics measure_spacing(const std::vector<Vec3>& points) {
-    constexpr std::size_t kMaxQueries = 50'000;  // limits the time; all lengths of a cloud are relative to the median
     if (points.size() < 2) return {};
-    const std::size_t step = (points.size() + kMaxQueries - 1) / kMaxQueries;
+    const std::size_t step = (points.size() + kPointSpacing.queries - 1) / kPointSpacing.queries;
     const detail::KdTree tree(points);
     std::vector<double> distances((points.size() + step - 1) / step);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, distances.size(), 256), [&](const auto& range) {

@@ -39,7 +39,7 @@ struct FlowHeuristics {
     /// thin structures may be lost.
     int min_coarsened = heuristic("flow.min_coarsened", 64);
     /// [steps] Maximum number of steps of the approach by the points alone.
-    int approach_steps = limit("flow.approach_steps", 40);
+    int approach_steps = heuristic("flow.approach_steps", 40);
     /// [passes] Maximum in which the image moves the body between contours.
     int contour_passes = heuristic("flow.contour_passes", 3);
     /// [distances between marked slices] Range within which the image may move the body between contours in one pass.

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <memory>
 
-#include "base/heuristics.h"
 #include "covol/band.h"
 #include "covol/error.h"
 #include "distance/memory_need.h"

@@ -12,8 +12,9 @@
 namespace covol::detail {
 namespace {
 
-/// @param core, enclosed  volumes, voxels; the core, dilated by the distance, is not a negligible part of what is
-/// enclosed
+/// Whether a core is no pocket: it is large compared to the tag distance, and, dilated by it, no negligible part of the
+/// enclosed volume.
+/// @param core, enclosed  volumes, voxels
 /// @param distance        voxels
 bool is_structure(double core, double enclosed, double distance) {
     constexpr double kBall = 4.0 / 3.0 * std::numbers::pi;

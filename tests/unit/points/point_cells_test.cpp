@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "support/clouds.h"
 

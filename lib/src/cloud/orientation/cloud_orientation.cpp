@@ -72,7 +72,8 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 /// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);
-    // The surface that closes the gaps is larger than the one with points.
+    // The surface that closes the gaps is larger than the one with points: the bare fraction is up to 0.04 for closed
+    // shapes, 0.14 to 0.37 for scans of some sides, and 0.66 to 0.85 for scans from the air.
     const bool mostly_bare = bare_fraction(cloud) > 0.5;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most

@@ -31,9 +31,6 @@ struct StrayHeuristics {
     double cell_noises = heuristic("stray.cell_noises", 0.5);
     /// [median distances to the last neighbour] Distance of the last neighbour from which on a point is isolated.
     double far = heuristic("stray.far", 2.5);
-    /// [distances to the last neighbour] Deviation of the neighbours or of the point from their plane, from which on an
-    /// isolated point is on no sheet.
-    double off_plane = heuristic("stray.off_plane", 0.25);
 };
 COVOL_HEURISTICS StrayHeuristics kStray{};
 
@@ -129,7 +126,7 @@ COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
 /// Normals of local planes, with signs propagated from neighbour to neighbour: propagation.cpp.
 struct PropagationHeuristics {
     /// [points] Maximum in it.
-    double maximum = limit("propagation.maximum", 100);
+    double maximum = heuristic("propagation.maximum", 100);
     /// [points] Neighbours from which a point may take its sign.
     std::size_t neighbours = heuristic("propagation.neighbours", 10);
 };

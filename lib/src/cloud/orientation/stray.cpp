@@ -7,6 +7,7 @@
 #include "base/geometry.h"
 #include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"
@@ -76,7 +77,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
                          reach = std::sqrt(near.back().squared);
             // The farther the neighbours, the flatter they must be.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
-            stray[point] = off * reach / far_reach > kStray.off_plane;
+            stray[point] = off * reach / far_reach > kCloud.flat;
         },
         [&](std::size_t n) { return isolated[n] != 0; });
     return stray;

@@ -94,7 +94,9 @@ private:
     }
 
     /// Noise fills space within its range. If the nearest points lie on sheets although the smoothing was that for
-    /// noise, the points are folds.
+    /// noise, the points are folds: the deviation of twelve neighbouring points from a quadric is 0.11 to 0.247 of
+    /// their reach in folds, 0.26 or more if the noise is as large as the distance between nearest points, and 0.33 if
+    /// they fill a ball.
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&

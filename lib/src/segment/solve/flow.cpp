@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "base/heuristics.h"
 #include "covol/error.h"
 #include "grid/levels_at.h"
 #include "inference/heuristics.h"
