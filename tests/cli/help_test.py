@@ -90,7 +90,7 @@ class Help(Case):
 
     def test_a_single_step_has_its_own_defaults(self):
         self.assertIn("weight of curvature [1vx]", self.first["evolve"])
-        self.assertIn("weight of curvature [0.5vx after tagging, else 1vx]", self.all["segment"])
+        self.assertIn("weight of curvature [0.5vx after tagging or a guess, else 1vx]", self.all["segment"])
 
 
 class OptionFiles(Case):
@@ -112,7 +112,7 @@ class OptionFiles(Case):
             '# 3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse\n'
             f'image="{self.image}"\n\n# point clouds: XYZ, CSV, PLY, OBJ, OFF; with names, ve=FILE exe=FILE, several structures\n'
             f'points="{self.points}"\n\n# the surface as a level set, .vdb\noutput="s.vdb"\n\n# weight of the points, 0 to 1\ntheta=0.5\n\n'
-            '# weight of curvature [0.5vx after tagging, else 1vx]\ndelta="2vx"\n')
+            '# weight of curvature [0.5vx after tagging or a guess, else 1vx]\ndelta="2vx"\n')
         report = self.report("segment", "--config", "old.toml", "--save-config", "new.toml")
         self.assertEqual(report["resolved"]["theta"], 0.5)
         self.assertEqual(self.lines("new.toml"), self.lines("old.toml"))
