@@ -24,6 +24,30 @@ openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
 }
 
+/// Sets all voxels beyond the domain to the background, inactive. FloatGrid::clip() would also split the tiles outside
+/// of the solid along the faces of the domain into leaves: 360 MB for an image of 2048^3 voxels.
+void limit_to(const openvdb::CoordBBox& domain, FloatGrid& grid) {
+    const float outside = grid.background();
+    for (auto leaf = grid.tree().beginLeaf(); leaf; ++leaf)
+        if (!domain.isInside(leaf->getNodeBoundingBox())) leaf->clip(domain, outside);
+    std::vector<openvdb::CoordBBox> tiles;
+    auto tile = grid.tree().cbeginValueAll();
+    tile.setMaxDepth(FloatGrid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        openvdb::CoordBBox box;
+        tile.getBoundingBox(box);
+        if (*tile != outside && !domain.isInside(box)) tiles.push_back(box);
+    }
+    for (const openvdb::CoordBBox& box : tiles)
+        for (int a = 0; a < 3; ++a) {
+            openvdb::CoordBBox low = box, high = box;
+            low.max()[a] = std::min(box.max()[a], domain.min()[a] - 1);
+            high.min()[a] = std::max(box.min()[a], domain.max()[a] + 1);
+            for (const openvdb::CoordBBox& beyond : {low, high})
+                if (!beyond.empty()) grid.fill(beyond, outside, false);
+        }
+}
+
 /// Trilinear samples of a grid that is known on a domain, extrapolated linearly beyond the last voxel centres.
 class DomainSampler {
 public:
@@ -73,7 +97,7 @@ public:
         : grid_(grid), domain_(domain), clip_(clip), width_(double(grid.background())) {}
 
     void cut() {
-        grid_.clip(voxels_of(domain_));
+        limit_to(voxels_of(domain_), grid_);
         const std::vector<Coord> origins = blocks();
         std::vector<Block> results(origins.size());
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {

@@ -126,10 +126,8 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     facts.domain = problem.domain(h, points, kStarts.margin_fraction * longest_side(box) + kCommon.beyond_voxels * h);
     // A body that the image cuts is continued beyond it: at the image's end its wall would be closed, and the image
     // would be evaluated at a cap. The clip at the end makes the cut.
-    // By a whole leaf, so that the part beyond the image is cut off along leaves: anywhere else, OpenVDB would fill the
-    // image's faces with leaves.
     if (problem.image != nullptr && !problem.options.roi)
-        facts.domain = widened(facts.domain, int(FloatGrid::TreeType::LeafNodeType::DIM));
+        facts.domain = widened(facts.domain, int(kCommon.beyond_voxels));
     detail::require_band_memory(largest_area(box), h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);
