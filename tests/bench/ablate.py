@@ -67,40 +67,61 @@ MECHANISMS = {
 }
 
 
-class Panel:
-    """Cases: {name: arguments of covol}, and the error of a result in percent."""
+class Jobs:
+    """All small jobs, or those on structures of real images.
 
-    def __init__(self, name, options, folder):
-        self.name, self.options, self.folder, self.cases = name, options, folder, {}
-        if name == "clouds":
-            self._draw()
-        elif name == "scans":
-            self._scan()
-        else:
-            self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items()
-                          if kind != "doubt" and (kind == "real") == (name == "marks")}
+    A panel has cases, {name: arguments of covol}, and output() and error() of the result in a folder.
+    """
 
-    def _draw(self):
+    def __init__(self, options, folder, kinds=("cloud", "open", "mask", "lapse")):
+        self.inputs = folder / "in"
+        self.cases = {job: jobs.arguments_of(job) for job, (_, kind, *_) in jobs.JOBS.items() if kind in kinds}
+
+    def output(self, case, out):
+        return jobs.output_of(case, out)
+
+    def error(self, case, out):
+        """(error in percent, whether the topology is right; None if it is not known)"""
+        return jobs.error_of(case, self.inputs, out), None
+
+
+class Marks(Jobs):
+    def __init__(self, options, folder):
+        super().__init__(options, folder, kinds=("real",))
+
+
+class Clouds:
+    def __init__(self, options, folder):
+        self.rivals, self.cases, self.truths = options.rivals, {}, {}
         given = {path.stem: path for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("meshes/*.ply"))}
-        folder = self.folder / "clouds"
+        folder = folder / "clouds"
         folder.mkdir()
-        self.truths = {}
         for name in [*given, *shapes.OWN]:
-            truth = given.get(name) or shapes.truth(name, self.options.work / "truth")
+            truth = given.get(name) or shapes.truth(name, options.work / "truth")
             for noise in NOISES:
                 case = f"{name} {noise:g} %"
                 path = folder / f"{name}_{noise:g}.ply"
-                ply.write(path, clouds.cloud(ply.read(truth), 5000, noise, 0, self.options.seed))
+                ply.write(path, clouds.cloud(ply.read(truth), 5000, noise, 0, options.seed))
                 self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply"]
                 self.truths[case] = truth
 
-    def _scan(self):
-        folder = self.folder / "scans"
+    def output(self, case, out):
+        return out / "s.ply"
+
+    def error(self, case, out):
+        found = json.loads(subprocess.run([self.rivals, "measure", str(out / "s.ply"), str(self.truths[case])], check=True, capture_output=True, text=True).stdout)
+        whole = found["components"] == 1 and found["closed"] == "yes"
+        return found["mean_to"] + found["mean_from"], bool(whole and found["genus"] == found["genus_truth"])
+
+
+class Scans:
+    def __init__(self, options, folder):
+        self.cases, self.truths = {}, {}
+        folder = folder / "scans"
         folder.mkdir()
-        self.truths = {}
         for name, (make, count) in scenes.SCENES.items():
             for kind, noise, given in (("", 0, False), ("noisy", 0.2, False), ("with normals", 0, True)):
-                scene = scenes.Scene(self.options.seed)
+                scene = scenes.Scene(options.seed)
                 make(scene)
                 points, normals = scene.points(int(SCENE_FRACTION * count))
                 apart = np.sqrt(sum(face[0] for face in scene.faces) / len(points))
@@ -108,14 +129,19 @@ class Panel:
                 path = folder / f"{case.replace(' ', '_')}.ply"
                 points = points + scene.random.normal(0, noise * apart, points.shape)
                 scenes.write_points(path, points, normals if given else None)
-                self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
-                self.truths[case] = points, scene.points(300_000)
+                self._add(case, path, (points, scene.points(300_000)))
         for path in sorted(pathlib.Path(os.environ.get("COVOL_DATA", "/nonexistent")).glob("clouds/*.ply")):
             if path.stem in SCANNED:
-                self.cases[path.stem] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
-                self.truths[path.stem] = ply.read(path)[0], None
+                self._add(path.stem, path, (ply.read(path)[0], None))
 
-    def _scan_error(self, case, out):
+    def _add(self, case, path, truth):
+        self.cases[case] = ["reconstruct", str(path), "-o", "s.vdb", "--mesh", "s.ply", "--json", "s.json"]
+        self.truths[case] = truth
+
+    def output(self, case, out):
+        return out / "s.ply"
+
+    def error(self, case, out):
         cloud, truth = self.truths[case]
         random = np.random.default_rng(3)
         measured = scenes.measure(out / "s.ply", cloud, truth, (), random)
@@ -131,25 +157,15 @@ class Panel:
         against = float((np.einsum("ij,ij->i", normals, truth[1][nearest])[near] < 0).mean()) if near.any() else 1
         return 100 * (measured["mean_to"] + measured["mean_from"] + against), None
 
-    def output(self, case, out):
-        return out / "s.ply" if self.name in ("clouds", "scans") else jobs.output_of(case, out)
 
-    def error(self, case, out):
-        """(error in percent, whether the topology is right; None if it is not known)"""
-        if self.name == "scans":
-            return self._scan_error(case, out)
-        if self.name != "clouds":
-            return jobs.error_of(case, self.folder / "in", out), None
-        found = json.loads(subprocess.run([self.options.rivals, "measure", str(out / "s.ply"), str(self.truths[case])], check=True, capture_output=True, text=True).stdout)
-        whole = found["components"] == 1 and found["closed"] == "yes"
-        return found["mean_to"] + found["mean_from"], bool(whole and found["genus"] == found["genus_truth"])
+PANELS = {"clouds": Clouds, "scans": Scans, "marks": Marks, "jobs": Jobs}
 
 
 class Runner:
     def __init__(self, options, folder):
         self.options, self.folder = options, folder
         jobs.make_inputs(folder / "in", pathlib.Path(options.covol).resolve())
-        self.panels = {name: Panel(name, options, folder) for name in options.panels}
+        self.panels = {name: PANELS[name](options, folder) for name in options.panels}
 
     def run(self, binary, scale, panel, case):
         """{digest, error, right, cpu}; error is None if the job fails."""
@@ -161,7 +177,7 @@ class Runner:
                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS)))
             path = panel.output(case, out)
             if done.returncode < 0 or not path.exists():
-                return {"digest": "", "error": None, "right": False}
+                return {"digest": "", "error": None, "right": None}
             error, right = panel.error(case, out)
             return {"digest": hashlib.sha256(path.read_bytes()).hexdigest(), "error": error, "right": right}
         finally:
@@ -186,7 +202,8 @@ def compared(panel, before, after):
         if abs(new - old) > NOTICEABLE * old and abs(new - old) > MINIMUM[panel]:
             (worse if new > old else better).append((abs(new - old), case))
     median_old, median_new = (np.median([r["error"] for r in results.values() if r["error"] is not None]) for results in (before, after))
-    right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if panel in ("clouds", "scans") else None
+    has_topology = any(r["right"] is not None for r in before.values())
+    right = [sum(bool(r["right"]) for r in results.values()) for results in (before, after)] if has_topology else None
 
     def text(case):
         return f"{case}: " + " → ".join("fails" if results[case]["error"] is None else f"{results[case]['error']:.3g}" for results in (before, after))
@@ -205,7 +222,7 @@ def main():
     parser.add_argument("--only", nargs="+", metavar="NAME", help="mechanisms [all]")
     parser.add_argument("--scale", nargs="+", default=[], metavar="NAME=FACTOR", help="other settings of COVOL_SCALE, instead of the mechanisms")
     parser.add_argument("--against", metavar="BINARY", help="a program to compare with, instead of the mechanisms")
-    parser.add_argument("--panels", nargs="+", choices=list(MINIMUM), default=list(MINIMUM), help="[all]")
+    parser.add_argument("--panels", nargs="+", choices=list(PANELS), default=list(PANELS), help="[all]")
     parser.add_argument("--seed", type=int, default=7, help="of the clouds [%(default)s]")
     parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("build/reconstruct"), help="folder for the meshes of shapes made here [%(default)s]")
     parser.add_argument("--processes", type=int, default=2)
