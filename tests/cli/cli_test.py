@@ -2,6 +2,7 @@
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cli_test.py
 """
+import gzip
 import json
 import math
 import os
@@ -314,6 +315,27 @@ class Segment(Case):
         fit = self.report("compare", self.points, "s.vdb")["fit"]["points_to_surface"]
         self.assertAlmostEqual(fit["mean"], report["fit"]["points_to_surface"]["mean"], places=4)
         self.assertEqual(self.files(), ["d.vdb", "m.nrrd", "m.ply", "r.json", "s.vdb"])
+
+    def voxels_of(self, name):
+        """Of a .nrrd that covol wrote: a header, an empty line, and gzip."""
+        return gzip.decompress((self.out / name).read_bytes().split(b"\n\n", 1)[1])
+
+    def test_the_value_in_the_mask(self):
+        self.segment("--mask", "one.nrrd")
+        self.segment("--mask", "other.nrrd", "--mask-label", 255, "--table", "t.csv")
+        one, other = self.voxels_of("one.nrrd"), self.voxels_of("other.nrrd")
+        self.assertEqual((set(one), set(other)), ({0, 1}, {0, 255}))
+        self.assertEqual(one.replace(b"\1", b"\xff"), other)
+        header, row = (line.split(",") for line in (self.out / "t.csv").read_text().splitlines())
+        self.assertEqual(row[header.index("label")], "255")
+        self.assertIn("bit-identical", self.run_covol("rerun", "s.vdb", "--inputs", self.inputs).stdout)
+        for name in self.files():
+            (self.out / name).unlink()
+        for label in 0, 256, -1:
+            self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mask", "m.nrrd", "--mask-label", label, code=3,
+                        expected_text="--mask-label")
+        self.refuse("segment", self.image, "--points", f"a={self.points}", f"b={self.points}", "-o", "s.vdb", "--mask", "m.nrrd",
+                    "--mask-label", 7, code=2, expected_text="expected one structure, got 2")
 
     def test_provenance(self):
         self.segment("--theta", "0.75", "--mesh", "m.ply")

@@ -5,6 +5,7 @@ replaced.
 """
 import fcntl
 import hashlib
+import math
 import os
 import pathlib
 import signal
@@ -183,8 +184,10 @@ class Waits(Files):
             "skipped.mhd": meta.format(16) + "HeaderSize = 12\nElementDataFile = pipe.raw\n",
             "list.mhd": meta.format(2) + "ElementDataFile = LIST\npipe.raw\npipe.raw\n",
             "numbers.mhd": meta.format(2) + "ElementDataFile = pipe%01d.raw 1 2 1\n",
+            "pipe.ics": "\t\nics_version\t1.0\nlayout\torder\tbits\tx\ty\tz\nlayout\tsizes\t8\t16\t16\t16\n"
+                        "representation\tformat\tinteger\nrepresentation\tsign\tunsigned\n",
         }
-        for name in "pipe.raw", "pipe1.raw", "pipe2.raw":
+        for name in "pipe.raw", "pipe1.raw", "pipe2.raw", "pipe.ids":
             os.mkfifo(self.out / name)
         for name, text in headers.items():
             (self.out / name).write_text(text)
@@ -204,13 +207,13 @@ class Waits(Files):
         os.mkfifo(self.out / "plan/plan.json")
         (self.out / "states").mkdir()
         os.mkfifo(self.out / "states/job.txt")
-        for end in ("tif", "nrrd", "nii", "nii.gz", "mha", "mrc", "npy", "h5", "ims", "dcm", "vdb", "xyz", "csv", "ply", "obj",
-                    "stl", "off", "glb", "las", "zip", "roi", "json"):
+        for end in ("tif", "nrrd", "nii", "nii.gz", "mha", "mrc", "ics", "npy", "h5", "ims", "dcm", "vdb", "xyz", "csv", "ply", "obj",
+                    "stl", "off", "glb", "las", "zip", "roi", "xml", "json"):
             os.mkfifo(self.out / ("p." + end))
-        for end in "tif", "nrrd", "nii", "nii.gz", "mha", "mrc", "npy", "h5", "ims", "dcm", "vdb":
+        for end in "tif", "nrrd", "nii", "nii.gz", "mha", "mrc", "ics", "npy", "h5", "ims", "dcm", "vdb":
             with self.subTest(end):
                 self.fails("info", "p." + end, code=4, expected_text="p." + end)
-        for end in "xyz", "csv", "ply", "obj", "off", "las", "zip", "roi", "json":
+        for end in "xyz", "csv", "ply", "obj", "off", "las", "zip", "roi", "xml", "json":
             with self.subTest("points " + end):
                 self.fails("reconstruct", "p." + end, "-o", "o.vdb", code=4, expected_text="p." + end)
                 self.fails("segment", self.image, "--contours", "p." + end, "-o", "o.vdb", code=4, expected_text="p." + end)
@@ -322,6 +325,14 @@ class Places(Files):
         self.keeps("a.mhd", "data.npy", "a.mhd")
         self.keeps("a.nhdr", "deep/data.tif", "a.nhdr")
         self.keeps("abs.nhdr", "data.npy")
+
+    @unittest.skipIf(formats.MISSING, formats.MISSING)
+    def test_pixels_of_ics(self):
+        formats.write_ics(self.out / "a.ics", np.full(formats.SIZE[::-1], 7, np.uint8), version="1.0")
+        self.run_covol("info", "a.ics")
+        for path in "a.ids", "./a.ids":
+            self.fails("segment", "a.ics", *LINE, "-o", "s.vdb", "--json", path, code=3, expected_text="of this run")
+        self.assertEqual(self.bytes("a.ids"), bytes([7]) * math.prod(formats.SIZE))
 
     def test_pixels_in_many_files(self):
         ball = ball_bytes()

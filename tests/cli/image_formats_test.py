@@ -82,6 +82,27 @@ def write_mrc(path, data, mode, big=False, **words):
     path.write_bytes(bytes(header) + data.astype(data.dtype.newbyteorder(order)).tobytes())
 
 
+def write_ics(path, data, version="2.0", big=False, compression="uncompressed"):
+    """As libics writes it; the voxels of version 1.0 are in the .ids file beside it."""
+    size = data.dtype.itemsize
+    order = range(size, 0, -1) if big else range(1, size + 1)
+    lines = [["ics_version", version], ["filename", path.stem], ["layout", "parameters", 4], ["layout", "order", "bits", "x", "y", "z"],
+             ["layout", "sizes", 8 * size, *SIZE], ["layout", "coordinates", "video"], ["layout", "significant_bits", 8 * size],
+             ["representation", "format", "real" if data.dtype.kind == "f" else "integer"],
+             ["representation", "sign", "unsigned" if data.dtype.kind == "u" else "signed"],
+             ["representation", "compression", compression], ["representation", "byte_order", *order],
+             ["parameter", "origin", 0, *ORIGIN], ["parameter", "scale", 1, *SPACING], ["parameter", "units", "bits", *["micrometers"] * 3],
+             ["history", "software", "a test"]]
+    text = "\t\n" + "".join("\t".join(map(str, words)) + "\n" for words in lines)
+    voxels = data.astype(data.dtype.newbyteorder(">" if big else "<")).tobytes()
+    voxels = gzip.compress(voxels) if compression == "gzip" else voxels
+    if version == "1.0":
+        path.with_suffix(".ids").write_bytes(voxels)
+        path.write_text(text)
+    else:
+        path.write_bytes((text + "end\n").encode() + voxels)
+
+
 def write_dicom_series(folder, data, series="1.2.3.4.5", description="ball"):
     """One file for each slice; the order of the names is not that of the slices."""
     folder.mkdir(exist_ok=True)
@@ -275,6 +296,13 @@ class SameSurface(Case):
         info = self.report("info", "start.mrc")["image"]
         for a in range(3):
             self.assertAlmostEqual(info["origin"][a], start[a] * SPACING[a])
+
+    def test_ics(self):
+        for name, kind, more in (("two.ics", "u1", {}), ("one.ics", "u2", {"version": "1.0"}), ("big.ics", "i2", {"big": True}),
+                                 ("real.ics", "f4", {}), ("packed.ics", "u1", {"compression": "gzip"})):
+            with self.subTest(name):
+                write_ics(self.folder / name, self.data.astype(kind), **more)
+                self.check(name, unit="um")
 
     def test_dicom_series(self):
         folder = write_dicom_series(self.folder / "series", self.data)

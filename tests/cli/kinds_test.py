@@ -318,7 +318,7 @@ class Guess(KindsCase):
         common = ("segment", self.image, "--guess", mask, "--points", self.marks, "-o", "s.vdb", "--mask", "m.nrrd")
         self.assertIn("expected one label, got 3, 8; choose one with --guess-label", self.run_covol(*common, code=3).stderr)
         self.assertIn("expected one of the labels", self.run_covol(*common, "--guess-label", 5, code=3).stderr)
-        self.report(*common, "--guess-label", 3)
+        self.assertIn("keeps its values", self.run_covol(*common, "--guess-label", 3, "--mask-label", 7).stderr)
         new = read_labels(self.out / "m.nrrd")
         self.assertTrue(np.array_equal(new == 8, labels == 8))
         self.assertGreater(dice(new == 3, ball()), dice(self.wrong, ball()))

@@ -41,6 +41,18 @@ def multi_point(path, points, counters):
     path.write_bytes(bytes(head) + struct.pack(f">{2 * n}h", *x, *y) + bytes(second) + struct.pack(f">{n}i", *slices))
 
 
+def cell_counter(path, points_of):
+    """Markers of Fiji's Cell Counter: a type for each name, whole pixels, slices from 1."""
+    types = "".join(
+        f"<Marker_Type><Type>{n}</Type><Name>{name}</Name>" + "".join(
+            "<Marker><MarkerX>%d</MarkerX><MarkerY>%d</MarkerY><MarkerZ>%d</MarkerZ></Marker>" % (round(x), round(y), round(z) + 1)
+            for x, y, z in points) + "</Marker_Type>"
+        for n, (name, points) in enumerate(points_of.items(), 1))
+    path.write_text('<?xml version="1.0" encoding="UTF-8"?>\n<CellCounter_Marker_File><Image_Properties><Image_Filename>a.tif'
+                    f"</Image_Filename></Image_Properties><Marker_Data><Current_Type>1</Current_Type>{types}</Marker_Data>"
+                    "</CellCounter_Marker_File>\n")
+
+
 class TwoBalls(Case):
     @classmethod
     def setUpClass(cls):
@@ -106,6 +118,11 @@ class Columns(TwoBalls):
         self.assertEqual(list(volumes), ["counter 0", "counter 1"])
         for volume, true in zip(volumes.values(), truth.values()):
             self.assertAlmostEqual(volume / true, 1, delta=0.2)  # whole pixels
+        cell_counter(self.inputs / "cells.xml", self.marks)
+        by_type = self.volumes(self.inputs / "cells.xml", "--structure-column", "type")
+        self.assertEqual(list(by_type), list(self.marks))
+        for volume, same in zip(by_type.values(), volumes.values()):
+            self.assertAlmostEqual(volume / same, 1, delta=0.01)  # the same marks as those of the multi-point, in another order
 
     def test_lines_keep_together(self):
         rows = []

@@ -63,16 +63,17 @@ void write(const fs::path& path, std::string_view data) {
 using Reader = std::function<void(const std::string&)>;
 
 const std::map<std::string, Reader> kReaders = {
-    {"nrrd", read_as_image},    {"mha", read_as_image},         {"nii", read_as_image},
-    {"nii.gz", read_as_image},  {"tif", read_as_image},         {"mrc", read_as_image},
-    {"npy", read_as_image},     {"h5", read_as_image},          {"ims", read_as_image},
-    {"dcm", read_as_image},     {"ply", read_as_mesh},          {"obj", read_as_mesh},
-    {"off", read_as_mesh},      {"stl", read_as_mesh},          {"glb", read_as_mesh},
-    {"xyz", read_as_points},    {"csv", read_as_points},        {"roi", read_as_points},
-    {"zip", read_as_points},    {"las", read_as_points},        {"pcd", read_as_points},
-    {"fcsv", read_as_points},   {"mrk.json", read_as_points},   {"annot", read_as_points},
-    {"vdb", read_as_level_set}, {"points.ply", read_as_points}, {"image.vdb", read_as_image},
-    {"zarr", read_as_image},    {"zarr3", read_as_image},       {"contours.dcm", read_as_points}};
+    {"nrrd", read_as_image},        {"mha", read_as_image},          {"nii", read_as_image},
+    {"nii.gz", read_as_image},      {"tif", read_as_image},          {"mrc", read_as_image},
+    {"ics", read_as_image},         {"npy", read_as_image},          {"h5", read_as_image},
+    {"ims", read_as_image},         {"dcm", read_as_image},          {"ply", read_as_mesh},
+    {"obj", read_as_mesh},          {"off", read_as_mesh},           {"stl", read_as_mesh},
+    {"glb", read_as_mesh},          {"xyz", read_as_points},         {"csv", read_as_points},
+    {"roi", read_as_points},        {"zip", read_as_points},         {"las", read_as_points},
+    {"pcd", read_as_points},        {"fcsv", read_as_points},        {"mrk.json", read_as_points},
+    {"annot", read_as_points},      {"xml", read_as_points},         {"vdb", read_as_level_set},
+    {"points.ply", read_as_points}, {"image.vdb", read_as_image},    {"zarr", read_as_image},
+    {"zarr3", read_as_image},       {"contours.dcm", read_as_points}};
 
 }  // namespace
 

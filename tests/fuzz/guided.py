@@ -127,6 +127,8 @@ def seeds_of(covol, folder):
     seeds["mrk.json"] = [b'{"markups":[{"type":"ClosedCurve","coordinateSystem":"LPS","controlPoints":[{"id":"1","position":[1,2,3]},'
                          b'{"id":"2","position":[4,2,3]},{"id":"3","position":[4,6,3]}]}]}']
     seeds["annot"] = [b"ITK-SNAP Annotation File\nLandmark 1 2 3\n", b"<registry><folder key='A'/></registry>"]
+    seeds["xml"] = [b"<?xml version='1.0'?><CellCounter_Marker_File><Marker_Data><Marker_Type><Type>1</Type><Name>a</Name><Marker>"
+                    b"<MarkerX>1</MarkerX><MarkerY>2</MarkerY><MarkerZ>3</MarkerZ></Marker></Marker_Type></Marker_Data></CellCounter_Marker_File>"]
     for name, dtype in (("npy", "<u2"), ("npy", ">f4")):
         np.save(folder / "a.npy", np.arange(60).reshape(3, 4, 5).astype(dtype))
         seeds.setdefault(name, []).append((folder / "a.npy").read_bytes())
@@ -137,6 +139,11 @@ def seeds_of(covol, folder):
     struct.pack_into("<3i", head, 64, 1, 2, 3)
     head[208:216] = b"MAP \x44\x44\0\0"
     seeds["mrc"] = [bytes(head) + np.arange(60, dtype="<i2").tobytes()]
+    header = ("\t\nics_version\t2.0\nfilename\ta\nlayout\torder\tbits\tx\ty\tz\tch\tt\nlayout\tsizes\t16\t5\t4\t3\t1\t1\n"
+              "representation\tformat\tinteger\nrepresentation\tsign\tunsigned\nrepresentation\tcompression\tuncompressed\n"
+              "representation\tbyte_order\t1\t2\nparameter\torigin\t0\t1\t2\t3\nparameter\tscale\t1\t0.5\t0.5\t2\n"
+              "parameter\tunits\tbits\tum\tum\tnm\nend\n")
+    seeds["ics"] = [header.encode() + np.arange(60, dtype="<u2").tobytes()]
     write_hdf5(folder / "a.h5", lambda file, values: file.create_dataset("data", data=values, chunks=(2, 5, 6), compression="gzip"))
     write_hdf5(folder / "a.ims", imaris)
     for frames, packed in ((2, False), (1, False), (1, True)):

@@ -15,7 +15,7 @@ LAYERS = [
     {"image": ["image_stream", "image_levels", "points", "slice_contours"], "io/chunked": [], "io/modules": ["reader_parts"]},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"io/dicom": [], "io/reader": [], "io/points": ["points_text", "point_array", "mark_kinds", "point_structures"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"io/dicom": [], "io/ics": [], "io/reader": [], "io/points": ["points_text", "point_array", "mark_kinds", "point_structures"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"io/points/programs": [], "io/write": ["program_marks"], "points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"], "cloud/poisson": []},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/indicator": ["orientation"]},
     {"cloud/orientation": [], "start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "intensity", "solid_measures"], "render/draw": ["picture"]},
@@ -50,7 +50,7 @@ LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 # Readers and writers, which the core does not use: COVOL_IO.
-READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
+READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/ics", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
 ROW = re.compile(r"^\| (\d+) \| `([\w/]+)` \| .", re.M)  # of the table in docs/architecture.md
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 

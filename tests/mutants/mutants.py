@@ -39,6 +39,7 @@ KERNELS = {
 READERS = {
     "io/pixels/raw_image.cpp": ["image_test", "image_chunks_test", "image_view_test", "image_roi_test"],
     "io/pixels/nifti_space.cpp": ["image_test", "image_formats_test", "cli/alignment_test"],
+    "io/ics/ics.cpp": ["ics_test", "cli/image_formats_test"],
     "io/image/mrc.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
     "io/image/npy.cpp": ["image_test", "image_formats_test", "image_python_test", "cli/image_formats_test", "cli/interchange_test"],
     "io/image/tiff_pages.cpp": ["image_test", "image_chunks_test", "cli/image_formats_test", "cli/alignment_test"],
@@ -47,6 +48,7 @@ READERS = {
     "io/chunked/zarr_array.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
     "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
     "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/hdf5_test"],
+    "io/points/programs/cell_counter.cpp": ["point_formats_test"],
     "io/points/programs/fiji_roi.cpp": ["points_test", "point_formats_test"],
     "io/points/programs/zip.cpp": ["points_test", "point_formats_test"],
     "io/points/point_columns.cpp": ["points_test", "point_formats_test", "points_check_test"],

@@ -256,7 +256,7 @@ def read_ome_tiff(path):
         return tiff.asarray(), Lattice(np.diag(spacing), np.zeros(3), {"µm": "um", "Å": "angstrom"}.get(unit, unit))
 
 
-# ------------------------------------------------------------------------------------------------ Zarr, HDF5, MRC, VDB
+# ------------------------------------------------------------------------------------------------ Zarr, HDF5, MRC, ICS, VDB
 
 LONG = {"nm": "nanometer", "um": "micrometer", "mm": "millimeter", "cm": "centimeter", "m": "meter", "angstrom": "angstrom"}
 
@@ -335,6 +335,25 @@ def read_mrc(path):
     cell, origin = struct.unpack_from("<3f", bytes_, 40), struct.unpack_from("<3f", bytes_, 196)
     return (np.frombuffer(bytes_, "<u2", offset=1024).reshape(size[::-1]),
             Lattice(np.diag(np.divide(cell, size)), np.array(origin, float), "angstrom"))
+
+
+def write_ics(path, data, lattice):
+    unit = {"um": "micrometers", "nm": "nanometers", "mm": "millimeters"}.get(lattice.unit, lattice.unit)
+    lines = [["ics_version", "2.0"], ["filename", "image"], ["layout", "order", "bits", "x", "y", "z"],
+             ["layout", "sizes", 8, *data.shape[::-1]], ["representation", "format", "integer"], ["representation", "sign", "unsigned"],
+             ["representation", "compression", "uncompressed"], ["representation", "byte_order", 1],
+             ["parameter", "origin", 0, *map(float, lattice.origin)], ["parameter", "scale", 1, *map(float, lattice.spacing)],
+             ["parameter", "units", "bits", *[unit] * 3], ["end"]]
+    path.write_bytes(("\t\n" + "".join("\t".join(map(str, words)) + "\n" for words in lines)).encode() + data.astype("u1").tobytes())
+
+
+def read_ics(path):
+    text, voxels = path.read_bytes().split(b"\nend\n", 1)
+    lines = [line.split("\t") for line in text.decode().splitlines()[1:]]
+    of = {" ".join(words[:2]): words[3:] for words in lines if len(words) > 3}
+    unit = {"micrometers": "um", "nanometers": "nm", "millimeters": "mm"}.get(of["parameter units"][0], of["parameter units"][0])
+    return (np.frombuffer(voxels, "u1").reshape([int(n) for n in of["layout sizes"]][::-1]),
+            Lattice(np.diag([float(s) for s in of["parameter scale"]]), np.array([float(o) for o in of["parameter origin"]]), unit))
 
 
 def write_vdb(path, data, lattice):

@@ -63,6 +63,7 @@ FORMATS = {
     "HDF5": Format(".h5", files.write_hdf5, files.read_hdf5, SPACING, ("nm", "um", "mm", "cm", "m")),
     "Imaris": Format(".ims", files.write_imaris, files.read_imaris, UPRIGHT, ("nm", "um", "mm", "m")),
     "MRC": Format(".mrc", files.write_mrc, files.read_mrc, UPRIGHT, ("angstrom",)),
+    "ICS": Format(".ics", files.write_ics, files.read_ics, UPRIGHT, ("nm", "um", "mm", "m")),
     "OpenVDB": Format(".vdb", files.write_vdb, files.read_vdb, ANY, ("",)),
 }
 # Format in which masks are written, by the lattices that the file stores.

@@ -111,7 +111,7 @@ def test_every_flag_is_an_option(program):
     assert set(ours) <= set(flags)
     words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "painted_as", "painted_outside", "inside", "outside", "guess", "init",
              "spacing"}
-    files = {"output", "mask", "rtstruct", "mesh", "density", "fields", "table", "evidence", "suggest", "suggestions", "structure_column", "half", "up", "unit_scale",
+    files = {"output", "mask", "mask_label", "rtstruct", "mesh", "density", "fields", "table", "evidence", "suggest", "suggestions", "structure_column", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
              "report", "keep_failed", "usda", "compression", "study"}  # for reading and writing, which are separate functions
     later = {"brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}

@@ -16,7 +16,8 @@ struct StructurePoints {
 /// As read_points(), for a file whose marks have names of structures; in the order in which the names occur in the
 /// file.
 /// @param by  the field that contains the names: the column of a table, "group" or "counter" of Fiji's selections,
-///     "label" or "node" of 3D Slicer's markups, "label" of .csl, "roi" of DICOM RT structure sets
+///     "type" of its Cell Counter, "label" or "node" of 3D Slicer's markups, "label" of .csl, "roi" of DICOM RT
+///     structure sets
 /// @throws Error as read_points(); InvalidInput if the file has no such names, a mark without one, or more than 254.
 [[nodiscard]] COVOL_API std::vector<StructurePoints> read_structures_of_points(const std::string& path,
                                                                                const std::string& by,

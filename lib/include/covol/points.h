@@ -77,7 +77,8 @@ struct PointCloud {
 /// Reads, by the file extension:
 /// - .xyz .txt .pts .asc .csv .tsv: columns, by name if there is a header: x, y, z; slice, contour, x_px, y_px;
 ///   napari's points and shapes; Fiji's Results (X, Y, Slice)
-/// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
+/// - .roi, .zip: Fiji's selections. .xml: its Cell Counter. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP.
+///   .landmarks, .lmk: Convert3D
 /// - .dcm: the contours of a DICOM RT structure set
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
 /// Normals: nx, ny, nz of PLY and of columns; columns 4 to 6 of six without names, if all are unit vectors; normal_x,

@@ -8,10 +8,9 @@ void add_segment(Session& session) {
         session.add_job<SegmentJob>("segment", "Find the surface of a structure in an image, with the help of marks");
     in_group(*command, Group::Input);
     command
-        ->add_option(
-            "image", job->images,
-            "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse [the "
-            "study's]")
+        ->add_option("image", job->images,
+                     "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, ICS, HDF5, .vdb; several are a "
+                     "time-lapse [the study's]")
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
         ->description(

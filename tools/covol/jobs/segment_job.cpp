@@ -57,6 +57,8 @@ void SegmentJob::check_options() const {
 
 void SegmentJob::check_settings() const {
     require_valid_flags(resolve(1.0));
+    if (mask_label && (*mask_label < 1 || *mask_label > 255))
+        throw Error(Errc::InvalidOptions, "--mask-label: expected 1 to 255, got " + std::to_string(*mask_label));
     cloud.check();
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
@@ -158,6 +160,11 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                 "label image with the geometry of the image; .seg.nrrd for 3D Slicer, .dcm for a DICOM segmentation")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr|.dcm");
         command
+            .add_option("--mask-label", mask_label,
+                        "value of the structure in --mask, 1 to 255; only for a single structure, and not for a mask "
+                        "of --guess, which keeps its values [1, or the painted label]")
+            ->type_name("N");
+        command
             .add_option("--rtstruct", rtstruct_path,
                         "contours of the surface on the image's slices, as a DICOM RT structure set")
             ->type_name("OUT.dcm");
@@ -198,8 +205,8 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         in_group(command, Group::ReadingMarks);
         command
             .add_option("--structure-column", structure_column,
-                        "what names the structure of each mark in a file with several structures: a column, a group or "
-                        "counter of Fiji, or a label or node of 3D Slicer")
+                        "what names the structure of each mark in a file with several structures: a column, a group, "
+                        "counter or type of Fiji, or a label or node of 3D Slicer")
             ->type_name("NAME");
     }
     if (with_image) painted.bind(command);

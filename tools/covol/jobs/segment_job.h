@@ -1,6 +1,7 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,7 @@ struct SegmentJob {
     std::string study;  ///< folder of a study whose structures are added to those of the files; empty: none
     std::string output, mask_path, rtstruct_path, mesh_path, density_path, fields_path, table_path, failed_path,
         page_path, scene_path;
+    std::optional<int> mask_label;  ///< value of the only structure in --mask; automatic: see number_labels()
     VdbFlags vdb;
 
     void bind(CLI::App& command, bool with_image);

@@ -270,6 +270,10 @@ std::string density_name(const StructuresOutput& output, const StructureOutput& 
 
 void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs) {
+    // Without --mask it has no effect and is no error: covol rerun repeats the settings of a run without its outputs.
+    if (job.mask_label && structures.size() != 1)
+        throw UsageError("--mask-label: expected one structure, got " + std::to_string(structures.size()) +
+                         ", which are numbered 1, 2, ...");
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
     if (!job.mask_path.empty() && !structures.front().name.empty() && !keeps_names(job.mask_path))

@@ -116,6 +116,11 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
                 run.warn("--guess: " + s.files.guess +
                          " does not lie on the image's voxels; the mask is made from the corrected surface");
         }
+        if (job.mask_label && s.corrected)
+            run.warn("--mask-label has no effect: the mask is " + s.files.guess +
+                     " with corrections, and keeps its values");
+        else if (job.mask_label)
+            s.label = *job.mask_label;
         session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
         // For an image in chunks, only the parts near marks and surface have been read; the interior is not read for

@@ -27,6 +27,9 @@ std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name);
 /// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
 std::unique_ptr<ImageFile> open_mrc(const std::string& path);
 
+/// Image Cytometry Standard: version 1.0 with its voxels in an .ids file of the same name, version 2.0 in one file.
+std::unique_ptr<ImageFile> open_ics(const std::string& path);
+
 /// NumPy's .npy: an array of three axes z, y, x, in C's or Fortran's order.
 std::unique_ptr<ImageFile> open_npy(const std::string& path);
 

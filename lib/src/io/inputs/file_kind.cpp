@@ -26,9 +26,9 @@ bool is_one_of(const std::string& end, const std::array<std::string_view, N>& li
     return std::find(list.begin(), list.end(), end) != list.end();
 }
 
-constexpr std::array<std::string_view, 17> kPointEndings{".xyz", ".csv",       ".tsv",  ".txt",  ".pts", ".asc",
-                                                         ".roi", ".zip",       ".json", ".fcsv", ".csl", ".annot",
-                                                         ".lmk", ".landmarks", ".pcd",  ".las",  ".ptx"};
+constexpr std::array<std::string_view, 18> kPointEndings{".xyz",   ".csv", ".tsv",       ".txt",  ".pts",  ".asc",
+                                                         ".roi",   ".zip", ".xml",       ".json", ".fcsv", ".csl",
+                                                         ".annot", ".lmk", ".landmarks", ".pcd",  ".las",  ".ptx"};
 constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
 constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
 

@@ -71,6 +71,7 @@ const std::vector<Format>& formats() {
                                           {".off", of_one<parse_off>},
                                           {".roi", parse_one_roi},
                                           {".zip", parse_roi_zip},
+                                          {".xml", parse_cell_counter},
                                           {".json", parse_markups},
                                           {".fcsv", parse_fcsv},
                                           {".csl", parse_sections},
@@ -143,12 +144,13 @@ PointTable read_point_table(const std::string& path, const std::string& structur
     if (content.empty()) fail(path, "the file is empty");
     PointTable table = format->parse(path, content, structures_by);
     if (!structures_by.empty() && table.structure.size() != table.points.size())
-        throw Error(Errc::InvalidInput,
-                    path + ": `structure_column`: expected a table with a column " + quote(structures_by) +
-                        ", Fiji's selections with group or counter, 3D Slicer's markups with label or node, or a "
-                        "DICOM RT structure set with roi; a " +
-                        extension + " file has no '" + structures_by + "'",
-                    "structure_column");
+        throw Error(
+            Errc::InvalidInput,
+            path + ": `structure_column`: expected a table with a column " + quote(structures_by) +
+                ", Fiji's selections with group or counter, its Cell Counter with type, 3D Slicer's markups with "
+                "label or node, or a DICOM RT structure set with roi; a " +
+                extension + " file has no '" + structures_by + "'",
+            "structure_column");
     return table;
 }
 

@@ -25,6 +25,9 @@ PointTable parse_roi(const std::string& path, const std::string& bytes, const st
                      const std::string& structures_by = {});
 PointTable parse_roi_zip(const std::string& path, const std::string& bytes, const std::string& structures_by = {});
 
+/// Markers of Fiji's plugin Cell Counter, .xml. @param structures_by  "type" of the markers, or empty
+PointTable parse_cell_counter(const std::string& path, const std::string& text, const std::string& structures_by = {});
+
 /// 3D Slicer's .mrk.json and .fcsv, which state the coordinate system.
 /// @param structures_by  "label" of each point, "node" (the markup's own name; not for .fcsv), or empty
 PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by = {});

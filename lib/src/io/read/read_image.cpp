@@ -32,8 +32,8 @@ using detail::PixelRequest;
 using detail::read_error;
 
 constexpr const char* kReadable =
-    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .ims, .npy, .dcm or .vdb, or a "
-    "folder with a DICOM series or a Zarr store";
+    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .ics, .h5, .ims, .npy, .dcm or .vdb, "
+    "or a folder with a DICOM series or a Zarr store";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
@@ -76,7 +76,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     const bool nifti = is_one_of(end, {".nii", ".nii.gz"});
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
-    const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".npy" || end == ".vdb";
+    const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".ics" || end == ".npy" || end == ".vdb";
     // The extensions of slices are often numbers.
     const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
     if (!marked && !known)
@@ -90,6 +90,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     if (nifti) return detail::open_nifti(path, run);
     if (mrc) return detail::open_mrc(path);
     if (tiff) return detail::open_tiff(path, axes, run);
+    if (end == ".ics") return detail::open_ics(path);
     if (end == ".npy") return detail::open_npy(path);
     return detail::open_vdb_image(path, grid);
 }

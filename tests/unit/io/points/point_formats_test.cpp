@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "covol/point_structures.h"
 #include "covol/points.h"
 #include "support/scratch.h"
 
@@ -276,6 +277,25 @@ std::vector<Vec3> moved(std::vector<Vec3> points, const Vec3& scale, const Vec3&
     return points;
 }
 
+/// Markers of Fiji's Cell Counter, in types of two markers, followed by an empty type.
+std::string cell_counter(const std::vector<Vec3>& points, bool named = false) {
+    std::string text =
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\r\n<CellCounter_Marker_File>\r\n <Image_Properties>\r\n"
+        "     <Image_Filename>a.tif</Image_Filename>\r\n </Image_Properties>\r\n <Marker_Data>\r\n"
+        "     <Current_Type>0</Current_Type>\r\n";
+    for (std::size_t type = 0; 2 * type <= points.size(); ++type) {
+        text += "     <Marker_Type>\r\n         <Type>" + std::to_string(type + 1) + "</Type>\r\n";
+        if (named) text += "         <Name>cell &lt;" + std::to_string(type + 1) + "&gt;</Name>\r\n";
+        for (std::size_t n = 2 * type; n < std::min(points.size(), 2 * type + 2); ++n)
+            text += "         <Marker>\r\n             <MarkerX>" + std::to_string(points[n][0]) +
+                    "</MarkerX>\r\n             <MarkerY>" + std::to_string(points[n][1]) +
+                    "</MarkerY>\r\n             <MarkerZ>" + std::to_string(int(points[n][2]) + 1) +
+                    "</MarkerZ>\r\n         </Marker>\r\n";
+        text += "     </Marker_Type>\r\n";
+    }
+    return text + " </Marker_Data>\r\n</CellCounter_Marker_File>\r\n";
+}
+
 RoiSpec multi_point() {
     RoiSpec spec;
     spec.type = kPoint;
@@ -341,6 +361,7 @@ std::vector<File> all_formats() {
         {"set.zip", zip({{"a.roi", roi(outline(kPolygon, 3))}, {"readme.txt", "no ROI"}, {"b.roi", roi(by_name)}}),
          "1 polygon, 1 traced"},
         {"stored.zip", zip({{"multi.roi", roi(multi_point())}}, false), "1 point"},
+        {"cells.xml", cell_counter(kIndex), "Fiji's Cell Counter (2 types), slices from 1"},
         {"lps.mrk.json", markups(world, "Fiducial", "LPS"), "3D Slicer markups (Fiducial), as x, y, z in world units"},
         {"ras.mrk.json", markups(ras, "ClosedCurve", "RAS"), "RAS turned to LPS"},
         {"old.fcsv",
@@ -505,6 +526,42 @@ TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its n
     spec.position = 3;
     spec.channel = 1;  // on all slices of channel 1
     contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
+}
+
+TEST_CASE("the types of Cell Counter are structures, and its slices may count channels") {
+    const Scratch scratch;
+    const std::string path = scratch.write("a.xml", cell_counter(kIndex));
+    std::vector<StructurePoints> structures = read_structures_of_points(path, "type");
+    REQUIRE(structures.size() == 2);
+    CHECK(structures[0].name == "type 1");
+    CHECK(structures[1].name == "type 2");
+    CHECK(structures[1].points.cloud.points == std::vector<Vec3>{kIndex[2], kIndex[3]});
+    structures = read_structures_of_points(scratch.write("n.xml", cell_counter(kIndex, true)), "type");
+    REQUIRE(structures.size() == 2);
+    CHECK(structures[1].name == "cell <2>");
+    contains(message_of([&] { (void)read_structures_of_points(path, "group"); }), "its Cell Counter with type");
+    ReadPointsOptions two;
+    two.channels = 2;
+    CHECK(read_points(path, two).points[0][2] == 1);  // image 4 of two channels
+    CHECK(read_points(path, two).points[3][2] == 2);
+}
+
+TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
+    const Scratch scratch;
+    const std::string good = cell_counter(kIndex);
+    const auto with = [&](const std::string& old, const std::string& other) {
+        std::string text = good;
+        return text.replace(text.find(old), old.size(), other);
+    };
+    contains(read_error(scratch, "a.xml", "<TrackMate version=\"7\"/>"), "got 'TrackMate'");
+    contains(read_error(scratch, "a.xml", "no XML"), "expected a file of Fiji's Cell Counter");
+    contains(read_error(scratch, "a.xml", good.substr(0, good.size() - 5)), "has no end");
+    contains(read_error(scratch, "a.xml", with("<MarkerZ>4</MarkerZ>", "")),
+             "marker 1: expected MarkerX, MarkerY and MarkerZ");
+    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>0<")), "marker 1: expected a slice from 1");
+    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>nan<")), "expected a number as MarkerZ");
+    contains(read_error(scratch, "a.xml", "<CellCounter_Marker_File></CellCounter_Marker_File>"),
+             "expected at least one point");
 }
 
 TEST_CASE("markups give lines, their own names and nothing that is not placed") {
