@@ -6,7 +6,7 @@
 
 #include "serve/web_server.h"
 
-// The headers of answers: pure functions without sockets.
+// HTTP responses and their headers: pure functions that use no sockets.
 namespace covol::serve {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;

@@ -54,8 +54,9 @@ public:
     [[nodiscard]] COVOL_API bool may_meet(const Vec3& center, double radius) const;
     /// A box that contains the body.
     [[nodiscard]] COVOL_API WorldBox box() const;
-    /// Points of the surface between the slices and on the domes, in world units; one for each lattice line of the
-    /// slices' grid that crosses the surface, along the axis closest to the surface's normal.
+    /// Intersections of the surface with the lines of a grid, between the slices and on the domes, in world units. At
+    /// each node, only the grid axis closest to the surface's normal is used.
+    /// @param step  maximum distance between the grid's layers along the normal of the slices
     [[nodiscard]] COVOL_API std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
     /// One position deep inside each hole of each slice.
     [[nodiscard]] COVOL_API std::vector<Vec3> hole_seeds() const;

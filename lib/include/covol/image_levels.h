@@ -39,8 +39,8 @@ public:
 
     /// The image as it is held in memory, without coarser levels.
     COVOL_API explicit ImageLevels(Image image);
-    /// @param sources  the finest first, which is the whole of `image`; a level whose voxels do not span whole numbers
-    ///     of fine ones is skipped
+    /// @param sources  from the finest level to the coarsest; the first contains the voxels of `image` itself. A level
+    ///     is skipped if its voxels do not span a whole number of voxels of the finest level along each axis.
     /// @param max_bytes  limit of decoded chunks that are kept
     COVOL_API ImageLevels(Image image, const std::vector<Source>& sources, std::uint64_t max_bytes);
 
@@ -56,8 +56,8 @@ public:
     /// @pre the box lies in the level. @throws Error as Image::copy(); Cancelled.
     COVOL_API void copy(std::size_t level, const VoxelBox& box, float* out, const RunContext& run = {}) const;
 
-    /// Minimum and maximum: for 8-bit and 16-bit integers in chunks those of the type, for other images in chunks those
-    /// of the voxels that percentiles() uses, for an image that is held in memory its own.
+    /// Minimum and maximum. For an image in chunks: of the pixel type if that is an 8-bit or 16-bit integer, otherwise
+    /// of the voxels that percentiles() uses. For an image that is held in memory: Image::range().
     [[nodiscard]] COVOL_API std::array<double, 2> range(const RunContext& run = {}) const;
     /// Intensities below which the fractions `low` and `high` of the voxels lie: of the coarsest level, or, if that is
     /// large, of some parts of it.

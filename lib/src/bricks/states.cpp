@@ -45,7 +45,8 @@ void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels,
     }
 }
 
-/// Where states overlap, blends from one to the other within kBlend voxels on either side of the seam.
+/// Blends the states of adjacent bricks, which overlap within kBlend voxels on either side of the face between their
+/// cores.
 class SeamBlend {
 public:
     SeamBlend(const BrickPlan& plan, const CoordBBox& box)

@@ -7,7 +7,7 @@
 namespace covol::detail {
 namespace {
 
-/// The points of the eight voxels of one row along k.
+/// The nearest known point of each of eight voxels in a row along k.
 struct Points8 {
     Float8 x, y, z;
     Int8 index;

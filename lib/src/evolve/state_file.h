@@ -23,7 +23,7 @@ public:
         static_assert(std::is_trivially_copyable_v<T>);
         bytes(&v, sizeof v);
     }
-    /// Exactly `count` values, whatever the file contains.
+    /// Writes or reads `count` values. The file does not contain the count, so the caller must know it.
     template <typename T>
     void array(T* values, std::size_t count) {
         static_assert(std::is_trivially_copyable_v<T>);

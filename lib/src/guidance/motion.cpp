@@ -314,7 +314,8 @@ void Motion::fit(const OffsetField& field, const std::vector<double>& measured, 
             const double unknown = 1 / (1 / (deviation * deviation) + believed[i]), off = measured[i] - offset_[i];
             squares += patches_.area[i] * (offset_[i] * offset_[i] + unknown);
             area += patches_.area[i];
-            // Student's t with three degrees of freedom: some places have changed, and are no valid measurements.
+            // Weights of Student's t-distribution with three degrees of freedom: large residuals count less, because
+            // an offset is not a valid measurement if the image has changed at its patch.
             believed[i] = precision[i] * 4 / (3 + off * off * precision[i]);
         }
         deviation = std::max(std::sqrt(squares / area), kFinest * h_);

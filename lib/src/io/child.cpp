@@ -27,8 +27,8 @@
 namespace covol::detail {
 namespace {
 
-/// Descriptors in the started program: the two memories that it shares with this process, and a pipe that is closed
-/// when it ends.
+/// File descriptors in the started program: the shared memory of the orders and of the results, the writing end of a
+/// pipe that is closed when the program ends, and the first descriptor that the program does not inherit.
 constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
 constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // from the terminal; they do not mean a crash
 

@@ -262,7 +262,7 @@ Crossings count_crossings(const TriangleMesh& mesh) {
     }
     std::vector<std::uint32_t> piece_of(mesh.triangles.size());
     for (std::size_t n = 0; n < piece_of.size(); ++n) piece_of[n] = pieces.root(mesh.triangles[n][0]);
-    // Most pairs are far apart; exact predicates decide on the others.
+    // contacts() omits pairs of triangles that are certainly apart; exact predicates decide on the others.
     const std::vector<meshing::ContactFinder::Pair> pairs =
         meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
     return tbb::parallel_reduce(

@@ -74,7 +74,7 @@ StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points
     if (is_any<TagStart>(o.start) || !problem.is_guided() || o.contours || o.tag_distance ||
         points.size() > kAutomatic.max_guess_marks)
         return StartMethod::Tagged;
-    // The points form a layer: the error of tagging states what it requires.
+    // These points cannot enclose a body. The error that refuse_flat() throws during tagging states what to add.
     if (problem.image == nullptr && !can_enclose(points)) return StartMethod::Tagged;
     remarks.choose("start", "guess",
                    std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.max_guess_marks),

@@ -59,7 +59,8 @@ void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std
     }
 }
 
-/// The same once the image is known. @returns the files of each structure, for reports
+/// Adds the marks and contours from files that name their structures, once the image is known.
+/// @returns the files of each structure, for reports
 std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::vector<Marks>& structures,
                                                    const std::optional<ImageGeometry>& geometry,
                                                    const RunContext& run) {

@@ -126,7 +126,8 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
             scale.spacing = median_of(around, [&](const Around& a) { return radius * std::sqrt(M_PI / a.count); });
             scale.noise = noise;
         }
-        // In wider neighbourhoods, only the surface's own curvature would add to the deviation.
+        // Stops at a sheet, or when the deviation relative to the radius increases again: wider neighbourhoods would
+        // only add the surface's own curvature to the deviation.
         if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
     }
     return scale;

@@ -46,7 +46,8 @@ bool is_valid_uid(const std::string& uid) {
            std::all_of(uid.begin(), uid.end(), [](char c) { return c == '.' || (c >= '0' && c <= '9'); });
 }
 
-/// A text that distinguishes this image from others on the same lattice.
+/// A text that distinguishes the image `like` from others on the same lattice: its digest or, if the path does not
+/// exist, the path and dicom_time().
 std::string identity_of(const std::string& like) {
     std::error_code status;
     if (std::filesystem::exists(like, status)) return digest_of(like);

@@ -30,7 +30,7 @@ std::vector<Vec3> loose_points(const MarkSets& marks, const Contours& contours) 
     return {marks.trusted.begin(), marks.trusted.begin() + loose};
 }
 
-/// The reason for tagging the points instead, or null.
+/// The reason for tagging the points instead of starting from the body between the contours; null if there is none.
 const char* why_tag(const Problem& problem, const std::vector<Vec3>& loose, double h) {
     const ContourSolid& body = *problem.body();
     for (const Vec3& seed : problem.options.exterior_seeds)

@@ -19,7 +19,7 @@ CorrectionOptions correction_options(const Problem& problem, double h) {
     double minimum = kCorrectionVoxels * h;
     if (problem.image != nullptr) {
         const Vec3& spacing = problem.image->geometry().spacing;
-        // A mark on one slice affects the next by half.
+        // The radius is at least twice the largest spacing, so that a mark also affects the neighbouring slices.
         minimum = std::max(minimum, 2 * *std::max_element(spacing.begin(), spacing.end()));
     }
     options.min_radius = minimum;

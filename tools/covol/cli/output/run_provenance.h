@@ -14,7 +14,7 @@ namespace covol::tool {
 /// What output files state about the run that wrote them.
 class RunProvenance {
 public:
-    /// @param report  of the run, for as long as this object is used
+    /// @param report  of the run; kept by reference, so it must outlive this object
     RunProvenance(const CLI::App& command, std::vector<std::string> inputs, const Json& report)
         : command_(command), inputs_(std::move(inputs)), report_(report) {}
 
