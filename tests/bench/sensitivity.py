@@ -166,10 +166,16 @@ class Measured:
                     text = "**sensitive**"
         return text if worst else "not run"
 
+    def better(self):
+        """The factor with which the median error is lower by more than a tenth of itself, and by more than POINTS; 1 if there is none."""
+        medians = {factor: statistics.median(float("inf") if e is None else e for e in found.values()) for factor, found in [(1, self.as_is), *self.errors.items()] if found}
+        best = min(medians, key=medians.get, default=1)
+        return best if best != 1 and medians[best] < min(medians[1] * (1 - ABOVE), medians[1] - POINTS) else 1
+
     def row(self):
         h, worst = self.constant, self.worst()
         where = "" if self.same or not worst or worst[0] < 0.005 else f"{worst[1]}, {'half' if worst[2] < 1 else 'twice'}: {number(self.as_is[worst[1]])} → {number(worst[3])}"
-        cells = [f"`{h.name}`", h.text, h.unit, h.meaning, str(len(self.as_is) or "")] + ([self.median(1), self.median(0.5), self.median(2)] if self.errors else ["", "", ""]) + [where, self.rating()]
+        cells = [f"`{h.name}`", h.text, h.unit, h.meaning, str(len(self.as_is) or "")] + ([self.median(1), self.median(0.5), self.median(2)] if self.errors else ["", "", ""]) + [where, self.rating() + {0.5: ", better half", 2.0: ", better twice"}.get(self.better(), "")]
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -197,7 +203,7 @@ Such a build multiplies constants by the factors in the environment variable `CO
 - **sensitive**: an error grows by more than a tenth of its value, and by more than {POINTS} percentage points;
 - flat: none of these; no effect: all meshes of clouds and masks of phantoms are identical, bit by bit, in the jobs that were run; not run: run the command again, which continues where it ended; limit: of time or memory, which only larger inputs reach.
 
-{len(found)} constants: {summary}. A cosine or a fraction that is doubled to more than 1 makes its condition hold always or never. Sizes, formats and tolerances of solvers are not heuristics and are defined where they are used.
+{len(found)} constants: {summary}; {sum(m.better() != 1 for m in found)} with a lower error if halved or doubled ("better": the median error is lower by more than a tenth, and by more than {POINTS} percentage points). A cosine or a fraction that is doubled to more than 1 makes its condition hold always or never. Sizes, formats and tolerances of solvers are not heuristics and are defined where they are used.
 """
     folder = step = None
     for m in found:

@@ -40,7 +40,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     const int code = covol::tool::run(argc, argv);
-    // Libraries are not finalised: HDF5 would report errors about objects that a damaged file left in an invalid state.
+    // Libraries are not finalised, because HDF5 would print errors about objects that a damaged file left invalid.
     std::fflush(nullptr);
     std::_Exit(code);
 }

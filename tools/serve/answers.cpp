@@ -8,7 +8,7 @@ namespace {
 
 bool is_letter_or_digit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
-// RFC 9110, 5.6.2.
+// Whether the text is a token by RFC 9110, 5.6.2.
 bool is_header_name(std::string_view text) {
     constexpr std::string_view kSigns = "!#$%&'*+-.^_`|~";
     return !text.empty() && std::all_of(text.begin(), text.end(), [&](char c) {
@@ -22,7 +22,7 @@ std::string in_small_letters(std::string text) {
     return text;
 }
 
-// Headers that handlers must not set: they state the length of an answer, or protect the page.
+// Whether handlers must not set this header, because it describes the body or the connection, or protects the page.
 bool is_server_header(const std::string& name) {
     static const Headers own = protecting_headers({});
     constexpr std::array<std::string_view, 9> kFraming{"connection",     "content-disposition", "content-encoding",
@@ -82,8 +82,8 @@ Response refusal(int status, const std::string& why) {
 Response cookie_answer(const std::string& cookie_name, const std::string& cookie, bool is_link) {
     Response response;
     if (is_link) {
-        // A browser would treat a redirection as a request of the linking page, and send no cookie. Hence a page is
-        // sent.
+        // The answer is a page that loads "/", and not a redirection: a browser would treat that as a request of the
+        // linking page, and send no cookie.
         response.type = "text/html; charset=utf-8";
         response.body =
             "<!doctype html>\n<title>covol</title><meta http-equiv=\"refresh\" content=\"0;url=/\"><a "
@@ -99,7 +99,7 @@ Response cookie_answer(const std::string& cookie_name, const std::string& cookie
 
 std::string attachment(std::string_view file_name) {
     std::string name(file_name);
-    // Browsers do much of this, too, but programs that download files may not.
+    // Browsers replace most of these characters themselves, but other programs that download files may not.
     for (char& c : name) {
         if ((c >= 0 && c < ' ') || c == '\x7f' || c == '/' || c == '\\') c = '_';
     }

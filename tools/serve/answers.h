@@ -19,13 +19,13 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 [[nodiscard]] std::string why_unsendable(const Response& response);
 
 /// All headers of an answer except its length and those of the connection.
-/// @param page_policy  for text/html; other types must not load anything
+/// @param page_policy  Content-Security-Policy of text/html; that of other types forbids to load anything
 [[nodiscard]] Headers headers_of(const Response& response, const std::string& page_policy);
 
 /// A response with a message of one line.
 [[nodiscard]] Response refusal(int status, const std::string& why);
 
-/// The answer to the right token. @param is_link  as Judgement::is_link
+/// The answer to a request with the correct token. @param is_link  see Decision::is_link
 [[nodiscard]] Response cookie_answer(const std::string& cookie_name, const std::string& cookie, bool is_link);
 
 /// The value of Content-Disposition that makes a browser save a file, by RFC 6266 with the name encoded as in RFC 5987.

@@ -42,7 +42,7 @@ void HttpConnection::read() {
     serializer_.reset();
     parser_.emplace();
     parser_->header_limit(kMaxHeaderBytes);
-    // judge() checks the length. Boost 1.74 interprets "none" as 0 here.
+    // The limit is a maximum, because judge() checks the length, and Boost 1.74 interprets "none" as 0.
     if (hub_.rules.max_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     waits_since_ = std::chrono::steady_clock::now();
     stream_.expires_after(hub_.options.idle);
@@ -94,14 +94,14 @@ void HttpConnection::answer_with(const std::string& path, std::function<Response
         asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
             self->end_post();
             beast::error_code ignored;
-            self->stream_.socket().cancel(ignored);  // ends watch(): the next request is read as soon as it arrives
+            self->stream_.socket().cancel(ignored);  // ends watch(), so that the next request can be read
             self->answer(std::move(response), self->wants_to_stay());
         });
     });
 }
 
-// A page that switches to another slice closes the connection with the pending request: the connection then becomes
-// free.
+// Waits for the client to close the connection while its request is handled, and then closes it, too. A page does this
+// when it switches to another slice.
 void HttpConnection::watch(std::shared_ptr<std::atomic<bool>> gone) {
     stream_.socket().async_wait(asio::ip::tcp::socket::wait_read, [self = self(), gone](beast::error_code status) {
         char next = 0;
@@ -132,7 +132,7 @@ void HttpConnection::take_body(Request request) {
     read_body(std::move(parser), std::move(request));
 }
 
-// In pieces, like write().
+// Reads in pieces, so that the time limit applies to each piece, as in write().
 void HttpConnection::read_body(std::shared_ptr<BodyParser> parser, Request request) {
     stream_.expires_after(hub_.options.idle);
     BodyParser& into = *parser;
@@ -184,7 +184,7 @@ void HttpConnection::answer(Response response, bool keep) {
     write();
 }
 
-// In pieces: the time limit applies to each piece, so that a large file may take long over a slow connection.
+// Writes in pieces, so that the time limit applies to each piece: a large file may take long over a slow connection.
 void HttpConnection::write() {
     stream_.expires_after(hub_.options.idle);
     http::async_write_some(stream_, *serializer_, [self = self()](beast::error_code status, std::size_t) {
@@ -199,7 +199,7 @@ void HttpConnection::write() {
     });
 }
 
-// If a socket is closed before all received data has been read, the client may lose the answer.
+// Reads and ignores data until the client closes: if the socket is closed before, the client may lose the answer.
 void HttpConnection::drain() {
     constexpr std::size_t kMax = 1 << 20, kPiece = 4096;
     buffer_.consume(buffer_.size());

@@ -22,7 +22,7 @@ public:
 
     /// Waits for a request. @pre this object is owned by a shared pointer
     void read();
-    /// Answers with a message and closes.
+    /// Answers with a message, and closes the connection.
     void refuse(int status, const std::string& why);
 
     void stop() override { finish(); }
@@ -42,7 +42,7 @@ private:
     void watch(std::shared_ptr<std::atomic<bool>> gone);
     void take_body(Request request);
     void read_body(std::shared_ptr<BodyParser> parser, Request request);
-    /// Calls `handler` on a thread for handlers, and answers with what it returns.
+    /// Calls `handler` on a thread of the pool for handlers, and answers with the returned response.
     void answer_with(const std::string& path, std::function<Response()> handler);
     void end_post();
     void open_live();
@@ -59,7 +59,7 @@ private:
     std::optional<StringResponse> response_;
     std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
     bool is_head_ = false, keeps_ = false, is_posting_ = false;
-    std::optional<bool> wants_to_stay_;  // for a POST, whose header has been released when it is answered
+    std::optional<bool> wants_to_stay_;  // stored for a POST, whose header is released before the answer
     std::size_t drained_ = 0;
     std::optional<MessageRate::Time> waits_since_;
 };

@@ -11,7 +11,7 @@ Hub::Hub(Options its_options, Handlers its_handlers)
       get_pool(std::size_t(options.get_threads)),
       live_pool(2) {}
 
-// Further connections are closed without an answer.
+// Maximum number of connections that are being refused; further ones are closed without an answer.
 constexpr std::size_t kMaxRefused = 8;
 
 void Hub::serve_socket(boost::asio::ip::tcp::socket socket) {

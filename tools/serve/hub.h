@@ -21,11 +21,11 @@ namespace covol::serve {
 class Connection : public std::enable_shared_from_this<Connection> {
 public:
     virtual ~Connection() = default;
-    /// Closes within Hub::kCloseTimeout.
+    /// Closes the connection within Hub::kCloseTimeout.
     virtual void stop() = 0;
-    /// The time since which it has been waiting for a request, or for the client to close; nullopt while it is busy.
+    /// When the connection began to wait for a request, or for the client to close; nullopt while it is busy.
     [[nodiscard]] virtual std::optional<MessageRate::Time> waits_since() const = 0;
-    /// Closes at once.
+    /// Closes the connection at once.
     virtual void finish() = 0;
 };
 
@@ -46,12 +46,12 @@ public:
 
     const Options options;
     const Handlers handlers;
-    Rules rules{};                         ///< complete before the first connection
-    std::atomic<bool> is_stopping{false};  ///< any thread
+    Rules rules{};                         ///< set before the first connection
+    std::atomic<bool> is_stopping{false};  ///< may be used by any thread
     bool is_posting = false;               ///< a body is being read or handled; bodies may be large
     /// Threads of handlers. There are two pools, so that messages are answered while many images are being read.
     boost::asio::thread_pool get_pool, live_pool;
-    boost::asio::io_context io{1};  // after the pools: its pending handlers refer to them until the end
+    boost::asio::io_context io{1};  // after the pools, which its pending handlers refer to
 
     /// Serves an accepted socket. If there are too many connections, closes the one that has been waiting longest for a
     /// request, or refuses the new one if all are busy.
@@ -67,11 +67,11 @@ public:
     /// Includes the client in send() and broadcast() from now on.
     void add_recipient(Client client, std::shared_ptr<Recipient> recipient);
     void remove_recipient(Client client);
-    /// Any thread.
+    /// May be called from any thread.
     bool send(Client client, std::string text);
     void broadcast(std::string text);
 
-    /// Any thread: calls `on_error`; exceptions that it throws are ignored.
+    /// Calls `on_error`, and ignores its exceptions. May be called from any thread.
     void report(const std::string& what) const;
 
 private:

@@ -41,7 +41,7 @@ void LiveConnection::accept(http::request<http::empty_body> request) {
     socket_.read_message_max(0);
     socket_.auto_fragment(false);
     socket_.text(true);
-    // Pings are counted as messages, because they cost as much.
+    // Pings are counted as messages, because they cost as much time.
     socket_.control_callback([this](websocket::frame_type kind, beast::string_view) {
         if (kind == websocket::frame_type::close || !is_too_fast()) return;
         asio::post(hub_.io, [self = self()] {
@@ -63,7 +63,7 @@ void LiveConnection::call(const char* name, const Call& handler) {
     }
 }
 
-// The socket must be destroyed on its own thread, not on a handler thread.
+// Releases a reference on the thread of Hub::io, where the socket has to be destroyed.
 void LiveConnection::release(std::shared_ptr<LiveConnection> self) {
     asio::io_context& io = self->hub_.io;
     asio::post(io, [self = std::move(self)] {});
@@ -116,7 +116,7 @@ void LiveConnection::on_read(beast::error_code status) {
         }
         asio::post(hub.io, [self = std::move(self), bytes = text.size()] { self->on_handled(bytes); });
     });
-    // Unread messages stay with the client, which limits the queue of slow handlers.
+    // Reading pauses while many messages are queued for the handlers. This limits the memory for the queue.
     pauses_ = has_much_to_handle();
     if (!pauses_) read();
 }
@@ -162,7 +162,7 @@ void LiveConnection::close(websocket::close_code code, const char* why, std::chr
     });
 }
 
-// If the client closes or sends invalid UTF-8, the read operation answers that itself, and writing fails from then on.
+// If the client closes or sends invalid UTF-8, the read operation itself answers this, and writing fails from then on.
 // The read operation has to be completed: if the socket is closed before, the client may not receive the answer.
 void LiveConnection::close_after(std::chrono::milliseconds maximum) {
     is_closing_ = true;

@@ -23,7 +23,7 @@ public:
     void stop() override;
     void finish() override;
     [[nodiscard]] std::optional<MessageRate::Time> waits_since() const override { return std::nullopt; }
-    /// Any thread.
+    /// May be called from any thread.
     bool send(const SharedText& text, bool is_broadcast) override;
 
 private:
@@ -36,7 +36,7 @@ private:
     void read();
     void on_read(boost::beast::error_code status);
     [[nodiscard]] bool is_too_fast();
-    /// On a handler thread: calls a handler, and closes the connection if it throws.
+    /// Calls a handler, and closes the connection if it throws. Called on a thread of the pool for handlers.
     template <typename Call>
     void call(const char* name, const Call& handler);
     static void release(std::shared_ptr<LiveConnection> self);
@@ -52,7 +52,7 @@ private:
     Hub& hub_;
     boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
     const Client client_;
-    Strand handlers_;  // one handler of this client at a time, in order
+    Strand handlers_;  // runs the handlers of this client one at a time, in order
     boost::asio::steady_timer deadline_;
     boost::beast::http::request<boost::beast::http::empty_body> handshake_;
     boost::beast::flat_buffer buffer_;

@@ -4,7 +4,7 @@
 
 namespace covol::serve {
 
-/// Limits the rate of a client's messages: a burst, and a mean number per second.
+/// Limits the messages of a client: the number at once, and the mean number per second.
 class MessageRate {
 public:
     using Time = std::chrono::steady_clock::time_point;

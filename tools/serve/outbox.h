@@ -14,16 +14,16 @@ using SharedText = std::shared_ptr<const std::string>;
 class Outbox {
 public:
     enum class Added {
-        Waiting,  ///< the running writer will send it
+        Waiting,  ///< the writer is running, and will send the text
         First,    ///< the writer has to be started
         TooMuch,  ///< no more texts are accepted: the client must be disconnected
         Refused   ///< closed, or not ready for broadcasts
     };
 
-    /// @param max_bytes  of the unsent texts; a single one may be larger if the queue is empty
+    /// @param max_bytes  of all unsent texts; if the queue is empty, a single text may be larger
     explicit Outbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-    /// The first text for this client makes it ready for broadcasts.
+    /// Adds a text. Broadcasts are refused before the first other text or take_broadcasts().
     [[nodiscard]] Added add(SharedText text, bool is_broadcast) {
         const std::lock_guard lock(mutex_);
         if (is_closed_ || (is_broadcast && !takes_broadcasts_)) return Added::Refused;
@@ -57,7 +57,7 @@ public:
         return !texts_.empty();
     }
 
-    /// Accepts no more texts; queued ones stay for the writer that may be active.
+    /// Accepts no more texts. Queued texts are kept, because a writer may be active.
     void close() {
         const std::lock_guard lock(mutex_);
         is_closed_ = true;

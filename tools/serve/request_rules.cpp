@@ -8,7 +8,7 @@
 namespace covol::serve {
 namespace {
 
-// Not the functions of <cctype>, which depend on the locale.
+// Used instead of the functions of <cctype>, which depend on the locale.
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 char small(char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; }
@@ -31,7 +31,7 @@ int hex_value(char c) {
     return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-// nullopt if an escape is invalid, or if the text is not UTF-8 or contains a NUL.
+// Decodes escapes (%20). Nullopt if one is invalid, or if the result is not UTF-8 or contains a NUL.
 std::optional<std::string> decode(std::string_view text, bool is_query) {
     std::string decoded;
     for (std::size_t n = 0; n < text.size(); ++n) {
@@ -84,7 +84,7 @@ Decision judge_body(const std::vector<std::string_view>& lengths, const Rules& r
     return good;
 }
 
-// Checks the form of a request before its origin; Get or Post if it is valid.
+// Checks the form of a request, not where it comes from. Returns Get or Post if the form is valid.
 Decision judge_form(const RequestHead& head, const Rules& rules) {
     const bool is_post = head.method == "POST" && rules.max_body_bytes > 0;
     if (head.method != "GET" && head.method != "HEAD" && !is_post)
@@ -112,9 +112,9 @@ bool has_value(const RequestHead& head, std::string_view name, std::string_view 
     return values.size() == 1 && values[0] == value;
 }
 
-// Whether the user followed a link on another page, which replaces the whole window, so that the linking page cannot
-// read the answer; or whether a frame of a permitted page is loaded, which the page's policy controls. Frames of pages
-// on other hosts would not send the cookie.
+// Whether the user followed a link on another page, or a page on another port loads this one into a frame. A link
+// replaces the whole window, so that the linking page cannot read the answer. The policy of the page controls which
+// pages may show it in a frame; in frames of pages on other hosts, browsers would not send the cookie.
 bool is_link(const RequestHead& head, const Rules& rules) {
     if (rules.may_be_framed && has_value(head, "Sec-Fetch-Site", "same-site") &&
         has_value(head, "Sec-Fetch-Mode", "navigate") && has_value(head, "Sec-Fetch-Dest", "iframe"))

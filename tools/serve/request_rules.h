@@ -15,11 +15,11 @@ namespace covol::serve {
 /// The header of a request as received, without the blanks around values.
 struct RequestHead {
     std::string_view method, target;
-    std::vector<std::pair<std::string_view, std::string_view>> fields;  ///< names in any case; some may occur twice
-    bool is_upgrade = false;                                            ///< it requests a WebSocket
+    std::vector<std::pair<std::string_view, std::string_view>> fields;  ///< names in any letter case, some repeated
+    bool is_upgrade = false;                                            ///< the request is for a WebSocket
 };
 
-/// The values that a request is compared with.
+/// The values and limits that a request is checked against.
 struct Rules {
     std::vector<std::string> authorities;  ///< values of `Host`, see allowed_authorities()
     std::string token;                     ///< part of the link that the user opens
@@ -41,7 +41,7 @@ struct Decision {
     };
     Kind kind = Kind::Refuse;
     int status = 400;
-    std::string why{};           ///< message for the user
+    std::string why{};           ///< of Refuse: message for the user
     Request request{};           ///< of Get and Post
     std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::max_body_bytes
     bool is_head = false;
@@ -53,11 +53,11 @@ struct Decision {
 /// comes from the server's own page, and the length of its body.
 [[nodiscard]] Decision judge(const RequestHead& head, const Rules& rules);
 
-/// 127.0.0.1 and localhost with this port, and the further ones, in the form that browsers send: in lower case, and
-/// without the port if it is 80. @pre is_authority() holds for each further one
+/// 127.0.0.1 and localhost with this port, and those in `further`, in the form that browsers send: in lower case, and
+/// without the port if it is 80. @pre is_authority() is true for each text in `further`
 [[nodiscard]] std::vector<std::string> allowed_authorities(std::uint16_t port, const std::vector<std::string>& further);
 
-/// Whether it is `name`, `name:port`, `[IPv6]` or `[IPv6]:port` with a port from 1 to 65535.
+/// Whether the text is `name`, `name:port`, `[IPv6]` or `[IPv6]:port` with a port from 1 to 65535.
 [[nodiscard]] bool is_authority(std::string_view text);
 
 /// The parts of "/path?name=value&name=value", decoded. nullopt if the text is invalid: a wrong or incomplete escape, a

@@ -36,8 +36,8 @@ namespace {
     throw Error(Errc::Io, what + std::strerror(number));
 }
 
-// Created without Asio, whose sockets would be inherited by child processes, such as a browser, and stay open as long
-// as they run.
+// The socket is created without Asio: child processes, such as a browser, would inherit a socket of Asio, and keep it
+// open while they run.
 int listen_on(std::uint16_t port) {
     const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (socket < 0) fail_to_listen(port, errno);
@@ -61,7 +61,7 @@ Options checked(Options options) {
     if (const std::string why = options.why_invalid(); !why.empty()) {
         throw Error(Errc::InvalidOptions, why);
     }
-    // It has priority over X-Frame-Options, which does not support origins.
+    // frame-ancestors has priority over X-Frame-Options, which cannot permit single origins.
     options.page_policy += "; frame-ancestors";
     for (const std::string& one : options.frame_origins) options.page_policy += " " + one;
     if (options.frame_origins.empty()) options.page_policy += " 'none'";
@@ -101,7 +101,7 @@ public:
         port_ = acceptor_.local_endpoint().port();
         hub_.rules.authorities = allowed_authorities(port_, hub_.options.authorities);
         hub_.rules.token = random_secret();
-        hub_.rules.cookie = random_secret();  // not the token: links are stored in histories and process lists
+        hub_.rules.cookie = random_secret();  // not the token, because links are stored, such as in histories
         hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
         hub_.rules.live_path = hub_.options.live_path;
         hub_.rules.may_be_framed = !hub_.options.frame_origins.empty();
@@ -158,7 +158,7 @@ private:
 
     // Accepts the pending connections. @return false if none can be accepted at present
     bool accept_all() {
-        constexpr int kMax = 64;  // then other events are handled
+        constexpr int kMax = 64;  // connections in one call, before other events are handled
         for (int n = 0; n < kMax; ++n) {
             const int accepted = ::accept4(acceptor_.native_handle(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
             if (accepted < 0) {

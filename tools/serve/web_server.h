@@ -20,8 +20,8 @@ namespace covol::serve {
 struct Request {
     std::string path;                          ///< decoded, begins with '/'
     std::map<std::string, std::string> query;  ///< decoded, UTF-8 without NUL
-    /// Becomes true if the client closes the connection before it has received the answer, which is then not needed any
-    /// more.
+    /// Becomes true if the client closes the connection before it has received the answer: the handler can then stop
+    /// computing it.
     std::shared_ptr<const std::atomic<bool>> gone{};
 };
 
@@ -30,8 +30,8 @@ struct Response {
     int status = 200;                                            ///< 200 to 599
     std::string type = "text/plain; charset=utf-8";              ///< Content-Type
     std::string body{};                                          ///< for HEAD only its length is sent
-    bool is_deflated = false;                                    ///< the body is a zlib stream of what `type` says
-    std::vector<std::pair<std::string, std::string>> headers{};  ///< further ones, such as `X-Width`
+    bool is_deflated = false;                                    ///< `body` is a zlib stream of content of that type
+    std::vector<std::pair<std::string, std::string>> headers{};  ///< further headers, such as `X-Width`
     std::string file_name{};  ///< UTF-8; if it is not empty, the browser saves the body as a file of that name
 };
 
@@ -41,13 +41,13 @@ struct Client {
     friend auto operator<=>(const Client&, const Client&) = default;
 };
 
-/// Functions that the server calls, on its own threads. Those of one client are called one after another: `opened`,
-/// then each `message` in order, then `closed`; those of different clients, and `get`, concurrently. Each may be empty.
-/// A slow handler delays the next ones of its client, and other clients if more than two are slow: long computations
-/// should run on another thread. Handlers may call send() and broadcast(), but not stop().
+/// Functions that the server calls, on its own threads; each may be empty. For one client, they are called one after
+/// another: `opened`, then each `message` in order, then `closed`. For different clients they are called concurrently,
+/// as is `get`. A slow handler delays the next ones of its client, and two slow ones delay those of all clients: long
+/// computations should run on another thread. Handlers may call send() and broadcast(), but not stop().
 struct Handlers {
     std::function<Response(const Request&)> get{};  ///< may be slow; if it throws, the answer is 500 without details
-    /// A POST with its body, one at a time, if Options::max_body_bytes > 0; otherwise as `get`.
+    /// A POST with its body, one at a time, if Options::max_body_bytes > 0. Otherwise like `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
     std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, the client is closed (1011)
@@ -67,15 +67,15 @@ struct Options {
     std::string live_path = "/live";                 ///< path of WebSockets
     std::size_t max_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
     std::size_t max_body_bytes = 0;                         ///< of a POST; 0: all POSTs are refused
-    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< of unsent data of a client: above it, it is closed
-    /// Open connections, >= 1, including WebSockets. A further one closes the one that has been waiting longest for a
-    /// request; if none is waiting, it is refused (503).
+    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< unsent data of a client; above it, it is closed
+    /// Maximum number of open connections, >= 1, including WebSockets. For a further one, the connection that has been
+    /// waiting longest for a request is closed; if none is waiting, the new one is refused (503).
     std::size_t max_connections = 16;
     std::size_t max_clients = 8;                  ///< WebSockets open at once
-    double messages_per_second = 200;             ///< > 0, of each client: above it the client is closed (1008)
-    double message_burst = 400;                   ///< >= 1: maximum number at once
-    std::chrono::milliseconds idle{30'000};       ///< >= 1: without a request, or without progress of an answer
-    std::chrono::milliseconds live_idle{60'000};  ///< >= 2: to answer a ping, and for handlers to catch up
+    double messages_per_second = 200;             ///< > 0, of each client; if exceeded, it is closed (1008)
+    double message_burst = 400;                   ///< >= 1, maximum number of messages at once
+    std::chrono::milliseconds idle{30'000};       ///< >= 1, maximum time without request or progress of an answer
+    std::chrono::milliseconds live_idle{60'000};  ///< >= 2, maximum time to answer a ping, and for handlers to catch up
     int get_threads = 4;                          ///< >= 1: concurrent calls of `get`
 
     /// Empty if valid, otherwise the reason: "port: expected ...".
@@ -85,14 +85,14 @@ struct Options {
 /// Listens on 127.0.0.1 during its lifetime.
 ///
 /// Only clients that have opened the link of url() get a cookie, and requests without the cookie are refused. A request
-/// also has to name this server as its `Host`, and, if it states its origin, to come from a page of this server. So
-/// other users of this machine, and pages of other sites in the same browser, get no data.
+/// also has to name this server as its `Host`, and, if it states its origin, to come from a page of this server.
+/// Therefore other users of this machine, and pages of other sites in the same browser, get no data.
 class WebServer {
 public:
     /// Answers requests from now on.
     /// @throws Error  InvalidOptions; Io (the port is taken; no random numbers; no sockets or threads).
     WebServer(Options options, Handlers handlers);
-    ~WebServer();  ///< as stop()
+    ~WebServer();  ///< calls stop()
     WebServer(const WebServer&) = delete;
     WebServer& operator=(const WebServer&) = delete;
 
@@ -100,7 +100,7 @@ public:
     /// The link to open, "http://127.0.0.1:PORT/?token=...": it is a secret, and works as long as the server runs.
     [[nodiscard]] std::string url() const;
 
-    /// Sends a text, UTF-8, to a client. From any thread; texts to one client arrive in the order of the calls.
+    /// Sends a text, UTF-8, to a client. May be called from any thread; texts arrive in the order of the calls.
     /// @return false if the client has left, or is closed now because too much data is queued for it
     bool send(Client client, std::string text);
     /// Sends a text to all clients. The order is the same for all of them, even if threads call this concurrently. A
@@ -108,8 +108,8 @@ public:
     /// that `opened` sends arrive first.
     void broadcast(std::string text);
 
-    /// Closes all connections and waits for its threads, which takes less than a second in addition to the running
-    /// handlers, which are waited for. Pending requests and messages are discarded; `closed` is called for each client.
+    /// Closes all connections, and waits until all threads have ended: for the running handlers, and less than a second
+    /// more. Pending requests and messages are discarded; `closed` is called for each client.
     /// May be called from any thread except the handlers', and more than once.
     void stop();
 

@@ -33,7 +33,7 @@ bool is_label(double value, int label) { return label == 0 ? value != 0 : value 
 
 // ------------------------------------------------------------------------------------------------- surfaces of masks
 
-/// The boundary between a mask's voxels, at half value, in the world.
+/// The boundary of a mask in world units: the isosurface of its voxel values at one half.
 class MaskSurface {
 public:
     MaskSurface(const Image& mask, int label) : mask_(mask), label_(label), size_(mask.geometry().size) {}

@@ -87,7 +87,7 @@ private:
         for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
         return all;
     }
-    /// The distinct labels of the six neighbours, ascending. A slit of zero width has both within one voxel.
+    /// The distinct structures of the six neighbours, ascending: both structures beside a slit of one voxel's width.
     [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
         std::vector<std::size_t> found;
         const Index3 here{i, j, k};
@@ -171,7 +171,7 @@ public:
     }
 
 private:
-    /// The box with the neighbouring voxels, by which slits are recognised.
+    /// The box and its neighbouring voxels, which are needed to recognise slits.
     [[nodiscard]] VoxelBox widened(VoxelBox box) const {
         for (int a = 0; a < 3; ++a) {
             box.min[a] = std::max(box.min[a] - 1, 0);

@@ -19,7 +19,7 @@ const double kShellRadius = std::sqrt(3.0) / 2.0;  // the paper's spheres, secti
 constexpr double kShellThickness = 0.04;
 constexpr double kContrast = 255.0;
 
-// The distributions of <random> differ between standard libraries; these do not.
+// The distributions of <random> differ between standard libraries; those of this class do not.
 class Random {
 public:
     explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -52,7 +52,7 @@ double gaussian(std::uint64_t seed, std::uint64_t index) {
 struct PhantomShape {
     const char* name;
     std::function<double(const Vec3&)> distance;             ///< to the true surface, negative inside
-    std::function<double(const Vec3&, double h)> intensity;  ///< of the voxel there, in [0,1]
+    std::function<double(const Vec3&, double h)> intensity;  ///< of a voxel of edge h at a position, in [0,1]
     std::function<Vec3(Random&)> point;                      ///< on the true surface
 };
 

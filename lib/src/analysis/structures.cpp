@@ -127,7 +127,7 @@ private:
         phi_ = carved;
     }
 
-    // In the middle of an overlap both distances are equal, so both must be known to that depth.
+    // In the middle of an overlap both distances are equal, so both must be known down to that depth.
     void deepen() {
         if (report_.overlaps.empty()) return;
         const double margin = 2 * h_;
@@ -139,7 +139,7 @@ private:
                 if (common(cores[overlap.a], cores[overlap.b]) > 0) shallow.insert({overlap.a, overlap.b});
             if (shallow.empty()) return;
             run_.check();
-            // All to the same depth, because a shallow distance would lose against a deep one.
+            // All to the same depth, because distances that are clamped at different depths cannot be compared.
             for (FloatGridPtr& phi : phi_)
                 phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface",
                                          run_);
@@ -158,7 +158,7 @@ private:
         return g;
     }
 
-    /// The minimum of the distances of the other structures in one leaf, if it can matter.
+    /// The minimum of the distances to the other structures at a leaf's voxels; it matters if one of them is close.
     struct Nearest {
         std::array<float, kLeafSize> value;
         bool matters = false;
@@ -221,12 +221,12 @@ private:
         bool moved = false;
         for (int p = 0; p < kLeafSize; ++p) {
             const float mine = values[p], other = nearest.value[p];
-            const float between = mine + other;  // the width of the gap, negative if both claim the voxel
+            const float between = mine + other;  // width of the gap between both; negative if they overlap
             if (!(between < gap)) continue;
             const Coord at = leaf.origin().offsetBy(p >> 6, p >> 3 & 7, p & 7);
             if (!(between <= 0) && !is_between(i, other, at, phi)) continue;
             values[p] = (mine - other) / 2;
-            // Exact contact, and overlaps of others far from this surface, move nothing.
+            // Exact contact, and overlaps far from this surface, do not move it.
             moved = moved || (between != 0 && std::abs(mine) < 2 * h_);
         }
         return moved;

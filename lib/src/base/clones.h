@@ -7,8 +7,8 @@
 // Vectors are only passed to inlined functions, so their calling convention does not matter.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-// With the thread sanitizer, only one version is compiled: it would instrument the resolver functions, which run before
-// it is initialized.
+// With the thread sanitizer, only one version is compiled: the sanitizer would instrument the functions that choose a
+// version, which run before it is initialized.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_THREAD__)
 #define COVOL_CLONES __attribute__((target_clones("default", "avx2")))
 #else

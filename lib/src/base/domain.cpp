@@ -14,7 +14,7 @@ namespace {
 constexpr const char* kMinKey = "covol_domain_min";
 constexpr const char* kMaxKey = "covol_domain_max";
 constexpr double kMaxVoxelsPerAxis = 1 << 30;
-// The keys of band leaves have a range of this many voxels on either side of voxel 0.
+// Maximum index of a voxel: the keys by which leaves are sorted cover this many voxels on either side of voxel 0.
 constexpr double kFarthestVoxel = 1 << 23;
 constexpr double kAnchorVoxels = 1 << 22;
 

@@ -47,38 +47,39 @@ template <typename T>
     return heuristic(name, value);
 }
 
-/// Principles that all steps share: samples, neighbourhoods, significance, repetition and margins.
+/// Constants that all steps have in common: samples, neighbourhoods, significance, repetition and margins.
 struct CommonHeuristics {
-    /// [points] Sample from which a median, a mean or a fraction is estimated: its standard error is below 2 %. Also
-    /// the maximum for steps whose time grows with the square of the number.
+    /// [points] Size of a sample from which a median, a mean or a fraction is estimated: the standard error is below
+    /// 2 %. Also the maximum number of points for steps whose time grows with its square.
     std::size_t sample = heuristic("common.sample", 4000);
-    /// [points] Nearest neighbours that show what is around a point of a surface: about one ring.
+    /// [points] Number of nearest neighbours that represent the surroundings of a point on a surface: about as many as
+    /// a vertex of a mesh has.
     std::size_t ring = heuristic("common.ring", 8);
-    /// [points] Minimum to which a plane or a quadric is fitted: twice as many as a quadric has unknowns.
+    /// [points] Minimum number to which a plane or a quadric is fitted: twice the number of unknowns of a quadric.
     std::size_t quadric = heuristic("common.quadric", 12);
-    /// [standard errors] Difference from which on a measured value is not explained by chance.
+    /// [standard errors] Deviation above which a measured value is not attributed to chance.
     double errors = heuristic("common.errors", 4.0);
-    /// [rounds] Maximum number in which a step is repeated until it changes nothing: a repair, a reweighted fit, the
-    /// body of marks and image.
+    /// [rounds] Maximum number of repetitions of a step that is repeated until it changes nothing: a repair, a
+    /// reweighted fit, the computation of a body from marks and image.
     int rounds = heuristic("common.rounds", 4);
-    /// [ratio] Of a length to the one before it when a suitable scale is searched: an area doubles.
+    /// [ratio] Of each length to the previous one in the search for a suitable scale: areas double.
     double growth = heuristic("common.growth", 1.4142135623730951);
-    /// [voxels] By which a surface is continued beyond the place where it is cut, so that its band is right up to
-    /// there: twice the half width of a band.
+    /// [voxels] Distance by which a surface is continued beyond a cut, so that its band is correct up to the cut: twice
+    /// the half width of a band.
     double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
     /// [voxels] Precision of a position that is given by voxels, and thus the smallest length that has to be resolved.
     double precision_voxels = heuristic("common.precision_voxels", 0.5);
-    /// [ratio] Of a distance to the relevant length, below which two positions are the same one.
+    /// [ratio] Of a distance to the relevant length; below it, two positions count as equal.
     double same_place = heuristic("common.same_place", 1e-3);
-    /// [ratio] From which on one length or size is clearly larger than another.
+    /// [ratio] Of one length or size to another; above it, the first counts as clearly larger.
     double clear_ratio = heuristic("common.clear_ratio", 2.0);
-    /// [fraction] Of a whole, that is negligible.
+    /// [fraction] Of a whole; a smaller part is negligible.
     double negligible = heuristic("common.negligible", 0.02);
-    /// [fraction] Of a whole, that is a small part of it: exceptions are fewer, and two things that differ by less
-    /// count as equal.
+    /// [fraction] Of a whole; a smaller part counts as an exception, and two quantities that differ by a smaller
+    /// fraction count as equal.
     double minority = heuristic("common.minority", 0.1);
-    /// [cosine] Minimum between the normals of a triangle before and after a change, of neighbouring sheets, and
-    /// between a path that leaves a surface and its normal: 60 degrees.
+    /// [cosine] Minimum between the normals of a triangle before and after a change, between the normals of
+    /// neighbouring sheets, and between a path that leaves a surface and the surface's normal: 60 degrees.
     double turn = heuristic("common.turn", 0.5);
 };
 COVOL_HEURISTICS CommonHeuristics kCommon{};

@@ -8,7 +8,7 @@ inline double determinant(const Matrix3& m) {
            m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
-/// The inverse by cofactors: the direction cosines in a file are orthonormal only up to their number of digits.
+/// The inverse by cofactors. The transpose would be inexact: direction cosines in a file are rounded to some digits.
 inline Matrix3 inverse(const Matrix3& m) {
     Matrix3 cofactors{};
     for (int a = 0; a < 3; ++a)

@@ -6,7 +6,8 @@
 
 namespace covol::detail {
 
-/// Faster than floor(), which is a function call on instruction sets without rounding. @pre |x| < 2^31
+/// Rounds down. Faster than floor(), which is a function call on processors without a rounding instruction.
+/// @pre |x| < 2^31
 inline int round_down(double x) {
     const int i = int(x);
     return i - (double(i) > x);

@@ -38,7 +38,7 @@ std::string replace_names(const std::string& message, const SpellOption& spell) 
         result.append(message, at, begin - at);
         if (end == std::string::npos) return begin == end ? result : result.append(message, begin);
         const auto named = spelled(std::string_view(message).substr(begin + 1, end - begin - 1), spell);
-        // If it does not, its second backquote may be the first one of a pair.
+        // If the text does not consist of option names, its second backquote may be the first one of another pair.
         result += named ? *named : message.substr(begin, end - begin);
         at = named ? end + 1 : end;
     }

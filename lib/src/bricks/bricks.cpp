@@ -1,4 +1,4 @@
-// A job in bricks, see lib/include/covol/bricks.h.
+// A computation in bricks, see lib/include/covol/bricks.h.
 #include "covol/bricks.h"
 
 #include <openvdb/openvdb.h>
@@ -26,10 +26,10 @@ namespace {
 
 using namespace pipeline;
 
-constexpr double kCoarseVoxels = 400;     // maximum across the points, on the lattice of the coarse solve
-constexpr double kMinFactor = 2;          // voxels: minimum voxel size of that lattice
-constexpr int kStateLayers = 8;           // around a brick, that its state includes
-constexpr int kSurfaceLayers = 8;         // around a brick: the distance to its surface depends on no more
+constexpr double kCoarseVoxels = 400;     // maximum length of the marks' or the image's box, in coarse voxels
+constexpr double kMinFactor = 2;          // minimum size of a coarse voxel, in voxels of the result
+constexpr int kStateLayers = 8;           // layers of voxels around a brick's core that its state includes
+constexpr int kSurfaceLayers = 8;         // layers around a core from which the distance to its surface is computed
 constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is sampled to fix the parameters of g
 
 void require_supported(const Problem& problem, const Resolved& resolved) {
@@ -47,16 +47,16 @@ void require_supported(const Problem& problem, const Resolved& resolved) {
                " marks for a guess (with `model = paper`, or with more marks, there is a flow)");
 }
 
-/// The voxels of the fine lattice that the domain of a coarse solve covers.
+/// The domain on the fine lattice: without image and roi, it covers the domain of the coarse solve.
 Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domain& coarse) {
     const Domain own = problem.domain(resolved.choices.h, resolved.marks.attracting, 0);
     if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
-    // A body that the image cuts off is solved beyond the image's end, too.
+    // A body that the image cuts off is also solved beyond the image's end.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
     return beyond > 2 * coarse.voxel_size ? widened(own, int(kCommon.beyond_voxels)) : own;
 }
 
-/// The fine band at a sample of the coarse band's leaves, spread over all of it.
+/// The band on the fine lattice at up to kEdgeSamples leaves of the coarse band, spread evenly over it.
 FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const RunContext& run) {
     std::vector<const FloatGrid::TreeType::LeafNodeType*> leaves;
     for (auto leaf = coarse.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
@@ -77,7 +77,7 @@ FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const Ru
     return band;
 }
 
-/// What all flows in bricks have in common: a band that follows a surface close to its steady state.
+/// The facts of a flow in a brick: the surface is close to its steady state, and the band follows it.
 StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vector<Vec3> points) {
     StartFacts facts;
     facts.origin = StartOrigin::CoarseLevel;
@@ -89,7 +89,7 @@ StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vec
     return facts;
 }
 
-/// K and the range of intensities, as they would be determined on the whole band.
+/// The edge options with K and the range of intensities estimated on a sample of the whole band, for all bricks.
 EdgeOptions fixed_edge(const Problem& problem, const Choices& choices, const FloatGrid& coarse, const Domain& domain) {
     if (!uses_image(choices.evolve)) return choices.edge;
     return find_edges(problem, facts_of_brick(choices, domain, {}), *sample_band(coarse, domain, problem.run),
@@ -97,7 +97,7 @@ EdgeOptions fixed_edge(const Problem& problem, const Choices& choices, const Flo
         .options;
 }
 
-/// Points that act in `part`.
+/// The marks whose attraction reaches `part`; all marks if the range of attraction is not limited.
 std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     const std::vector<Vec3>& points = resolved.marks.attracting;
     const double range = resolved.choices.evolve.attraction_range.value_or(0);
@@ -113,7 +113,8 @@ std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     return near;
 }
 
-/// In the plan's order, in which overlapping states are summed: the last bits of sums of three depend on it.
+/// A brick and its neighbours, in the plan's order. Overlapping states are summed in this order, which changes the
+/// last bits of sums of three numbers.
 std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
     std::vector<std::size_t> all = plan.bricks[brick].neighbours;
     all.push_back(brick);
@@ -133,7 +134,7 @@ std::vector<std::size_t> bricks_reaching(const BrickPlan& plan, const Domain& pa
     return found;
 }
 
-/// The level set that a brick starts from; null if there is none.
+/// The level set that a brick starts from; null if no surface passes through `part`.
 FloatGridPtr start_of(const BrickPlan& plan, std::size_t brick, const BrickStates& states, const Domain& part,
                       const RunContext& run) {
     const FloatGridPtr known =
@@ -186,7 +187,7 @@ struct BrickJob::Parts {
 
     [[nodiscard]] double h() const { return resolved.choices.h; }
 
-    /// A plan may come from elsewhere. @throws Error InvalidInput
+    /// Checks the voxel size, because a plan may have been made by another job. @throws Error InvalidInput
     void require_plan_of_this_job(const BrickPlan& plan) const {
         if (plan.domain.voxel_size != h())
             throw Error(Errc::InvalidInput, "bricks: expected a plan with the voxel size of its job, " + number(h()) +
@@ -210,8 +211,9 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// Extracts the surface brick by brick: nothing else of the whole is held in memory, unless fields are requested.
-    /// @param solution  gets u, and the size of its band
+    /// Extracts the surface brick by brick. Only its level set is held in memory as a whole, unless fields are
+    /// requested.
+    /// @param solution  receives the size of the band, and u if fields are requested
     [[nodiscard]] FloatGridPtr join_surfaces(const BrickPlan& plan, const BrickStates& states,
                                              Solution& solution) const {
         FloatGridPtr surface = make_grid(plan.domain, float(kHalfWidthVoxels * plan.domain.voxel_size), "surface");
@@ -239,7 +241,7 @@ struct BrickJob::Parts {
         return surface;
     }
 
-    /// For all bricks, without u.
+    /// The solution of all bricks, without its level set u.
     [[nodiscard]] Solution solution_on(const BrickPlan& plan) const {
         Solution solution;
         solution.start = facts_of_brick(resolved.choices, plan.domain, resolved.marks.attracting);
@@ -248,7 +250,7 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// Factor to the coarser lattice on which the whole is a few hundred voxels wide.
+    /// Size of a coarse voxel in fine ones at which the box is at most kCoarseVoxels long: a power of two.
     [[nodiscard]] double coarse_factor() const {
         const std::vector<Vec3>& attracting = resolved.marks.attracting;
         const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);
@@ -359,7 +361,7 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
     with_threads(run, [&] {
         StepReport before = choices.report;
         if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
-        // The surface is bit-identical, whatever else is made from it.
+        // The surface is joined without the fields, so that it is bitwise equal whether or not fields are requested.
         FloatGridPtr surface;
         Solution solution = parts_->field ? parts_->join(plan, states) : parts_->solution_on(plan);
         if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);

@@ -5,8 +5,8 @@
 
 namespace covol::bricks {
 
-/// Splits the domain along leaves until no part has more of the surface's band than `options` allow; parts are about
-/// equal. Bricks without any part of the band are omitted: their leaves belong to no brick and stay empty.
+/// Splits the domain along leaves, at the median of the band along an axis, until no part has more voxels of the band
+/// than `options` allow, or a part cannot be split. The bricks cover the whole domain.
 [[nodiscard]] std::vector<Brick> split(const Domain& domain, const FloatGrid& coarse, const BrickOptions& options);
 
 /// The core with `layers` more voxels on every side, limited by the domain.

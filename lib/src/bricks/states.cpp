@@ -14,10 +14,10 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr int kFrameLayers = 4;  // the scheme reads two voxels beyond, redistancing one more
-constexpr int kBlend = 8;        // voxels: states extend this far beyond their cores
-constexpr int kSeamLayers = 3;   // layers of one brick's voxels beside another in which their surfaces are compared
-constexpr double kUnboundedVoxels = 1e3;  // voxels: a bound without effect
+constexpr int kFrameLayers = 4;  // layers that are held fixed: the scheme reads two, redistancing one more; one spare
+constexpr int kBlend = 8;        // voxels by which states extend beyond their cores
+constexpr int kSeamLayers = 3;   // layers of a brick, next to another one, in which their surfaces are compared
+constexpr double kUnboundedVoxels = 1e3;  // voxels: so far away that a bound has no effect
 
 CoordBBox bounds(const VoxelBox& box) { return {Coord(box.min.data()), Coord(box.max.data())}; }
 
@@ -89,7 +89,7 @@ private:
         return box;
     }
 
-    /// 1 deep in the core, 1/2 at its faces, 0 where its state ends.
+    /// The weight of a brick's state at a voxel: 1 deep in its core, 1/2 at the core's faces, 0 at the state's end.
     [[nodiscard]] float weight_at(const VoxelBox& core, const Coord& at) const {
         float depth = kBlend;
         for (int a = 0; a < 3; ++a) {
@@ -172,7 +172,7 @@ double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box) 
                 if ((*value < 0) == (next < 0)) continue;
                 float first = 0, second = 0;
                 const bool known = b_at.probeValue(p, first) && b_at.probeValue(q, second);
-                // The value of b at the zero of a: the slopes may differ with the phase in which the flow stopped.
+                // The value of b at the zero of a: differences of values would be wrong, because the slopes may differ.
                 const double there = double(*value) / (double(*value) - next);
                 largest = std::max(largest, known ? std::abs(first + there * (second - first)) : kHalfWidthVoxels * h);
             }

@@ -17,8 +17,8 @@ namespace {
 
 using Accessor = FloatGrid::ConstAccessor;
 
-constexpr double kMinCell = 0.1;        // voxels: layers closer to the face are moved onto it
-constexpr float kSameDistance = 1e-3F;  // voxels: maximum deviation of a distance that equals the face's
+constexpr double kMinCell = 0.1;        // voxels: layers that are closer to a face are moved onto it
+constexpr float kSameDistance = 1e-3F;  // voxels: a value closer to the distance to a face counts as that
 
 openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
@@ -130,7 +130,7 @@ private:
         return domain_.index_to_world({double(voxel[0]), double(voxel[1]), double(voxel[2])});
     }
 
-    /// Whether a box of voxels may contain some beyond the clip or within the band along its boundary.
+    /// Whether a box may contain voxels outside the clip, or voxels within the band's half width of its boundary.
     [[nodiscard]] bool near_clip(const openvdb::CoordBBox& box) const {
         const Vec3 lo = world(box.min()), hi = world(box.max());
         double highest = -LatticeClip::kFar;
@@ -145,7 +145,7 @@ private:
         return highest > -width_;
     }
 
-    /// Appends blocks of 8^3 within a box that the clip may change.
+    /// Appends the blocks of 8^3 voxels of a box that are near the clip.
     void add_blocks(const openvdb::CoordBBox& box, std::vector<Coord>& blocks) const {
         if (!near_clip(box)) return;
         const int longest = int(box.dim().maxIndex());
@@ -200,7 +200,7 @@ private:
     FloatGrid& grid_;
     const Domain& domain_;
     const Clip& clip_;
-    double width_;  // of the band, world units
+    double width_;  // half width of the band, world units
 };
 
 /// Undoes the cut face by face: each column that ends at the face is followed inward until the wall, the solid's own
@@ -231,7 +231,7 @@ public:
     }
 
 private:
-    static constexpr int kDepth = 5;  ///< layers inside: the band is three voxels wide, and a slope needs one more
+    static constexpr int kDepth = 5;  ///< layers that are read: the face hides up to three, a slope needs two
 
     /// @return whether the solid meets this face.
     bool restore(int axis, bool upper) {
@@ -271,9 +271,9 @@ private:
         return meets;
     }
 
-    /// The distance to the wall in the layers from `at` inward.
-    [[nodiscard]] [[nodiscard]] std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at,
-                                                                 int axis, int inward) const {
+    /// The distance to the wall in the layers from `at` inward; extrapolated in layers with the distance to the face.
+    [[nodiscard]] std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at, int axis,
+                                                   int inward) const {
         std::array<float, kDepth> wall;
         std::array<bool, kDepth> hidden;
         for (int n = 0; n < kDepth; ++n, at[axis] += inward) {
@@ -302,7 +302,7 @@ private:
     float width_;
 };
 
-/// None if a plane is not parallel to the lattice.
+/// The clip in index space; none if a plane is not perpendicular to an axis of the lattice.
 std::optional<LatticeClip> on_lattice(const Clip& planes, const Domain& domain) {
     LatticeClip clip;
     for (const HalfSpace& plane : planes) {

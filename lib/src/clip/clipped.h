@@ -14,39 +14,41 @@ namespace covol::detail {
 /// @param distance  to the whole solid, known on `domain`; class GRID_LEVEL_SET. Ownership is taken.
 [[nodiscard]] FloatGridPtr clipped(FloatGridPtr distance, const Domain& domain, const Clip& clip);
 
-/// Positions at which an axis-aligned clip cuts the lattice, index space; infinite if it does not cut the solid.
+/// The faces of an axis-aligned clip, as positions in index space; infinite on a side without a face.
 struct LatticeClip {
     static constexpr double kFar = std::numeric_limits<double>::infinity();
     std::array<double, 3> low{-kFar, -kFar, -kFar}, high{kFar, kFar, kFar};
 
-    /// The layer that represents the face: the first beyond it, or one just within, so that no cell is flat.
+    /// The layer that represents a face: the first one beyond it, or one up to 0.1 voxels inside, so that no cell is
+    /// flat.
     [[nodiscard]] int face_layer(int axis, bool upper) const;
-    /// Layers from the face's layer on lie on the face, all others at their index.
+    /// The position of a layer: on the face for the face's layer and those beyond, otherwise the layer's index.
     [[nodiscard]] double position(int axis, int layer) const;
     [[nodiscard]] bool on_face(int axis, int layer) const {
         return position(axis, layer) == low[axis] || position(axis, layer) == high[axis];
     }
 };
 
-/// A clipped solid's distance with the cut undone near its faces and continued beyond, as the distance to the wall.
-/// Interpolation of the clipped distance rounds the edges of the cut; that of this one, clipped afterwards, does not.
+/// The distance of a clipped solid to its own surface, the wall, without the faces of the clip, and continued beyond
+/// them. Interpolating the clipped distance rounds the edges of the cut; interpolating this one and then clipping does
+/// not.
 struct Uncut {
     FloatGridPtr distance;
-    LatticeClip clip;
+    LatticeClip clip;  ///< only the faces that the solid meets
 };
 
-/// The layers beyond a face.
+/// How the layers beyond a face are filled.
 enum class FaceLayer {
-    InPlace,  ///< kCarriedOn layers with the distance at their positions
-    OnFace    ///< one layer with the distance on the face, onto which it is moved; all beyond is outside
+    InPlace,  ///< kCarriedOn layers, each with the distance at its own position
+    OnFace    ///< one layer with the distance at the face, onto which it is moved; all layers beyond are outside
 };
-inline constexpr int kCarriedOn = 4;  ///< half width of the band, and one more
+inline constexpr int kCarriedOn = 4;  ///< layers: half width of the band plus one
 
-/// @return none if nothing is cut, or the clip is not aligned with the lattice.
+/// Undoes the clip of a level set. @return none if nothing is cut, or the clip is not aligned with the lattice.
 [[nodiscard]] std::optional<Uncut> uncut(const FloatGrid& surface, FaceLayer layer);
 
-/// Largest n·x - offset over the planes: the negative distance to the clip's boundary inside, at most the distance
-/// outside.
+/// Maximum of n·x - offset over the planes: inside the clip, minus the distance to its boundary; outside, at most the
+/// distance to it.
 [[nodiscard]] double depth_in(const Clip& clip, const Vec3& x);
 
 }  // namespace covol::detail

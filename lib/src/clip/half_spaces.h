@@ -8,7 +8,7 @@
 
 namespace covol::detail {
 
-/// n·x - offset: distance of a position beyond the plane, negative within.
+/// n·x - offset: signed distance of a position from the plane, negative in the half-space.
 [[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) { return dot(plane.normal, x) - plane.offset; }
 
 [[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {

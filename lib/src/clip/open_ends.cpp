@@ -31,7 +31,7 @@ std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<
 }
 
 std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces, double reach) {
-    // Face by face, including images of images: a body at an edge of the box becomes one of four.
+    // Images in earlier faces are mirrored, too: a body at an edge of the box has three images.
     std::vector<Vec3> all = points;
     for (const ImageFace& face : faces) {
         if (std::none_of(points.begin(), points.end(), [&](const Vec3& p) { return face.depth(p) < reach; })) continue;

@@ -1,5 +1,5 @@
 #pragma once
-// Points that close bodies cut off by the image, for tagging, whose flood fill comes from all sides.
+// Additional points for tagging, which close bodies that the image cuts off: the flood fill comes from all sides.
 #include <vector>
 
 #include "covol/clip.h"
@@ -15,11 +15,12 @@ struct ImageFace {
 };
 [[nodiscard]] std::vector<ImageFace> faces_of(const ImageGeometry& geometry);
 
-/// Whether a position is on the last slice along a face: not deeper than the distance between slices.
+/// Whether a position is on the last slice at a face: inside, and not deeper than the distance between slices.
 [[nodiscard]] bool on_end_slice(const ImageFace& face, const Vec3& x);
 
-/// Continues the section on each end slice beyond the face by repeating its points up to `length` beyond. Marks inside
-/// the section close it there, and the flood fill passes above a surface that leaves the image at a shallow angle.
+/// Copies of the points on each end slice, shifted beyond the face in steps of the slice distance up to `length`. They
+/// continue the section, and copies of marks inside the section close it. A surface that leaves the image at a shallow
+/// angle is not closed: the flood fill passes above it.
 [[nodiscard]] std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                            double length);
 

@@ -61,13 +61,13 @@ public:
         }
         return level(column(place(x, y)), w);
     }
-    /// See interval_at().
+    /// Whether w lies in this interval, as in interval_at().
     [[nodiscard]] bool holds(double w) const {
         if (kind_ == Kind::Below) return w < slice().w;
         return slice().w <= w && (kind_ == Kind::Above || w < data_.slices[n_ + 1].w);
     }
-    /// Levels over (x, y) for w, which is in this interval, w + dw, ... @return the number of the `count` values that
-    /// lie in it
+    /// Levels at (x, y) for w, which is in this interval, w + dw, w + 2 dw, ... Stops at the end of the interval, or
+    /// after `count` values. @return the number of values
     [[nodiscard]] int levels_over(double x, double y, double w, double dw, int count, float* values) const {
         const Column c = is_shifted() ? Column{} : column(place(x, y));
         int n = 0;
@@ -76,8 +76,8 @@ public:
         while (at = w + dw * ++n, n < count && holds(at));
         return n;
     }
-    /// Range of the level within a ball around a position of the plane, for all w; the upper bound is not needed on
-    /// domes.
+    /// Bounds of the level within `radius` of a position of the plane, for all w. On domes the upper bound is not
+    /// needed and not computed.
     [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
         const SlicePlace p = place(x, y);
         const double here = at(slice(), p);
@@ -159,7 +159,7 @@ private:
     std::size_t n_;
 };
 
-/// Whether the surface can cross the columns at a node and at its next ones.
+/// Whether the surface can cross the columns along w over a node and its next nodes along x and y.
 bool Interval::may_cross(int i, int j) const {
     if (is_shifted()) return true;
     const SliceGrid& grid = data_.grid;

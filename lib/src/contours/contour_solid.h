@@ -58,7 +58,7 @@ struct SolidSlice {
     [[nodiscard]] double at(const SliceGrid& grid, const SlicePlace& place) const {
         return sample_slice(level, grid, place);
     }
-    /// Above it nothing is inside.
+    /// Height beyond an end slice above which nothing is inside.
     [[nodiscard]] double highest() const { return open ? end : cap; }
 };
 

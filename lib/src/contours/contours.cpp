@@ -40,7 +40,7 @@ struct Line {
     std::array<bool, 3> constant{false, false, false};
 };
 
-/// Without repeated neighbouring marks.
+/// The marks without successive duplicates.
 std::vector<Vec3> without_repeats(const std::vector<Vec3>& marks, bool closed) {
     std::vector<Vec3> kept;
     for (const Vec3& mark : marks)
@@ -213,7 +213,7 @@ bool Densifier::choose_tilted_plane() {
     return true;
 }
 
-/// The plane that contains most marks of closed lines; lines that lie in several planes are not counted.
+/// Chooses the plane with the largest number of marks; those of closed lines count twice, of lines in several planes 0.
 void Densifier::choose_plane() {
     std::array<std::size_t, 3> votes{0, 0, 0};
     for (const Line& line : lines_) {
@@ -236,7 +236,7 @@ std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const
         const double spacing = geometry_.spacing[axis], out = side % 2 == 0 ? -1.0 : 1.0;
         const double face = (side % 2 == 0 ? -0.5 : geometry_.size[axis] - 0.5) * spacing;
         const auto at_side = [&](const Vec3& p) { return (face - p[a]) * out <= spacing; };
-        // Begin with a mark that does not lie there, so that no run is split.
+        // Begin with a mark that is not at this side, so that no run is split.
         const auto first = std::find_if_not(curve.begin(), curve.end(), at_side);
         if (first == curve.end()) return curve;
         std::rotate(curve.begin(), first, curve.end());
@@ -312,7 +312,7 @@ void Densifier::join_lines() {
     }
 }
 
-/// By the even-odd rule two copies of a contour would cancel.
+/// Removes repeated contours, because by the even-odd rule two copies would cancel.
 void Densifier::drop_repeated_loops() {
     std::sort(loops_.begin(), loops_.end());
     const auto last = std::unique(loops_.begin(), loops_.end());
@@ -387,7 +387,7 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
     run_.check();
 }
 
-/// For sections that do not overlap: a single one is translated to the next, several end and begin anew.
+/// If sections do not overlap: a single contour is translated to the next; several end, and new ones begin.
 void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons) {
     std::vector<char> apart(data.slices.size(), 0);
     tbb::parallel_for(std::size_t(0), data.slices.size() - 1, [&](std::size_t n) {
@@ -435,8 +435,8 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         slices[end].cap =
             std::max(compute_cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
         if (!along_image_ || alone) return;
-        // On the image's last slice, or if the next slice to be marked would lie beyond it and the sections do not end
-        // before.
+        // Open on the image's last slice, or if the next marked slice would lie beyond the image and the sections,
+        // extrapolated, do not end before it.
         const double left =
             first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis()] - 0.5) * spacing - slices[end].w;
         const double shrinks_by = slices[before].area - slices[end].area;

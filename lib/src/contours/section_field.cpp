@@ -30,7 +30,7 @@ using Planes = std::vector<const SectionLevels*>;
 struct PlaneCrossing {
     std::uint32_t node;
     std::uint8_t direction;  // 2 * axis, + 1 towards larger indices
-    float distance, value;   // in cells; the plane's value
+    float distance, value;   // distance in cells, and the value on the plane
 };
 
 /// The equation of a node beside a plane.
@@ -114,7 +114,7 @@ std::vector<PlaneCrossing> crossings_of(const Planes& planes, const Lattice& lat
     return stops;
 }
 
-/// Laplace's equation on a lattice whose border is outside.
+/// Solves Laplace's equation on a lattice whose border is outside.
 class Solver {
 public:
     Solver(const Planes& planes, const Lattice& lattice, const RunContext& run)
@@ -123,7 +123,7 @@ public:
     }
 
     /// By successive over-relaxation.
-    /// @param across  cells between planes, which determine the optimal factor
+    /// @param across  number of cells between planes, from which the relaxation factor is computed
     void solve(std::vector<float>& values, double across) const {
         const auto factor = float(2 / (1 + std::sin(std::numbers::pi / std::max(across, 3.0))));
         for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
@@ -161,7 +161,7 @@ private:
         }
     }
 
-    /// Updates the nodes of one colour, which depend on those of the other alone. @return the maximum change
+    /// Updates every second node, as on a chessboard; these depend on the others alone. @return the maximum change
     double half_sweep(std::vector<float>& values, int colour, float factor) const {
         const auto [di, dj, dk] = lattice_.strides();
         return tbb::parallel_reduce(
@@ -191,7 +191,7 @@ private:
 
     const Lattice& lattice_;
     const RunContext& run_;
-    std::vector<std::int32_t> entry_;  // of each node in beside_, or -1
+    std::vector<std::int32_t> entry_;  // index of each node in equations_, or -1
     std::vector<NodeEquation> equations_;
 };
 
@@ -229,8 +229,8 @@ struct Field {
     std::vector<float> values;
 };
 
-/// Solves on successively finer lattices, down to this cell size.
-/// @param across  the planes' distance
+/// Solves on successively finer lattices, down to the cell size `finest`.
+/// @param across  the planes' distance, world units
 Field solve_between(const Planes& planes, const WorldBox& box, double finest, double across, const RunContext& run) {
     double cell = finest;
     while (longest_side(box) > kCoarsest * cell) cell *= 2;
@@ -276,7 +276,7 @@ float cross_validated_level(const Planes& planes, const WorldBox& box, double ce
         }
     }
     std::sort(found.begin(), found.end());
-    // Outside below the level, and inside above it.
+    // Number of errors: outside at or below the level, or inside above it.
     auto wrong = std::ptrdiff_t(std::count_if(found.begin(), found.end(), [](const auto& f) { return f.second; }));
     std::ptrdiff_t fewest = wrong;
     float best = 0;
@@ -298,7 +298,7 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     for (int a = 0; a < 3; ++a) volume *= box.max[a] - box.min[a];
     for (const Section& section : sections) area += area_within(section.plane, box);
     plane_distance_ = area > 0 ? volume / area : longest_side(box);
-    // The body ends halfway to the next plane, as between slices.
+    // The box extends by the planes' distance beyond the sections; its border is outside.
     double nodes = 1;
     for (int a = 0; a < 3; ++a) {
         box.min[a] = origin[a] + h * std::floor((box.min[a] - plane_distance_ - origin[a]) / h);

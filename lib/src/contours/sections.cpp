@@ -145,7 +145,7 @@ SectionMarks marks_along(const std::vector<Section>& sections, double step) {
                 const double length = std::hypot(out[0], out[1]);
                 if (!(length > 0)) continue;  // a contour of one or two positions
                 out = {out[0] / length, out[1] / length};
-                const double off = kCommon.same_place * step;  // the side is that right beside the contour
+                const double off = kCommon.same_place * step;  // the side is determined at this distance
                 const Vec2 beside{at[0] + off * out[0], at[1] + off * out[1]};
                 if (is_inside(section.polygons, beside)) out = {-out[0], -out[1]};
                 const Vec3 tip = section.plane.world(out), zero = section.plane.origin;

@@ -8,7 +8,7 @@ namespace covol::detail {
 
 /// A plane of any direction, with orthogonal coordinates in it.
 struct SectionPlane {
-    Vec3 origin{0, 0, 0}, u{1, 0, 0}, v{0, 1, 0}, normal{0, 0, 1};  ///< unit, right-handed
+    Vec3 origin{0, 0, 0}, u{1, 0, 0}, v{0, 1, 0}, normal{0, 0, 1};  ///< u, v, normal: unit vectors, right-handed
 
     [[nodiscard]] double height(const Vec3& p) const;  ///< along the normal
     [[nodiscard]] Vec2 flat(const Vec3& p) const;

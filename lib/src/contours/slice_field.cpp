@@ -34,7 +34,7 @@ std::vector<Edge> edges_of(const std::vector<Polygon>& polygons, const SliceGrid
     return edges;
 }
 
-/// The nearest known edge of each node, swept over the grid.
+/// Finds the nearest edge of each node by sweeps over the grid.
 class Sweep {
 public:
     Sweep(const std::vector<Edge>& edges, const SliceGrid& grid)

@@ -24,8 +24,8 @@ struct SliceGrid {
 
 /// A position in a grid's plane, computed once for all slices.
 struct SlicePlace {
-    std::size_t node = 0;  ///< the one with the lowest indices of the cell's four
-    double s = 0, t = 0;   ///< within the cell
+    std::size_t node = 0;  ///< the node with the lowest indices of the cell's four
+    double s = 0, t = 0;   ///< position within the cell, 0 to 1
     double beyond = 0;     ///< distance from the grid, in its units
 };
 [[nodiscard]] SlicePlace place_in(const SliceGrid& grid, double x, double y);

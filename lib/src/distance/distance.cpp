@@ -28,7 +28,7 @@ std::vector<Vec3> to_index_space(const std::vector<Vec3>& points, const Domain& 
     return result;
 }
 
-/// Null if no voxel lies both in the tube and in the box.
+/// The distances of a leaf's voxels; null if no voxel lies both in the tube and in the box.
 std::unique_ptr<Leaf> make_leaf(const detail::NearestField& field, const detail::NearestLeaf& nearest,
                                 const detail::CoordBBox& box, float h, float background) {
     alignas(32) float d[detail::kLeafSize];

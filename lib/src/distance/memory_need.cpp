@@ -72,7 +72,7 @@ using BytesAt = std::function<double(double voxel_size)>;
 void require(const BytesAt& bytes_at, double voxel_size, const char* where, const RunContext& run) {
     const double budget = double(run.memory_budget), needed = bytes_at(voxel_size);
     if (!(needed > kOverestimate * budget) || kBudgetFraction * budget <= kBaseBytes)
-        return;  // no voxel size would satisfy this limit
+        return;  // it fits, or no voxel size would satisfy this limit
     double fits = voxel_size;
     for (int n = 0; n < kMaxGrowths && bytes_at(fits) > kBudgetFraction * budget; ++n) fits *= kGrowth;
     std::ostringstream text;

@@ -22,7 +22,7 @@ Coord leaf_origin(const Coord& voxel) { return voxel & ~(kLeafDim - 1); }
 
 Coord voxel_of(const Vec3& p) { return {round_down(p[0] + 0.5), round_down(p[1] + 0.5), round_down(p[2] + 0.5)}; }
 
-/// The voxels of a leaf that touch each of its 26 neighbours.
+/// For each of a leaf's 26 neighbours, the voxels of the leaf that touch it.
 std::array<LeafMask, 27> border_masks() {
     std::array<LeafMask, 27> masks{};
     const auto touches = [](int voxel, int step) { return step == 0 || voxel == (step < 0 ? 0 : 7); };
@@ -274,8 +274,8 @@ void Sweeper::visit(NearestLeaf& leaf) {
     if (!any_on(changed)) return;
     const unsigned faces = improved_faces(block, reach);
     for (int face = 0; face < 6; ++face) leaf.affected |= (faces >> face & 1) << kFaceSlots[face];
-    // Existing neighbours are notified of a change through the faces; edges and corners matter only for those to be
-    // created.
+    // Existing neighbours are notified of a change through the faces. Changes at edges and corners matter only for
+    // leaves that have to be created.
     for (int slot = 0; slot < 27; ++slot) {
         std::uint64_t any = 0;
         if (leaf.neighbours[slot] < 0)

@@ -72,7 +72,7 @@ COVOL_INLINE Points8 moved_down(const Points8& p, const Points8& halo) {
     return {shift(p.x, halo.x), shift(p.y, halo.y), shift(p.z, halo.z), shift(p.index, halo.index)};
 }
 
-/// Along the row in both directions, in steps of 1, 2 and 4 voxels instead of seven steps of one.
+/// Passes points along the row in both directions, in steps of 1, 2 and 4 voxels instead of seven steps of one.
 COVOL_INLINE void sweep_row(Row& row, const NearestBlock& b, int at) {
     const Points8 below = broadcast(b, at - 1);
     row.offer(moved_up<1>(row.p, below));

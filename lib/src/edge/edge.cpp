@@ -29,7 +29,8 @@ using detail::LeafBounds;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kHeatTolerance = 1e-4;  // of the brightness range
-// Sigmas beyond which the weights of a Gaussian are too small to change a value: half and twice as many give the same.
+// Sigmas beyond which the weights of a Gaussian are too small to change a value: half and twice as many give the same
+// result.
 constexpr double kHaloSigmas = 3.0;
 // Maximum time step, h^2: shorter ones make the kernel more similar to a Gaussian, which changes no result visibly.
 constexpr double kLargestHeatStep = 0.5;
@@ -58,7 +59,7 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
 }
 
 // Number of leaves after which a mapped image's pages are released. Each of a leaf's 64 rows may be on a separate page:
-// 0.5 GB.
+// at most 0.5 GB in all.
 constexpr std::size_t kLeavesAtOnce = 1 << 11;
 
 Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
@@ -193,7 +194,7 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
     const std::vector<double> series = heat_series(time / steps, steps);
     const LeafBand& band = window.band;
     const detail::LeafArray<float> image = window.image.values;
-    detail::LeafArray<float>& newest = window.image.values;  // whose mean is taken
+    detail::LeafArray<float>& newest = window.image.values;  // the field whose neighbours are averaged
     detail::LeafArray<float> other(band.size(), 0.0F, 1);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         for (int n = 0; n < kLeafSize; ++n) newest.leaf(leaf)[n] = float(series.back()) * image.leaf(leaf)[n];
@@ -235,7 +236,7 @@ double contrast_of(FloatGrid& slopes, double percentile) {
     });
     const float at = detail::nth_value(values, std::size_t(percentile * double(values.size() - 1)));
     if (at > 0.0F) return at;
-    // If edges are rarer than the percentile: half of the steepest slope.
+    // Edges are rarer than the percentile: half of the steepest slope is used.
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 

@@ -12,7 +12,7 @@ struct EdgeHeuristics {
     double line_fraction = heuristic("edge.line_fraction", 1.0 / 3.0);
     /// [standard errors] Minimum strength of a line; a weaker one may be noise.
     double standard_errors = heuristic("edge.standard_errors", 3.0);
-    /// [of the voxels] That are brighter than what becomes 1, and as many darker than what becomes 0.
+    /// [of the voxels] Fraction of the brightest ones, which become 1, and of the darkest ones, which become 0.
     double clipped = heuristic("edge.clipped", 0.005);
 };
 COVOL_HEURISTICS EdgeHeuristics kEdge{};

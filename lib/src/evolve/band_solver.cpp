@@ -33,7 +33,8 @@ constexpr double kLocalGoal = 0.5;  // fraction of the residual aimed at; a leaf
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// 1 up to r/2, decreasing to 0 at r, and its integral from 0: the points attract by -taper(d) ∇d = -∇potential(d).
+// A weight, 1 up to range/2 and decreasing to 0 at range, and its integral from 0: the points attract by
+// -taper(d) ∇d = -∇potential(d).
 struct Taper {
     double range;  // world units; 0: no limit
     [[nodiscard]] double ramp(double d) const { return std::clamp(2.0 * d / range - 1.0, 0.0, 1.0); }
@@ -203,9 +204,9 @@ Motion BandSolver::step(double tau, Counts& counts) {
     const Rows rows = assemble(constants);
     counts.seconds_assembly += seconds_since(start);
     const auto solve_start = Clock::now();
-    // The largest row belongs to some voxel at the edge of the plateau, where W is of order 1/ε; optimising the
-    // relaxation for it costs sweeps for all other voxels. In measurements with delta of 0.5 to 5 voxels, this row was
-    // best.
+    // The largest row belongs to some voxel at the edge of the clamped region, where W is of order 1/ε. Optimising the
+    // relaxation for it costs sweeps for all other voxels. In measurements with delta of 0.5 to 5 voxels, `regular_row`
+    // was best.
     const double regular_row = 8.0 * constants.curvature + tau * (options_.theta + options_.rho);
     const double row = std::min(rows.largest, regular_row);
     const double jacobi = row / (1.0 + row);
@@ -260,7 +261,7 @@ void BandSolver::update_active_leaves(const std::vector<float>& motion, double t
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         unsigned char is_active = moved[leaf];
         for (const std::int32_t next : band_.neighbours(leaf)) is_active |= moved[next];
-        // Inactive leaves have the same values in the step before, too.
+        // In inactive leaves u^{n-1} = u^n.
         if (!is_active) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         leaf_active_[leaf] = is_active && active_counts_[leaf] > 0;
     });

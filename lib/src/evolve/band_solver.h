@@ -30,7 +30,7 @@ public:
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 
-    /// Gathers u and the fields that have a weight.
+    /// Gathers u and the fields whose weight is not 0.
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
@@ -38,16 +38,16 @@ public:
     struct LeafStates {
         LeafBand band;
         std::vector<unsigned char> active;
-        std::vector<float> pending_motion;  ///< not yet enough to activate the leaves around, voxels
+        std::vector<float> pending_motion;  ///< since the leaf last activated its neighbours, voxels
         std::vector<LeafMotion> motions;
     };
-    /// The solver cannot be used afterwards.
+    /// Moves the states out of the solver, which cannot be used afterwards.
     [[nodiscard]] LeafStates take_leaf_states();
     /// Leaves that were inactive in the previous band stay inactive.
-    /// @param changed  sorted origins of leaves whose values differ from those
+    /// @param changed  sorted origins of leaves whose values differ from those of the previous band
     void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
-    /// Everything that steps have changed, for the same band.
+    /// Writes or reads everything that steps have changed. The band has to be the same.
     void exchange(StateFile& file);
 
     /// One time step of length τ = tau * h on the active leaves.
@@ -75,7 +75,7 @@ private:
     void gather_fields(const EvolveFields& fields);
     void hold_to_bounds();
     struct Rows {
-        double largest;   ///< Σ_q |a_pq|
+        double largest;   ///< maximum of Σ_q |a_pq|
         double residual;  ///< root mean square at u^{n-1}, voxels
     };
     Rows assemble(const SchemeConstants& constants);
@@ -99,15 +99,15 @@ private:
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_, obstacle_, floor_;
     LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
-    bool has_previous_ = false;  // previous_ is from the step before
+    bool has_previous_ = false;  // previous_ is u of the step before
     static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Fraction);
-    std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
+    std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // coefficients of each leaf; scratch between steps
     // One for each leaf:
     std::vector<int> active_counts_;
     std::vector<unsigned char> leaf_active_;
     std::vector<float> pending_motion_;
     std::vector<LeafMotion> motions_;
-    std::vector<double> residuals_;  // squared, as of the last visit
+    std::vector<double> residuals_;  // sums of squares, from the last visit
 };
 
 }  // namespace covol::detail

@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kJobFile = "job.txt";
 constexpr std::string_view kFlow = "flow-";
 
-/// Whether it is a name made by file(): other files in the folder are not ours.
+/// Whether file() creates such names: other files in the folder must not be removed.
 bool is_of_flow(const std::string& name) {
     const std::size_t digits = name.find_first_not_of("0123456789", std::min(kFlow.size(), name.size()));
     if (!name.starts_with(kFlow) || digits == std::string::npos || digits < kFlow.size() + 2) return false;
@@ -67,7 +67,7 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     const fs::path job_file = fs::path(folder) / kJobFile;
     state_->had_states = fs::exists(job_file, status);
     if (!state_->had_states) {
-        remove_flows(folder);  // of a run that was killed while removing them
+        remove_flows(folder);  // left by a run that was killed while it removed them
         detail::write_atomically(job_file.string(), [&](const std::string& temporary) {
             std::ofstream file(temporary, std::ios::binary);
             file << job;

@@ -39,8 +39,8 @@ bool has_active(const FloatGrid& u) {
     return false;
 }
 
-// A row's fractions are accurate to half of 1/65535: the smallest step moves at most 1.5 % too far or too little; after
-// the largest one the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction.
+// The fractions of a row are accurate to half of 1/65535. With the smallest step, the motion is wrong by at most 1.5 %;
+// with the largest step, the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction.
 constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
 
 // Steps between two examinations of a tracked band. A step moves the front by less than a voxel, so that it stays
@@ -58,7 +58,7 @@ public:
         if (fields.floor != nullptr) check_transform(*fields.floor, "floor");
         check_step();
         if (options.follow) {
-            // Before u changes. A fixed band is checked when it is read.
+            // Checked before u changes. A fixed band is checked by BandSolver.
             detail::expect_finite(u, "u");
             if (!has_active(u)) throw Error(Errc::InvalidInput, "evolve: expected active voxels in u, got none");
             for (const auto& [field, name] : {std::pair(fields.distance, "distance"), std::pair(fields.edge, "edge"),
@@ -237,7 +237,7 @@ private:
             rebuild_band(left, largest);
         else if (!front.is_distance)
             solver_->redistance(tracking_clamp(options_));
-        // Only now, so that a leaf becomes inactive in the same phase that the others have at the end.
+        // After the redistancing, so that leaves become inactive in the same phase in which the evolution ends.
         if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
         return std::min(motion, front.moved / kCycle);
     }
@@ -269,13 +269,13 @@ private:
                 *flattest >= detail::kFlattest && *steepest <= detail::kSteepest};
     }
 
-    // Leaves no solver if no surface remains. @param largest  in: for each previous leaf; out: for each new leaf
+    // solver_ is null if no surface remains. @param largest  in: for each previous leaf; out: for each new leaf
     void rebuild_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
         const detail::BandSolver::LeafStates states = solver_->take_leaf_states();
-        solver_.reset();  // frees its memory first
+        solver_.reset();  // its memory is freed before a new solver is made
         std::vector<detail::Coord> changed;
         if (is_held())
             changed = detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
@@ -303,15 +303,15 @@ private:
         if (is_held()) solver_->redistance(tracking_clamp(options_));
     }
 
-    // Aims at steps in which the front leaves the band's middle within a cycle. Between the limits lie two changes of
-    // the time step in each direction, so that it does not alternate.
+    // Adapts the time step so that the front moves by about kMotion.left_by in a cycle. The motion may differ from this
+    // by two changes of the time step in each direction, so that the time step does not alternate.
     void adapt_tau(double motion) {
         const double aim = kMotion.left_by / kCycle, margin = kCommon.growth * kCommon.growth;
         if (motion < aim / margin) tau_ = std::min(tau_ * kCommon.growth, kEvolve.largest_tau);
         if (motion > aim * margin) tau_ = std::max(tau_ / kCommon.growth, 1.0);
     }
 
-    // By steps or by the decrease of the change, whichever is further.
+    // Estimated from the number of steps and from the decrease of the change; the larger value is returned.
     [[nodiscard]] double progress() const {
         const double by_steps = double(report_.steps) / options_.max_steps;
         if (!(report_.last_change > 0) || !(options_.tolerance > 0)) return by_steps;
@@ -325,7 +325,7 @@ private:
     const RunContext& run_;
     const Domain domain_;
     detail::FlowStates states_;
-    bool is_finished_ = false, is_band_new_ = true;  // since the last state
+    bool is_finished_ = false, is_band_new_ = true;  // is_band_new_: since the last saved state
     double tau_ = 1.0;                               // in h
     std::unique_ptr<detail::BandSolver> solver_;
     detail::BandSolver::Counts counts_;

@@ -8,12 +8,12 @@
 
 namespace covol::detail {
 
-/// The states of one flow, if the run has checkpoints.
+/// The saved states of one evolution, if the run has checkpoints.
 class FlowStates {
 public:
     using Exchange = std::function<void(StateFile& file)>;
     struct Grids {
-        FloatGridPtr u, edge;  ///< null edge: the one that the flow began with
+        FloatGridPtr u, edge;  ///< null edge: the one with which the evolution began
     };
 
     /// @param all  null: no states are kept
@@ -27,7 +27,7 @@ public:
 
     [[nodiscard]] bool are_enabled() const { return all_ != nullptr; }
     [[nodiscard]] bool is_due() const { return all_ != nullptr && all_->is_due(); }
-    /// Replaces the previous state. @param u  null: unchanged, like the edge. @throws Error Io.
+    /// Replaces the previous state. @param u  null: the saved u and edge are kept. @throws Error Io.
     void write(const FloatGrid* u, const FloatGrid* edge, const Exchange& exchange);
 
 private:

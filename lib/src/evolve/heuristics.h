@@ -13,7 +13,7 @@ struct EvolveHeuristics {
 };
 COVOL_HEURISTICS EvolveHeuristics kEvolve{};
 
-/// When a band has to follow the surface: motion.cpp.
+/// The criterion for rebuilding a band around a moved surface: motion.cpp.
 struct MotionHeuristics {
     /// [voxels] Mean motion in a leaf at which the surface has left the band's middle.
     double left_by = heuristic("motion.left_by", 0.75);

@@ -24,8 +24,8 @@ constexpr std::size_t kFewJumps = 8;
 // leaf's face has voxels.
 constexpr int kFewCrossings = kLeafDim * kLeafDim / 2;
 
-// Voxels at most this deep, in voxels, are more than a voxel from the band's end. If the front has passed a deeper one,
-// anywhere, the band follows at once.
+// [voxels] Voxels that were closer to the front than this are more than a voxel from the end of its clamped distance.
+// If the front has passed a voxel that was farther away, in any leaf, the band is rebuilt at once.
 constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
@@ -137,7 +137,8 @@ CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* 
             }
         squared_counts += (double(now.size()) - first) * (double(now.size()) - first);
     }
-    // A plane crosses edges along an axis in proportion to its normal's component there, and so are the jumps.
+    // The number of edges along an axis that a plane crosses is proportional to its normal's component along that axis,
+    // and so are the jumps of u on these edges.
     const double slope = now.size() >= kFewJumps ? jumps / std::sqrt(squared_counts) : 1.0;
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
@@ -210,7 +211,7 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
             flips += __builtin_popcountll(flipped);
         }
         const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
-        // A leaf that is halfway follows with the others; otherwise the band would have to follow again soon.
+        // A leaf that is halfway is rebuilt with the others; otherwise the band would have to be rebuilt again soon.
         states[leaf] = deep                           ? kDeepDown
                        : moved >= kMotion.left_by     ? kLeft
                        : moved >= kMotion.left_by / 2 ? kLeaving

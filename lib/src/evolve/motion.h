@@ -11,7 +11,7 @@ class StateFile;
 /// The effect of one step on the level set in a leaf. Edges are those between voxels of the leaf.
 struct LeafMotion {
     double displacement = 0.0;  ///< of the zero crossings along voxel edges, voxels, summed over the edges
-    int edges = 0;              ///< crossed before or after
+    int edges = 0;              ///< number of edges that are crossed before or after the step
     float largest = 0.0F;       ///< max |u^n - u^{n-1}|, voxels
     bool negative = false, positive = false;  ///< signs that occur
     bool finite = true;
@@ -76,7 +76,7 @@ public:
 private:
     struct Crossing {
         std::uint16_t edge;  ///< 512 * axis + voxel
-        float at;            ///< along it
+        float at;            ///< position along the edge, 0 to 1
     };
     struct Leaf {
         std::vector<Crossing> crossings;
@@ -94,7 +94,7 @@ public:
     /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one with the same values, or
     /// -1
     void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
-    /// The leaves that are due, or nearly so; empty if the band need not be rebuilt.
+    /// The leaves that are due or close to it; empty if the band does not have to be rebuilt.
     [[nodiscard]] std::vector<std::size_t> due_leaves(const LeafArray<float>& u) const;
     void exchange(StateFile& file);
 

@@ -23,7 +23,7 @@ namespace {
 /// Makes an empty file next to `target`, with a hidden name that is unpredictable and unique.
 std::string new_file_beside(const fs::path& target, mode_t mode) {
     const std::string whole = target.filename().string();
-    // Keeps the extension, which writers depend on; file systems limit the length of a name.
+    // Keeps the extension, which writers depend on, but not the whole name, whose length file systems limit.
     constexpr std::size_t kEnd = 32;
     const std::string end = whole.substr(whole.size() - std::min(whole.size(), kEnd));
     std::random_device random;

@@ -60,7 +60,7 @@ void add_metadata(const fs::path& folder, Digest& hash) {
     const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json",
                                       "journal.jsonl"};  // of a Zarr store, or of a study
     std::set<fs::path> found;
-    // Chunks are in deeper folders, or next to these files; there may be any number of them.
+    // Does not read the chunks, which are in deeper folders or next to these files: there may be any number of them.
     std::vector<fs::path> level{folder};
     for (int depth = 0; depth < 3; ++depth) {
         std::vector<fs::path> next;

@@ -18,7 +18,7 @@ namespace covol {
 namespace fs = std::filesystem;
 namespace {
 
-/// The reason for a failed write, which libraries do not report.
+/// If a write failed for lack of disk space, this reason, which libraries do not report; otherwise empty.
 std::string disk_full_reason(const std::string& message) {
     const int why = errno;
     if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};

@@ -132,7 +132,8 @@ private:
         return false;
     }
 
-    /// Reads the commit, which is in another folder. @param known  false: that folder is inaccessible now
+    /// Reads the commit, which is in another folder.
+    /// @param known  becomes false if that folder is inaccessible and no file is in place
     [[nodiscard]] std::optional<SetOutcome> fate_elsewhere(bool& known) const {
         const ScratchPlace& first = manifest_->scratches.front();
         known = id_of(first.path.parent_path()).inode == first.folder;
@@ -152,7 +153,7 @@ private:
         for (const Manifest::File& file : manifest_->files) {
             const fs::path temporary = scratch_ / file.name, target = folder / file.name;
             const Stamp there = stamp_of(target), here = stamp_of(temporary);
-            // Files that were put there by others since are not replaced.
+            // Files that other processes have put there since are not replaced.
             if (fate == SetOutcome::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
                 done = exchange(temporary, target) && done;
             if (fate == SetOutcome::PutBack && there == file.made) done = exchange_back(temporary, target) && done;

@@ -22,7 +22,7 @@ namespace covol::detail {
 struct ScratchPlace {
     std::filesystem::path path;
     ino_t inode = 0,
-          folder = 0;  ///< of the folder itself and of its parent; device numbers may change after a reboot
+          folder = 0;  ///< of the folder and of its parent; no device numbers, which may change after a reboot
 };
 
 /// The current state of a file. 0, 0: there is none.

@@ -47,7 +47,7 @@ private:
     State state_;
 };
 
-/// The lock is removed last, so that the folder is still recognized if this is interrupted.
+/// Removes a folder with its contents; the lock last, so that the folder is still recognized if this is interrupted.
 void remove_scratch(const std::filesystem::path& folder) noexcept;
 
 }  // namespace covol::detail

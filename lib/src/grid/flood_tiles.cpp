@@ -71,8 +71,8 @@ void flood_tiles(FloatGrid& level_set, const Domain& domain) {
     using Leaf = Tree::LeafNodeType;
     using Upper = Tree::RootNodeType::ChildNodeType;
     Tree& tree = level_set.tree();
-    // OpenVDB's flood fill sets the tiles of the root. It skips leaves whose voxels are all active: their signs are
-    // known.
+    // OpenVDB's flood fill sets the tiles of the root. It does not change leaves whose voxels are all active; they are
+    // made so for a while, because their signs are known.
     std::vector<Leaf*> leaves;
     tree.getNodes(leaves);
     std::vector<Leaf::NodeMaskType> masks(leaves.size());

@@ -11,7 +11,7 @@ namespace {
 
 bool is_face(int slot) { return std::find(std::begin(kFaceSlots), std::end(kFaceSlots), slot) != std::end(kFaceSlots); }
 
-// Row (i,j) of the padded buffer lies in leaf row (li,lj) of the neighbour (di,dj).
+// Index i of a padded buffer, -1..8, is index `local` of the neighbour in direction d.
 struct RowSource {
     int d, local;
     explicit RowSource(int i) : d(i < 0 ? -1 : i > 7 ? 1 : 0), local(i & 7) {}

@@ -30,7 +30,7 @@ void load_star(const HaloField& field, std::size_t leaf, float* out);
 void load_star_from(const float* inner, const float* const across[6], float* out);
 /// The blocks that load_star reads, in place.
 [[nodiscard]] LeafStar star_of(HaloField& field, std::size_t leaf);
-/// Prefetches the values that are read of them.
+/// Prefetches the values of a star that a sweep reads.
 void prefetch(const LeafStar& star);
 /// Writes a padded buffer's inner 8^3 voxels back.
 void store_inner(const float* in, float* leaf);

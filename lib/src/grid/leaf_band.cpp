@@ -33,7 +33,7 @@ void require_packable(const std::vector<Coord>& origins) {
     }
 }
 
-constexpr std::size_t kNextKeys = 8;  // that are checked before a binary search
+constexpr std::size_t kNextKeys = 8;  // number of keys that are checked before a binary search
 
 bool is_odd(const Coord& origin) { return ((origin.x() ^ origin.y() ^ origin.z()) >> 3) & 1; }
 
@@ -72,7 +72,8 @@ void LeafBand::index() {
     });
     tbb::parallel_sort(lookup_);
     neighbours_.resize(origins_.size());
-    // In the order of the keys, a leaf's neighbours follow those of the previous leaf: nine positions advance.
+    // Leaves are visited in the order of their keys. In each of the nine directions (di,dj), the keys of the neighbours
+    // then increase, too, so that each search continues from its last position.
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lookup_.size(), 256), [&](const auto& range) {
         std::array<std::size_t, 9> places{};
         for (std::size_t n = range.begin(); n != range.end(); ++n) {

@@ -8,7 +8,7 @@ namespace covol::detail {
 
 /// A band's leaves and the gaps between them, column by column along k: the whole space in O(leaves + columns) pieces.
 ///
-/// The columns span the whole domain, or the leaves' box, one leaf wider unless it ends at the domain's boundary.
+/// The columns span the whole domain, or the leaves' box enlarged by one leaf on each side, up to the domain's end.
 class LeafColumns {
 public:
     /// A leaf, or a run of leaf-sized blocks without a leaf. k in leaf units, half-open.
@@ -18,8 +18,8 @@ public:
         std::int32_t column;
     };
 
-    /// @pre at least one leaf; each meets the box.
     enum class Extent { Leaves, Domain };
+    /// @pre at least one leaf; each meets the domain.
     LeafColumns(const LeafBand& band, const CoordBBox& domain, Extent extent = Extent::Leaves);
 
     [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
@@ -55,7 +55,7 @@ private:
     std::vector<std::int32_t> piece_of_leaf_;
 };
 
-/// The runs that are inside, given the inside voxels of the leaves: a run is inside if a leaf's voxel next to it is.
+/// The runs that are inside, given the inside voxels of the leaves: those next to an inside voxel or an inside run.
 /// @pre no interface passes between a leaf and a run.
 [[nodiscard]] std::vector<bool> inside_runs(const LeafColumns& columns, const std::vector<LeafMask>& inside);
 
@@ -78,8 +78,8 @@ void for_each_part(LeafMask mask, Visit&& visit) {
 
 /// The result of a flood fill.
 struct Flood {
-    std::vector<LeafMask> leaves;  ///< by leaf
-    std::vector<bool> pieces;      ///< by piece; of runs only
+    std::vector<LeafMask> leaves;  ///< by leaf: the voxels that were reached
+    std::vector<bool> pieces;      ///< by piece: whether a run was reached
 };
 
 /// Flood fill of the open voxels, through faces, from the columns' border and from the `seeds`.

@@ -12,7 +12,7 @@ namespace covol::detail {
 
 /// The voxels of a leaf next to marked voxels in direction `axis` (0..2), `sign` (-1 or 1): bit p is set if the voxel p
 /// + sign * e_axis is marked. `mask` marks voxels of the leaf itself, `halo` those of the leaf next to it in that
-/// direction (an empty mask ignores either).
+/// direction (an empty `mask` or `halo` is ignored).
 inline LeafMask beside_marked(const LeafMask& mask, const LeafMask& halo, int axis, int sign) {
     constexpr std::uint64_t kFirstK = 0x0101010101010101ULL;  // voxels with k = 0
     constexpr std::uint64_t kLastK = kFirstK << 7;

@@ -44,7 +44,7 @@ double deviation_along(const InImage& options, const Vec3& direction) {
 /// The face that is so close to a mark that the mark may lie in the cut, or null.
 const HalfSpace* end_beside(const Vec3& mark, const InImage& options) {
     for (const HalfSpace& face : options.faces) {
-        // half a voxel from its centre to its end, and the error of marking
+        // Covers the error of marking, and the half voxel between the centre of the last slice and the image's end.
         const double near = kCommon.errors * deviation_along(options, face.normal);
         if (detail::along(face, mark) > -near) return &face;
     }
@@ -87,10 +87,10 @@ std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, co
     return places;
 }
 
-/// If the surface extends far beyond its marks, constraints are added around them, outside by about their distance to
-/// the marks: for few or rough marks there are surfaces of less energy that extend through the whole space and never
-/// close.
-/// @return whether it does
+/// If the surface extends far beyond its marks, adds constraints that positions around them are outside, with their
+/// distance to the marks as the value: for few or rough marks there are surfaces of less energy that extend through the
+/// whole space and never close.
+/// @return whether the surface extends that far
 bool add_outside_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const std::vector<Vec3> far = places_around(known.marks, 2 * kGuess.held_at, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;

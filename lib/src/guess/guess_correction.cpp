@@ -37,7 +37,7 @@ struct Bump {
     double radius, height;
 };
 
-/// The signed distance to the guess, without a limit.
+/// The signed distance to the guess, also beyond the band.
 class FarDistance {
 public:
     FarDistance(const FloatGridPtr& guess, const std::vector<Vec3>& crossings)
@@ -82,7 +82,7 @@ public:
 
 private:
     FloatGridPtr guess_;
-    double exact_;  ///< below it hardly any voxel from which the distance is interpolated is clamped
+    double exact_;  ///< up to this distance, hardly any voxel used by the interpolation is clamped
     detail::KdTree surface_;
 };
 
@@ -122,7 +122,8 @@ Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, st
     for (std::size_t n = 0; n < targets.size(); ++n) {
         surface.push_back(targets[n].at);
         if (n < marks) continue;
-        // The surface lies beyond a seed, on all sides: twice as far as it is moved.
+        // The surface is placed beyond a seed, in any direction: the hull contains positions around it, twice as far
+        // away.
         for (int a = 0; a < 3; ++a)
             for (const int side : {-1, 1}) {
                 surface.push_back(targets[n].at);
@@ -171,7 +172,7 @@ double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     return sum;
 }
 
-/// Heights of equal bumps at the targets that give the requested shifts, up to noise: (K + noise I) heights = shifts.
+/// Heights of bumps of equal radius at the targets that give the shifts, up to noise: (K + noise I) heights = shifts.
 std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
     struct Entry {
         std::size_t column;
@@ -285,9 +286,9 @@ struct GuessCorrection::Data {
     Data(const FloatGridPtr& start, const std::vector<Vec3>& surface) : grid(start), distance(start, surface) {}
     FloatGridPtr grid;
     FarDistance distance;
-    FloatGridPtr given;  ///< before it was redrawn; null if it was not
+    FloatGridPtr given;  ///< the guess before it was redrawn; null if it was not
     WorldBox redrawn{};  ///< outside of it `given` and `grid` are equal
-    Facets hull;         ///< of the guess, the marks and the active seeds; empty if no mark is far from the guess
+    Facets hull;         ///< of the guess, the marks and the active seeds; empty if no bump exceeds the minimum radius
     std::vector<Bump> bumps;
     CorrectionReport report;
 

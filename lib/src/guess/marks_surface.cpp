@@ -17,19 +17,19 @@
 namespace covol::guess {
 namespace {
 
-// Of the variance that is stated: marks with less are as good as exact, the deviation being 1/30 of the stated one.
+// Fraction of the stated variance below which marks count as exact: the deviation is 1/30 of the stated one.
 constexpr double kExact = 1e-3;
-// Weight of the whole among the parts, in weights of a part at its centre: it only has to continue them at their ends.
+// Weight of the whole relative to that of a part at its centre: it only has to continue the parts at their ends.
 constexpr double kWholeWeight = 1e-3;
 
-/// Number of marks whose normals are optimised first, without known normals: the time grows with the cube of the
-/// number, so that several attempts with a third of the marks take less time than one with the whole.
+/// Number of marks whose normals are optimised first. The time grows with the cube of the number, so that several
+/// attempts with a third of the marks take less time than one with all marks of the whole.
 std::size_t oriented_marks() { return kMarks.whole / 3; }
 
 /// Number of marks in a part: its core, a fourth of them, lies within half of its radius and is described by a quadric.
 std::size_t part_marks() { return 4 * kCommon.quadric; }
 
-/// Ratio between the variances of the marks that are compared: the deviation doubles.
+/// Ratio between the variances that are compared: the deviation doubles.
 double variance_step() { return std::pow(kCommon.growth, 4); }
 
 Vec3 unit_or_x(const Vec3& v) {
@@ -37,7 +37,7 @@ Vec3 unit_or_x(const Vec3& v) {
     return size > 0 ? Vec3{v[0] / size, v[1] / size, v[2] / size} : Vec3{1, 0, 0};
 }
 
-/// The selected marks, with the variance along their normals if these are known.
+/// The constraints of the selected marks, with the variance along their normals if these are known.
 Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const Normals& normals) {
     Constraints part;
     const double mean_variance = (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) +
@@ -85,7 +85,7 @@ std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to
     return chosen;
 }
 
-/// The fraction of the stated variance, for marks that fit each other better than stated.
+/// The most probable fraction of the stated variance, for marks that fit each other better than stated.
 struct LikeliestVariance {
     double factor = 1;
     std::unique_ptr<VariationalSurface> surface;  ///< with that variance
@@ -119,7 +119,7 @@ LikeliestVariance likeliest_variance(const VariationalSurface& stated, const Imp
 /// The factor of the stated variance, at least 1, for marks that fit each other worse than stated. Computed on
 /// neighbourhoods, which are dense enough to distinguish imprecise marks from a rough surface.
 double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& normals, const RunContext& run) {
-    // With as many marks as the whole has, the standard error of a variance is below a tenth.
+    // With about kMarks.whole marks in all neighbourhoods, the standard error of a variance is below a tenth.
     const std::vector<std::size_t> centers = spread_out(marks.marks, 1 + kMarks.whole / part_marks());
     std::vector<std::vector<std::size_t>> near;
     for (const std::size_t center : centers) near.push_back(nearest(marks.marks, center, part_marks()));

@@ -17,7 +17,7 @@ struct ImpreciseMarks {
     std::vector<Vec3> seeds;  ///< positions that are inside (value < 0) or outside
     std::vector<double> seed_value;
 
-    Clip world;  ///< beyond its end nothing is known
+    Clip world;  ///< the region in which the surface is known; beyond it the body may continue
 
     std::vector<Vec3> normals;  ///< approximate, outward: one for each mark, or none
 
@@ -48,7 +48,7 @@ private:
     struct Patch {
         Vec3 center;
         double radius;             ///< support of the weight
-        VariationalSurface added;  ///< relative to the whole
+        VariationalSurface added;  ///< the difference from the surface as a whole
     };
     void make_patches(const ImpreciseMarks& marks, const RunContext& run);
     void sort_patches();

@@ -36,7 +36,7 @@ constexpr double kAround[] = {1.15, 1.5};  // relative to the farthest mark
 class HermiteSystem {
 public:
     /// @param nodes   in the unit ball; the first `marks` of them also have a gradient
-    /// @param lambda  of each node
+    /// @param lambda  added to each node's diagonal: see VariationalSurface
     HermiteSystem(const std::vector<Point>& nodes, Index marks, const Vector& lambda)
         : values_(Index(nodes.size())), gradients_(3 * marks), size_(values_ + gradients_), matrix_(size_, size_) {
         Matrix polynomials = Matrix::Zero(size_, kPolynomial);
@@ -278,7 +278,7 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     return points;
 }
 
-/// On ellipsoids around all marks, without positions outside the world.
+/// Whether f has the same sign on ellipsoids around all marks, except at positions outside the world.
 bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
     constexpr double kNoStep[3] = {0, 0, 0};
     int positive = 0, count = 0;
@@ -442,7 +442,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
         log_likelihood_ = -0.5 * (system.log_determinant() + system.freedom() * std::log(unit_amplitude));
     }
     amplitude_ = unit_amplitude / radius_;
-    // Without seeds the outside is identified by being unbounded.
+    // Without seeds, the outside is the unbounded side, on which f has to be positive.
     if (given.seeds.empty() && search == Search::Wide) {
         double far = 0;
         for (int corner = 0; corner < 8; ++corner)

@@ -60,8 +60,8 @@ enum class Search {
 class VariationalSurface {
 public:
     /// @param normals  initial directions of the gradients, or empty
-    /// @param search   whether other initial values are tried as well (the flattest modes of the energy, away from the
-    ///                 centroid, away from neighbours): of the closed results the one of minimum energy is used
+    /// @param search   whether other initial values are tried as well (away from the centroid of the marks, away from
+    ///                  the neighbours): of the closed results the one of minimum energy is used
     /// @param amplitude  variance of f per length: the covariance of f is amplitude * |x|^3; 0: estimated from the
     /// marks
     /// @throws Error InvalidInput (fewer than four distinct marks, or all in one plane); Numerical.
@@ -73,7 +73,7 @@ public:
     /// value() at from + n * step, n < count.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
 
-    /// Of the marks, given their variance and the amplitude, up to a constant.
+    /// Log likelihood of the marks, given their variance and the amplitude, up to a constant.
     [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
     [[nodiscard]] double amplitude() const { return amplitude_; }
 

@@ -14,10 +14,10 @@
 namespace covol::guidance {
 namespace {
 
-// range beyond the border's own profile in which inside and outside are learnt
+// steps beyond the border's profile that contribute to the distributions of inside and outside
 constexpr int kFarSteps = 4 * kStepsPerVoxel;
 
-/// Gaussian blur of `count` values with the given stride; the sum is preserved at the ends.
+/// Gaussian blur of `count` values with the given stride; the kernel is normalised so that their sum is preserved.
 void blur(double* values, int count, int stride, double sigma) {
     const int radius = int(std::ceil(2.5 * sigma));
     std::vector<double> out(count, 0.0), kernel(2 * radius + 1);
@@ -41,7 +41,7 @@ void BorderProfile::Counts::add(const Counts& other, double weight) {
 }
 
 BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::move(places)) {
-    // Quantiles: each level holds equally many of the samples near the marks.
+    // The levels are separated by quantiles: each contains the same number of samples near the marks.
     std::vector<float> all;
     for (const MarkedPlace& place : places_) {
         const PatchProfile& p = place.profile;
@@ -92,7 +92,7 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
                     c.outside[level] += weight / kFarSteps;
             }
     }
-    // Along the normal by the error of a mark somewhere in its voxel.
+    // Blur along the normal by the standard deviation of a mark that may lie anywhere in its voxel.
     for (int level = 0; level < kLevels; ++level)
         blur(c.border.data() + level, kDepths, kLevels, kUniformDeviation * kStepsPerVoxel);
     for (int depth = 0; depth < kDepths; ++depth)
@@ -105,15 +105,15 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
     constexpr double kIgnoredWeight = 1e-8;  // weight difference that is ignored
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
-    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // the usual weight
+    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // 1 if most weights are 1
     Counts total = maximum > 0 ? all_ : Counts();
     for (std::size_t n = 0; n < counts_.size(); ++n)
         if (std::abs(weights[n] - maximum) > kIgnoredWeight) total.add(counts_[n], weights[n] - maximum);
     return total;
 }
 
-/// Converts counts to probabilities, shrunk towards `base`; without it inside and outside are shrunk towards a uniform
-/// distribution, and the border towards these two.
+/// Converts counts to probabilities, shrunk towards `base`. Without `base`, inside and outside are shrunk towards a
+/// uniform distribution, and each depth of the border towards a mixture of inside and outside.
 void BorderProfile::normalise(Counts& c, const Counts* base) {
     const auto mix = [](double* values, const double* prior, double belief) {
         double total = 0;

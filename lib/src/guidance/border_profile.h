@@ -6,22 +6,23 @@
 
 namespace covol::guidance {
 
-/// Steps of a profile for each voxel of the image along the normal.
+/// Number of steps of a profile within one voxel of the image along the normal.
 inline constexpr int kStepsPerVoxel = 4;
-/// The border's own profile extends this many steps to either side; beyond it depth does not matter.
+/// Steps on either side of the border at which each depth has its own distribution of intensities. Farther away there
+/// is one distribution for inside and one for outside.
 inline constexpr int kBorderSteps = 10;
 inline constexpr int kDepths = 2 * kBorderSteps + 1;
-inline constexpr int kLevels = 24;  ///< of intensity
-/// [voxels] On both sides of the surface, within which profiles are read: the farthest border with its own profile.
+inline constexpr int kLevels = 24;  ///< number of levels of intensity
+/// [voxels] Distance to which profiles are read on both sides of the surface: the maximum offset plus kBorderSteps.
 inline double profile_reach() { return kGuide.farthest + double(kBorderSteps) / kStepsPerVoxel; }
 
-/// Intensity along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
+/// Intensity along the normals of one patch: each row belongs to a vertex, from `lo` to `hi` steps outward of it.
 struct PatchProfile {
     int lo = 0, hi = -1;
-    bool image_ends_below = false, image_ends_above = false;  ///< limited by the image; the border may lie beyond
+    bool image_ends_below = false, image_ends_above = false;  ///< the profile ends at the image's boundary
     int rows = 0;
     std::vector<float> values;  ///< row by row
-    std::vector<float> seen;    ///< [step][level]: number of rows with that level of intensity there
+    std::vector<float> seen;    ///< [step][level]: number of rows with that level at that step
     [[nodiscard]] int steps() const { return hi - lo + 1; }
     [[nodiscard]] bool empty() const { return rows == 0; }
 };
@@ -38,18 +39,18 @@ struct BorderTable {
     std::vector<float> border;           ///< [depth + kBorderSteps][level]
     std::vector<float> inside, outside;  ///< [level]
 
-    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), for each voxel of the image, up to a
-    /// constant; mean over rows. An offset beyond the profile means that all of the profile lies on one side of the
-    /// border.
+    /// Adds to out[n] the log-likelihood, up to a constant, that the border lies first + n steps outward of the patch:
+    /// the mean over rows of the sum over steps, divided by kStepsPerVoxel. An offset beyond the profile means that all
+    /// of the profile lies on one side of the border.
     void likelihood(const PatchProfile& profile, int first, std::vector<double>& out) const;
 };
 
-/// Frequency of each level at each depth around marked places; tables are computed from some or all of these.
+/// Frequency of each level at each depth around marked places; tables are computed from some or all of the places.
 class BorderProfile {
 public:
     explicit BorderProfile(std::vector<MarkedPlace> places);
     void count_levels(PatchProfile& profile) const;
-    /// From all places, weighted by `weights`, shrunk towards the counts of `base` (may be null).
+    /// The table of all places with these weights, shrunk towards the table with `base_weights` unless that is null.
     [[nodiscard]] BorderTable table(const std::vector<double>& weights,
                                     const std::vector<double>* base_weights = nullptr) const;
     [[nodiscard]] const std::vector<MarkedPlace>& places() const { return places_; }
@@ -65,9 +66,9 @@ private:
     static void normalise(Counts& counts, const Counts* base);
 
     std::vector<MarkedPlace> places_;
-    std::vector<float> edges_;    // between levels, kLevels of them: the last ones may be infinite
+    std::vector<float> edges_;    // edges_[n] is the upper bound of level n; the last is infinite
     std::vector<Counts> counts_;  // by place
-    Counts all_;                  // their sum
+    Counts all_;                  // sum of counts_
 };
 
 }  // namespace covol::guidance

@@ -8,7 +8,7 @@
 namespace covol::guidance {
 namespace {
 
-constexpr std::size_t kBlock = 1024;  // rows of a partial sum: makes the result independent of the threads
+constexpr std::size_t kBlock = 1024;  // rows of a partial sum: the result does not depend on the number of threads
 
 /// Calls visit(row) for each row, and sums the return values.
 template <typename Visit>
@@ -24,7 +24,7 @@ double sum_over(std::size_t rows, std::vector<double>& sums, const Visit& visit)
     return total;
 }
 
-/// In a symmetric matrix a row equals its column.
+/// The product of a row of a symmetric matrix and x. The row is read as a column, which is stored contiguously.
 double row_times(const Eigen::SparseMatrix<double>& matrix, std::size_t row, const double* x) {
     const double* value = matrix.valuePtr();
     const int *other = matrix.innerIndexPtr(), *first = matrix.outerIndexPtr();

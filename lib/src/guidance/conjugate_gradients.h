@@ -4,18 +4,18 @@
 
 namespace covol::guidance {
 
-/// half * diag(weight) * half, of a symmetric matrix. The product itself is never formed: it has three times as many
-/// entries.
+/// The matrix half * diag(weight) * half. The product is never formed, because it has three times as many entries as
+/// `half`.
 class SquaredMatrix {
 public:
     /// @param half    symmetric
-    /// @param weight  > 0, of each row
+    /// @param weight  > 0, for each row of `half`
     SquaredMatrix(Eigen::SparseMatrix<double> half, std::vector<double> weight);
 
     [[nodiscard]] const std::vector<double>& diagonal() const { return diagonal_; }
-    /// On all threads. @param between  out: weight * half * x
+    /// Computes weight * half * x on all threads. @param between  the result
     void multiply_half(const std::vector<double>& x, std::vector<double>& between) const;
-    /// A row's entry of half * between.
+    /// The entry of half * between at `row`.
     [[nodiscard]] double finish(std::size_t row, const std::vector<double>& between) const;
     /// The whole product, on all threads.
     [[nodiscard]] std::vector<double> operator*(const std::vector<double>& x) const;
@@ -27,7 +27,7 @@ private:
 
 /// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, preconditioned by the diagonal (M. R.
 /// Hestenes and E. Stiefel 1952). The result is bitwise the same for any number of threads.
-/// @param matrix     positive definite with the diagonal
+/// @param matrix     positive definite after `diagonal` is added
 /// @param diagonal   >= 0
 /// @param x          in: the initial value
 /// @param tolerance  of the residual, relative to the right-hand side

@@ -39,7 +39,8 @@ private:
         const float* values = nullptr;
     };
 
-    /// Null if the grid has none. Each of eight neighbouring leaves has its own cache entry.
+    /// The values of the leaf with this voxel; null if there is none. Each of eight neighbouring leaves has its own
+    /// cache entry.
     const float* leaf_at(const openvdb::Coord& voxel) {
         const openvdb::Coord origin = voxel & ~7;
         Cached& cached = cached_[(voxel.x() >> 3 & 1) << 2 | (voxel.y() >> 3 & 1) << 1 | (voxel.z() >> 3 & 1)];
@@ -53,7 +54,7 @@ private:
         const float* leaf = leaf_at(voxel);
         return leaf != nullptr ? leaf[Leaf::coordToOffset(voxel)] : accessor_.getValue(voxel);
     }
-    /// The same arithmetic as openvdb::tools::BoxSampler. @param i, j  steps along those axes
+    /// The same arithmetic as openvdb::tools::BoxSampler. @param i, j  strides of the first two axes
     static double between(const float* v, int i, int j, const double part[3]) {
         const auto mix = [](float a, float b, double weight) { return a + float(double(b - a) * weight); };
         const auto along = [&](const float* p) { return mix(p[0], p[1], part[2]); };
@@ -61,7 +62,7 @@ private:
         return double(mix(across(v), across(v + i), part[0]));
     }
 
-    FloatGrid::ConstUnsafeAccessor accessor_;  // not registered with the tree, which takes longer than a few reads
+    FloatGrid::ConstUnsafeAccessor accessor_;  // not registered with the tree: that would take longer than a few reads
     const Domain& domain_;
     std::array<Cached, 8> cached_;
 };

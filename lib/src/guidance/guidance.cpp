@@ -36,10 +36,10 @@ constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
 
 double squared(double x) { return x * x; }
 
-/// A surface on its way from the guess to the target, and the data about it.
+/// Moves a surface step by step from the guess to the border.
 class Guide {
 public:
-    /// @param guess  a start: a signed distance, clamped
+    /// @param guess  a start: a signed distance, clamped to the narrow band
     Guide(FloatGridPtr guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
           GuidanceReport& report, const RunContext& run)
         : marks_(marks),
@@ -51,7 +51,7 @@ public:
           h_(domain_.voxel_size),
           surface_(std::move(guess)) {}
 
-    /// False, with the reason in the report, if the image is not usable.
+    /// One iteration. Returns false, with the reason in the report, if the image is not usable.
     bool step(bool first) {
         run_.check();
         cut_surface();
@@ -101,12 +101,12 @@ private:
     double h_;
     FloatGridPtr surface_;
     FloatGridPtr start_;                    // the distance to the guess
-    std::optional<WideDistance> distance_;  // to the surface
+    std::optional<WideDistance> distance_;  // the distance to the current surface
 
     // about the guess:
-    double guess2_ = 0;  // variance at the marks
+    double guess2_ = 0;  // variance of the guess at the marks
     double misfit_ = 0;  // 0: the errors of the marks explain their distances from the guess; 1: they do not
-    double prior_ = 0;   // chosen in the first iteration
+    double prior_ = 0;   // prior standard deviation of the offsets, chosen in the first iteration
     double sigma_ = 0;
 
     // about this iteration, by patch:
@@ -114,12 +114,12 @@ private:
     double area_ = 0, size_ = 0, spacing_ = 0, width_ = 0;
     std::vector<double> to_mark_, home_, offset_;
     std::vector<int> ranges_;
-    double broad_ = 0;  // deviation of a guess of which only the marks are known
+    double broad_ = 0;  // standard deviation of the guess, estimated from the distances to the marks alone
     std::vector<OffsetEvidence> evidence_, held_out_;
     std::vector<std::size_t> nearest_;
 
     std::vector<PatchMark> on_;  // the marks on the surface
-    double mark2_ = 0;           // their variance
+    double mark2_ = 0;           // mean variance of on_
     std::optional<SmoothImage> smooth_;
     std::optional<LearntProfile> learnt_;
 };
@@ -133,7 +133,7 @@ void Guide::cut_surface() {
     for (const auto& t : mesh.triangles)
         volume += meshing::six_volumes({place(t[0]), place(t[1]), place(t[2])}, origin) / 6;
     area_ = std::accumulate(vertices.area.begin(), vertices.area.end(), 0.0);
-    size_ = 3 * std::abs(volume) / area_;  // for a ball its radius
+    size_ = 3 * std::abs(volume) / area_;  // the radius if the body is a ball
     const detail::KdTree tree(marks_);
     const auto cut = [&](double width) {
         width_ = width;
@@ -141,7 +141,7 @@ void Guide::cut_surface() {
         to_mark_.resize(patches_.size());
         tbb::parallel_for(std::size_t(0), patches_.size(),
                           [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
-        // If points are randomly spread with one in each s^2, the mean distance to them is s / 2.
+        // If points are spread randomly, one in an area of s^2, the mean distance to the nearest one is s / 2.
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
     cut(kGuide.patch_width * h_);
@@ -219,7 +219,7 @@ void Guide::set_ranges() {
     if (options_.range) broad_ = std::min(broad_, 0.5 * *options_.range);
     ranges_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
-        // At marks the range is that of any other position, as if the guess were no better there.
+        // The range at marks is not smaller than elsewhere, although the guess is more accurate there.
         double range = std::max(reach[i], 2 * broad_);
         if (options_.range) range = std::min(range, *options_.range);
         range = std::min(range + std::abs(home_[i]), kGuide.farthest * h_);
@@ -289,9 +289,9 @@ void Guide::query(const Scene& scene) {
 }
 
 /// Cross-validates the image: the offsets at each mark are learnt without it, for a guess with a deviation of `prior`
-/// everywhere. Returns the error at the marks, the fraction of a wave of the guess, two spacings long, that the image
-/// would undo, and how fast the offsets grow with the distance from the marks. Errors are increased by a
-/// standard error, and the last value is reduced by a standard error.
+/// everywhere. Returns the error at the marks; the fraction that the image removes of a wave in the guess, with a
+/// wavelength of two spacings; and how fast the offsets grow with the distance from the marks. The error is increased
+/// by a standard error, and the growth is reduced by a standard error.
 Guide::ValidationResult Guide::cross_validate(const OffsetField& field, double prior) const {
     const std::size_t count = patches_.size();
     const std::vector<double> none(count, 0.0), deviation(count, prior);
@@ -329,8 +329,8 @@ Guide::ValidationResult Guide::cross_validate(const OffsetField& field, double p
     return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2, std::move(each)};
 }
 
-/// The image's error by patch: that at the marks around it, averaged with that at all marks, which counts as a few
-/// marks.
+/// The image's squared error by patch: the mean of the squared errors at nearby marks and of the mean at all marks,
+/// which has the weight of kGuide.belief marks.
 std::vector<double> Guide::local_error2(const ValidationResult& validation) const {
     const double all = validation.error2 + mark2_;
     std::vector<double> result(patches_.size());
@@ -395,7 +395,7 @@ void Guide::weigh(bool first) {
         if (fit.precision[i] * squared(deviation[i]) > 1 && fraction > 0.5) sure[i] = 1;
     }
     if (misfit_ > 0) {
-        // A guess that does not pass its marks, such as that of another tool, is attracted to them.
+        // A guess that does not pass through its marks, such as the result of another tool, is moved towards them.
         std::vector<double> rest(count, 0.0), precision(count, 0.0);
         for (const PatchMark& mark : on_) {
             rest[mark.patch] = mark.residual - offset_[mark.patch];
@@ -417,7 +417,7 @@ void Guide::weigh(bool first) {
     report_.mean_offset = mean(whole);
 }
 
-/// The distance to the surface minus the offset of its nearest vertex.
+/// Moves the surface: the offset of the nearest vertex is subtracted from the distance, which is then recomputed.
 void Guide::move() {
     const FloatGridPtr moved = distance_->less(on_vertices(patches_, width_, offset_));
     detail::drop_unmarked_pieces(*moved, marks_);

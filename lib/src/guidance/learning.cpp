@@ -15,8 +15,8 @@ namespace covol::guidance {
 namespace {
 
 constexpr int kBeyondRange = 3 * kStepsPerVoxel, kBeyondMark = 8 * kStepsPerVoxel;
-// Along a path an interpolated distance changes by at most sqrt(3) times its length, plus a fraction of a voxel at the
-// seam between its two parts.
+// Along a path, an interpolated distance changes by at most sqrt(3) times the length of the path, plus a fraction of a
+// voxel where the values of the narrow band meet those beyond it (WideDistance).
 constexpr double kSteepest = 1.7320508, kSeam = 0.5;
 constexpr std::array<double, 6> kSharpness{0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr std::array<double, 4> kStray{0.02, 0.1, 0.25, 0.5};
@@ -60,7 +60,7 @@ Likelihood likelihood(const PatchProfile& profile, const BorderTable& table, int
     return l;
 }
 
-/// Weights of the marked places around `at`.
+/// Gaussian weights of the marked places by their distance from `at`.
 std::vector<double> around(const BorderProfile& profile, const Vec3& at, double radius) {
     std::vector<double> weights;
     for (const MarkedPlace& place : profile.places())
@@ -68,7 +68,7 @@ std::vector<double> around(const BorderProfile& profile, const Vec3& at, double 
     return weights;
 }
 
-/// The median radius that contains `count` other places.
+/// The median distance of a place to its `count`-th nearest other place.
 double neighbourhood(const BorderProfile& profile, int count) {
     std::vector<double> radii;
     for (const MarkedPlace& a : profile.places()) {
@@ -86,7 +86,7 @@ std::vector<MarkedPlace> places_of(const Scene& scene, const std::vector<PatchMa
     tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
         const PatchMark& mark = marks[n];
         places[n].profile = read_profile(scene, mark.patch, scene.ranges[mark.patch] + kBeyondMark, image);
-        // The border lies between the surface and the mark, according to their errors.
+        // The expected position of the border between the surface and the mark, weighted by their variances.
         const double surface2 = guess_deviation * guess_deviation;
         places[n].offset = mark.residual * surface2 / (surface2 + mark.deviation * mark.deviation) /
                            (scene.patches.voxel[mark.patch] / kStepsPerVoxel);
@@ -103,7 +103,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     const double step = p.voxel[patch] / kStepsPerVoxel, h = scene.domain.voxel_size;
     struct Row {
         int lo = 0, hi = 0;
-        float* values;  // at step 0
+        float* values;  // points to the value at step 0
     };
     const std::size_t longest = 2 * std::size_t(reach) + 1;
     std::vector<float> values(longest * (p.first[patch + 1] - p.first[patch]));
@@ -124,8 +124,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
                     const double away = s * step;
                     const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
                                   x[2] + side * away * normal[2]};
-                    // Beyond the middle of a gap or of the body another part of the surface is closer than along a
-                    // normal that is tilted against it; less a voxel.
+                    // Stop if another part of the surface is closer: the distance is then less than kCommon.turn times
+                    // the path along the normal, minus one voxel.
                     const double margin = side * distance(at) - (kCommon.turn * away - h);
                     if (margin < 0) break;
                     checked = s + int(std::max(margin - kSeam * h, 0.0) / ((kSteepest + kCommon.turn) * step));
@@ -161,7 +161,7 @@ LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& m
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
-    // Profiles that vary with the position are learnt at as many marks as a quadric would be fitted to.
+    // A profile that varies with the position is learnt from about as many marks as a quadric is fitted to.
     if (marks.size() > kCommon.quadric) {
         radius_ = std::max(neighbourhood(profile_, int(kCommon.quadric)), apart);
         test(scene, marks, prior_deviation, apart, true);
@@ -174,7 +174,7 @@ LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& m
     });
 }
 
-/// Predicts each mark from the profile of the others; replaces the current settings if these predict better.
+/// Predicts each mark from the profile at the other marks. Replaces the current settings if the prediction is better.
 void LearntProfile::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
                          bool local) {
     std::vector<BorderTable> tables(marks.size());
@@ -202,8 +202,8 @@ void LearntProfile::test(const Scene& scene, const std::vector<PatchMark>& marks
             if (likelihoods[n].values.empty()) continue;
             const double step = scene.patches.voxel[marks[n].patch] / kStepsPerVoxel;
             const OffsetEvidence e = density(likelihoods[n].values, likelihoods[n].first * step, step, trust);
-            // The density of the mark: that of the border under prior and image, blurred by the mark's error, relative
-            // to the same density without the image.
+            // The probability density of the mark: that of the border given prior and image, blurred by the mark's
+            // error. It is divided by the same density without the image.
             const double prior2 = prior_deviation * prior_deviation,
                          mark2 = std::pow(std::max(marks[n].deviation, 0.5 * step), 2);
             double mean, variance;

@@ -16,15 +16,15 @@ struct Scene {
     const FloatGrid& distance;  ///< to the surface, signed, in a wide band
     const Domain& domain;
     const std::vector<int>& ranges;  ///< by patch: range in which the border is searched, steps
-    Vec3 shift{0, 0, 0};             ///< of positions in the image against the surface's
+    Vec3 shift{0, 0, 0};             ///< from positions on the surface to positions in the image
 };
 
 /// The marks in one patch.
 struct PatchMark {
     std::size_t patch = 0;
-    Vec3 at{};             ///< their mean
-    double residual = 0;   ///< from the surface to them, outward
-    double deviation = 0;  ///< of their own error along the normal
+    Vec3 at{};             ///< mean position
+    double residual = 0;   ///< their mean distance from the surface, positive outside
+    double deviation = 0;  ///< standard deviation of their mean position along the normal
 };
 
 /// Reliability of the image.
@@ -36,25 +36,26 @@ struct Trust {
 /// The image's profiles at the marks, and how well they predict the marks.
 class LearntProfile {
 public:
-    /// @param guess_deviation  of the surface at the marks
-    /// @param prior_deviation  of the surface anywhere: marks are predicted as if they lay at any other position
+    /// @param guess_deviation  standard deviation of the surface at the marks
+    /// @param prior_deviation  standard deviation of the surface elsewhere; it is also assumed to predict marks
     /// @param apart            marks closer together than this are left out together
     LearntProfile(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
                   double guess_deviation, double prior_deviation, double apart);
 
+    /// Mean increase of the log density at held-out marks due to the image.
     [[nodiscard]] double gain() const { return gain_; }
-    /// Minus its own standard error.
+    /// The gain minus its standard error.
     [[nodiscard]] double sure_gain() const { return gain_ - gain_error_; }
     [[nodiscard]] bool local() const { return local_; }
 
     struct ProfileEvidence {
         OffsetEvidence all;       ///< learnt at all marks
-        OffsetEvidence held_out;  ///< learnt without the nearest mark and those beside it
-        std::size_t nearest = 0;  ///< mark
+        OffsetEvidence held_out;  ///< learnt without the nearest mark and the marks close to it
+        std::size_t nearest = 0;  ///< index of the nearest mark
     };
     [[nodiscard]] ProfileEvidence query(const Scene& scene, std::size_t patch, const SmoothImage& image) const;
 
-    /// Median intensity at the marks this many steps outward.
+    /// Median intensity over all marks, this many steps outward of the border.
     [[nodiscard]] double brightness(int steps) const;
 
 private:
@@ -62,14 +63,15 @@ private:
               bool local);
 
     BorderProfile profile_;
-    std::vector<BorderTable> tables_, held_out_;  // by place, or one for all; by place
-    double radius_ = 0;                           // radius in which a local profile is learnt
+    std::vector<BorderTable> tables_, held_out_;  // tables_: by place, or one for all; held_out_: by place
+    double radius_ = 0;                           // standard deviation of the weights of a local profile
     bool local_ = false;
     Trust trust_;
     double gain_ = 0, gain_error_ = 0;
 };
 
-/// Reads the profile of a patch as far as its own surface is the nearest one, and within the image.
+/// Reads the profile of a patch up to `reach` steps on both sides, but only within the image and only while no other
+/// part of the surface is closer.
 [[nodiscard]] PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, const SmoothImage& image);
 
 }  // namespace covol::guidance

@@ -28,10 +28,10 @@ namespace {
 using namespace guidance;
 
 constexpr int kStepsOfSample = kStepsPerVoxel / 2;
-constexpr int kParts = 8;  // of a step, at which offsets are compared
-// Voxels: the finest difference between offsets.
+constexpr int kParts = 8;  // offsets are compared at multiples of 1 / kParts of a step
+// [voxels] The smallest difference between offsets.
 constexpr double kFinest = 1.0 / (kStepsPerVoxel * kParts);
-constexpr double kMinNoise = 1e-6;  // of the variance of intensity: images that are equal have none
+constexpr double kMinNoise = 1e-6;  // minimum, as a fraction of the variance of intensity: equal images have no noise
 
 /// [voxels] Maximum movement of a part of the surface in addition to that of the whole, which accounts for most of it.
 double part_range() { return 0.5 * kGuide.farthest; }
@@ -99,7 +99,7 @@ struct SurfaceTemplate::Data {
     FloatGridPtr given;
     double h = 1;
     Domain domain;         ///< with a margin for the movement
-    FloatGridPtr surface;  ///< the surface as a start on it
+    FloatGridPtr surface;  ///< the surface as a start in this domain
     Patches patches;
     std::optional<WideDistance> distance;
     std::vector<int> window, range;   ///< by patch, steps: range that is compared, and range of the movement
@@ -107,7 +107,7 @@ struct SurfaceTemplate::Data {
 
     Data(FloatGridPtr level_set, const Image& image, const RunContext& run);
     [[nodiscard]] WorldBox box(double around) const { return bounding_box(patches.places, around); }
-    /// @param shift  of positions in the image against the surface's
+    /// @param shift  from positions on the surface to positions in the image
     [[nodiscard]] Template read(std::size_t i, const SmoothImage& image, const Vec3& shift) const {
         return Template(
             read_profile({patches, *distance->grid(), domain, range, shift}, i, window[i] + range[i], image));
@@ -134,7 +134,7 @@ SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const Ru
 
 namespace {
 
-/// A level in a wide band, moved by a fraction of a voxel along each axis.
+/// A level set in a wide band, moved by a fraction of a voxel along each axis.
 FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
     FloatGridPtr result = level.deepCopy();
     if (part == Vec3{0, 0, 0}) return result;
@@ -148,7 +148,7 @@ FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
     return result;
 }
 
-/// The movement of a surface into another image.
+/// Computes the movement of a surface from its image to another one.
 class Motion {
 public:
     Motion(const SurfaceTemplate::Data& known, const Image& image, const RunContext& run)
@@ -165,11 +165,11 @@ public:
     }
 
 private:
-    /// Mean squared differences of a patch from the new image, by offset.
+    /// Mean squared differences between a patch's template and the new image, by offset.
     struct Mismatch {
         int first = 0;  ///< offset, steps
         std::vector<double> squares;
-        double minimum = std::numeric_limits<double>::infinity();  ///< of for_each_offset()
+        double minimum = std::numeric_limits<double>::infinity();  ///< over all positions of for_each_offset()
         /// Calls visit(offset, square) at fractions of a step, with parabolic interpolation between steps.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
@@ -210,7 +210,7 @@ private:
     SmoothImage image_;
     Vec3 translation_{0, 0, 0};
     std::vector<double> offset_;  // by patch
-    Moments both_;                // intensity before and now, all along the surface
+    Moments both_;                // intensities in the previous and the new image, along the whole surface
 };
 
 /// 1 - correlation of the templates with the shifted new image.
@@ -272,8 +272,8 @@ void Motion::translate() {
     if (!(best < (1 - kCommon.minority) * standing)) translation_ = {0, 0, 0};
 }
 
-/// Matches in two passes: an estimated offset is a few percent too short, because the positions between the old surface
-/// and the new one resemble neither.
+/// Matches in several passes: an estimated offset is a few percent too small, because the image between the old and
+/// the new surface does not resemble the image at either of them.
 void Motion::match() {
     offset_.assign(patches_.size(), 0.0);
     const OffsetField field(patches_, std::max(kTimeLapse.alike * radius(), 4 * h_));
@@ -322,9 +322,9 @@ void Motion::fit(const OffsetField& field, const std::vector<double>& measured, 
     }
 }
 
-/// Calls pair(intensity before, intensity later) for all samples that a patch has in both images, moved by `offset`
-/// steps.
-/// @return false if these are less than half of the samples before
+/// Calls pair(intensity before, intensity later) for all samples of a patch that exist in both images if the patch has
+/// moved by `offset` steps.
+/// @return false if fewer than half of the samples before have a pair
 template <typename Pair>
 bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, const Pair& pair) const {
     const Template& was = known_.templates[i];
@@ -353,7 +353,8 @@ std::vector<Template> Motion::read_now() {
             if (both.correlation() > best[i].correlation()) best[i] = both;
         }
     });
-    // Illumination varies and stains bleach: one gain and one offset of intensity, from the best match of each patch.
+    // Illumination varies and stains bleach: one gain and one offset of intensity for the whole image, from the best
+    // match of each patch.
     both_ = {};
     for (const Moments& of_patch : best) both_.add(of_patch);
     const double gain = both_.deviation_y() > 0 ? both_.deviation_x() / both_.deviation_y() : 1.0;
@@ -371,7 +372,7 @@ std::vector<Motion::Mismatch> Motion::compare(const std::vector<Template>& later
                 sum += (is - was) * (is - was);
                 ++count;
             });
-            if (!enough) continue;  // at the ends of the range
+            if (!enough) continue;  // too few samples, at the ends of the range
             if (result[i].squares.empty()) result[i].first = offset;
             result[i].squares.push_back(sum / count);
         }
@@ -432,8 +433,8 @@ Followed Motion::moved() const {
     const bool is_still = translation_ == Vec3{0, 0, 0} && !(report.max_offset > kFinest * h_);
     if (is_still) return result;
     const FloatGridPtr level = known_.distance->less(on_vertices(patches_, kGuide.patch_width * h_, offset_));
-    // Whole voxels shift the lattice and only the fraction is interpolated: linear interpolation would shrink convex
-    // shapes from frame to frame.
+    // The lattice is shifted by whole voxels, and only the remaining fraction is interpolated, quadratically: linear
+    // interpolation would shrink convex shapes from image to image.
     Vec3 whole, part;
     for (int a = 0; a < 3; ++a) {
         whole[a] = std::round(translation_[a] / h_);

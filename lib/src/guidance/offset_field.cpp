@@ -16,9 +16,9 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 
 // Relative residual for conjugate gradients. The field's range is a few patches, so that about ten iterations suffice
-// for any number of patches, whereas the work of a factorization grows with the power 1.5 (86,000 patches: 8 s to 0.07
-// s). Incomplete factors take longer to compute than they save. The choice between priors requires such a small
-// residual: with 1e-5 another may be chosen, and the surface of a spleen moves by 0.05 voxels.
+// for any number of patches, whereas the work of a factorization grows with the power 1.5 of it (86,000 patches: 8 s
+// instead of 0.07 s). An incomplete factorization takes longer than it saves. The choice between priors requires this
+// accuracy: with 1e-5 another prior may be chosen, and the surface of a spleen then moves by 0.05 voxels.
 constexpr double kSolved = 1e-8;
 
 }  // namespace
@@ -91,7 +91,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     const std::vector<double> pull = *precision_ * field;
     std::vector<double> site(count, 0.0), prior_precision(count), known(count, 0.0), right(count);
     for (int round = 0; round < (requested ? kCommon.rounds : 1); ++round) {
-        // The value of the field at a patch is the prediction from its neighbours; its precision grows with theirs.
+        // The current offset of a patch is used as its prior mean; its precision grows with that of its neighbours.
         for (std::size_t i = 0; i < count; ++i) {
             prior_precision[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
             for (const std::uint32_t j : patches_.neighbours[i])

@@ -15,33 +15,33 @@ struct OffsetEvidence {
     std::vector<float> density;  ///< mean 1; empty: unknown
 };
 
-/// A smooth random field of offsets on the patches, with the guess as its mean.
+/// A Gaussian random field of offsets on the patches, smooth along the surface.
 class OffsetField {
 public:
-    /// @param range      correlation length of the offsets
-    /// @param deviation  by patch, prior standard deviation
+    /// @param range  correlation length of the offsets
     OffsetField(const Patches& patches, double range);
     ~OffsetField();
 
     struct Fit {
         std::vector<double> offset;
-        std::vector<double> precision;  ///< of the image's offset, 1 / variance
-        std::vector<double> carried;    ///< response of the offsets to a shift of the prior's mean
+        std::vector<double> precision;  ///< 1 / variance of the offset according to the image alone
+        std::vector<double> carried;    ///< change of the offsets if `shift` is added to the prior's mean
     };
     /// @param mean, deviation  the prior, by patch
     /// @param evidence         by patch
-    /// @param fixed, fixed_precision  further known offsets (marks), by patch
-    /// @param shift  of the prior's mean, for Fit::carried; may be null
+    /// @param fixed, fixed_precision  offsets known from marks and their 1 / variance, by patch; precision 0: unknown
+    /// @param shift  a change of the prior's mean, for Fit::carried; may be null
     [[nodiscard]] Fit fit(const std::vector<double>& mean, const std::vector<double>& deviation,
                           const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,
                           const std::vector<double>& fixed_precision, const std::vector<double>* shift) const;
 
 private:
     const Patches& patches_;
-    std::unique_ptr<SquaredMatrix> precision_;  // of the field of unit variance
+    std::unique_ptr<SquaredMatrix> precision_;  // precision matrix of the field with unit variance
 };
 
-/// Mean and variance of a density times a normal distribution. @return its mass relative to that of the normal one.
+/// Mean and variance of the product of a density and a normal distribution. @return the mass of the product relative to
+/// that of the normal distribution.
 double moments(const OffsetEvidence& evidence, double mean, double variance, double& new_mean, double& new_variance);
 
 }  // namespace covol::guidance

@@ -36,8 +36,8 @@ void smooth_normals(SurfaceVertices& surface, int rounds) {
     }
 }
 
-/// A cell of the image's lattice and the direction that the surface faces: the two sides of a sheet are separate
-/// patches.
+/// Sorts vertices by the cell of a lattice along the image's axes and by the axis direction closest to their normals:
+/// the two sides of a thin body belong to separate patches.
 struct VertexKey {
     std::uint64_t ij, k_face;
     std::uint32_t vertex;
@@ -97,12 +97,13 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, double smooth) {
         const double area =
             length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
         for (int c = 0; c < 3; ++c) {
-            // In a closed surface every directed edge belongs to exactly one triangle.
+            // In a closed surface every directed edge belongs to one triangle, so that each neighbour is added once.
             surface.neighbours[fill[t[c]]++] = t[(c + 1) % 3];
             surface.area[t[c]] += area / 6;
         }
     }
-    // A round averages a vertex and its six neighbours, about 0.9 voxels away: the mean squared distance grows by 2/3.
+    // A round averages over a vertex and its neighbours, about six at a distance of about 0.9 voxels: the mean squared
+    // distance of the vertices that are averaged grows by 2/3.
     smooth_normals(surface, int(std::lround(1.5 * smooth * smooth)));
     return surface;
 }
@@ -171,8 +172,8 @@ void find_borders(SurfaceVertices&& surface, Patches& p) {
     for (const auto& [a, b, length] : crossing) {
         if (p.borders.empty() || p.borders.back().a != a || p.borders.back().b != b)
             p.borders.push_back({a, b, 0, std::sqrt(detail::squared_distance(p.centers[a], p.centers[b]))});
-        // Each edge was counted from both ends; on a triangular lattice its part of the border is 1/sqrt(3) of its
-        // length.
+        // Each edge was counted from both ends. On a lattice of equilateral triangles the length of the border that
+        // crosses an edge is 1/sqrt(3) of the edge's length.
         p.borders.back().length += 0.5 * length / std::sqrt(3.0);
     }
     p.neighbours.resize(p.size());

@@ -7,14 +7,14 @@
 
 namespace covol::guidance {
 
-/// A surface's vertices: the data that do not depend on how it is cut.
+/// A surface's vertices: the data that do not depend on how it is cut into patches.
 struct SurfaceVertices {
     std::vector<Vec3> places, normals;
     std::vector<double> area;                      ///< a third of the area of the triangles around it
-    std::vector<std::uint32_t> first, neighbours;  ///< of vertex v neighbours[first[v] .. first[v+1]), each once
+    std::vector<std::uint32_t> first, neighbours;  ///< vertex v: neighbours[first[v] .. first[v+1])
 };
 
-/// @param mesh    closed, outward
+/// @param mesh    closed, with outward normals
 /// @param smooth  distance over which normals are averaged, voxels
 [[nodiscard]] SurfaceVertices vertices_of(const TriangleMesh& mesh, double smooth);
 
@@ -27,22 +27,22 @@ struct Patches {
     std::vector<std::uint32_t> first, members;  ///< patch p has the vertices members[first[p] .. first[p+1])
     std::vector<Vec3> centers, directions;      ///< mean position, mean normal
     std::vector<double> area;
-    std::vector<double> voxel;  ///< the image's voxel along the normal, world units
+    std::vector<double> voxel;  ///< voxel_along() the patch's normal, world units
     struct Border {
         std::uint32_t a, b;
         double length, distance;
     };
     std::vector<Border> borders;
-    std::vector<std::vector<std::uint32_t>> neighbours;  ///< by patch: those with which it has a border
+    std::vector<std::vector<std::uint32_t>> neighbours;  ///< by patch: the patches with which it has a border
 
     [[nodiscard]] std::size_t size() const { return centers.size(); }
 };
 
-/// Cuts into patches without computing borders, so that a surface may be cut more than once before find_borders().
-/// @param width   of the patches; at least one voxel of the image along each of its axes
+/// Cuts a surface into patches without computing borders, so that it may be cut more than once before find_borders().
+/// @param width   of the patches; along each axis of the image at least one voxel is used
 [[nodiscard]] Patches cut_patches(const SurfaceVertices& vertices, const ImageGeometry& geometry, double width);
 
-/// Fills borders and neighbours, and the data by vertex, from the vertices that were cut.
+/// Fills in borders, neighbours, places and normals. @param vertices  those that were passed to cut_patches()
 void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
 /// Interpolates values of patches to a smooth function on the vertices.
@@ -50,7 +50,7 @@ void find_borders(SurfaceVertices&& vertices, Patches& patches);
 [[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
                                               const std::vector<double>& by_patch);
 
-/// The edge of the image's voxels along a unit vector.
+/// The root mean square of the edges of the image's voxels, weighted by the components of a unit vector.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);
 
 }  // namespace covol::guidance

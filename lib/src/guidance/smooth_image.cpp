@@ -76,8 +76,8 @@ void SmoothImage::smooth(int axis, double sigma) {
         for (int n1 = 0; n1 < size_[a1]; ++n1) {
             float* base = values_.data() + n1 * stride1 + n2 * stride2;
             const auto at = [&](int n) { return base[std::size_t(std::clamp(n, 0, count - 1)) * stride]; };
-            // Beyond its end the image is continued by reflection about the last value: if that were repeated, a body
-            // that tapers towards the end would appear as wide at the end as a little before it.
+            // Beyond its end the image is continued by reflection about the last value: if that value were repeated,
+            // a body that tapers towards the end would appear as wide at the end as a little before it.
             for (int n = -radius; n < count + radius; ++n)
                 line[n + radius] = n < 0        ? 2 * at(0) - at(-n)
                                    : n >= count ? 2 * at(count - 1) - at(2 * (count - 1) - n)

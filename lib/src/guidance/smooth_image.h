@@ -11,14 +11,14 @@ namespace covol::guidance {
 class SmoothImage {
 public:
     /// @param box    world; the part that is sampled
-    /// @param sigma  Gaussian, world units: along axes with longer voxels it hardly smooths
+    /// @param sigma  standard deviation of the Gaussian, world units; not applied along axes with spacing > sigma / 0.3
     /// @throws Error InvalidOptions if it takes more than run.memory_budget
     SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run = {});
 
-    /// Positions at equal steps.
+    /// Equidistant positions on a line.
     class Line {
     public:
-        /// False outside the image (half a voxel beyond its last centres).
+        /// Returns false outside the image, which ends half a voxel beyond its last voxel centres.
         bool sample(int step, float& value) const {
             return image_->at({first_[0] + step * step_[0], first_[1] + step * step_[1], first_[2] + step * step_[2]},
                               value);
@@ -29,7 +29,7 @@ public:
         const SmoothImage* image_ = nullptr;
         Vec3 first_{}, step_{};  // as indices of the part
     };
-    /// @param step  world
+    /// @param step  world units
     [[nodiscard]] Line along(const Vec3& first, const Vec3& step) const;
     [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
 
@@ -40,7 +40,7 @@ private:
     Matrix3 to_index_{};
     Vec3 offset_{};
     Index3 size_{0, 0, 0};       // of the part
-    Vec3 low_{}, high_{};        // of the image, as indices of the part
+    Vec3 low_{}, high_{};        // ends of the image, as indices of the part
     std::vector<float> values_;  // i fastest
 };
 

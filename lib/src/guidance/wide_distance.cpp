@@ -18,7 +18,7 @@ std::vector<Vec3> to_index(const Domain& domain, const std::vector<Vec3>& world)
     return index;
 }
 
-/// In the order of the field's leaves.
+/// The grid's leaves at the places of the field's leaves, in the same order; missing ones are created.
 std::vector<Leaf*> touched(FloatGrid& grid, const detail::NearestField& nearest) {
     std::vector<Leaf*> leaves;
     for (const detail::NearestLeaf& leaf : nearest.leaves) leaves.push_back(grid.tree().touchLeaf(leaf.origin));

@@ -29,7 +29,7 @@ double squared_length(const Point& a, const Point& b) {
 
 bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCommon.turn * std::sqrt(dot(a, a) * dot(b, b)); }
 
-/// Moves vertices close to the line onto it; their value becomes 0 even if the move is undone.
+/// Moves vertices close to the line onto it. Their values become 0 even if the move is undone because triangles turn.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
     std::vector<float> closest(values.size(), kCut.close);
     std::vector<Point> moved = vertices;
@@ -65,7 +65,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
     vertices = std::move(tried);
 }
 
-/// Divides triangles along the line.
+/// Divides triangles along the line on which the value is 0.
 class Splitter {
 public:
     Splitter(const TriangleMesh& mesh, std::vector<float> values) : values_(std::move(values)) {

@@ -6,10 +6,10 @@
 
 namespace covol::holes {
 
-/// Triangles that each lie on one side.
+/// A mesh whose triangles each lie on one side of a cut.
 struct CutMesh {
     TriangleMesh mesh;
-    std::vector<char> kept;  ///< of each triangle: whether the value is above 0
+    std::vector<char> kept;  ///< for each triangle, whether the value on it is above 0
 };
 /// Cuts along the line at which a value, linear on each triangle, is 0. Vertices close to it are moved onto it along an
 /// edge to avoid slivers; the others keep their positions and numbers.

@@ -6,9 +6,10 @@ namespace covol {
 
 /// Holes of a cloud: holes.cpp.
 struct HolesHeuristics {
-    /// [spacings, and voxels] Automatic distance to the points from which on a surface is a hole.
+    /// [spacings, and voxels] Automatic distance from the points beyond which a surface is a hole: the larger one.
     double far = heuristic("holes.far", 3);
-    /// [fraction of that distance] Smoothing width of the rim: removes undulations shorter than about three times that.
+    /// [fraction of that distance] Standard deviation of the smoothing of the rim: removes undulations shorter than
+    /// about three standard deviations.
     double smoothing = heuristic("holes.smoothing", 0.5);
 };
 COVOL_HEURISTICS HolesHeuristics kHoles{};

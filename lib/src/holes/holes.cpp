@@ -18,7 +18,7 @@
 namespace covol {
 namespace {
 
-// 95th percentile of the distance to the nearest neighbour for evenly random points, in spacings of 1 / sqrt(density)
+// 95th percentile of the nearest-neighbour distance of uniformly random points on a surface, times sqrt(density)
 constexpr double kP95OfSpacing = 0.976;
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -27,8 +27,8 @@ double area_of(const TriangleMesh& mesh, const Triangle& t) {
     return meshing::area(mesh.place(t[0]), mesh.place(t[1]), mesh.place(t[2]));
 }
 
-/// Step of a diffusion, as a fraction of the way to the neighbours' mean: the largest at which no wave overshoots, even
-/// one that the mean reverses. It is not decisive, because the number of steps follows from it.
+/// Step of a diffusion, as a fraction of the way to the neighbours' mean: the largest one that reverses no component,
+/// even if the mean reverses it. It hardly changes the result, because the number of steps follows from it.
 constexpr float kStep = 0.5F;
 
 /// Diffusion over the mesh: approximately a Gaussian of standard deviation `width` if the triangles are even.
@@ -53,7 +53,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
     }
 }
 
-/// Vertices connected by triangles of one kind.
+/// The sets of vertices that are connected by kept triangles, or by the others.
 detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     detail::DisjointSets parts(cut.mesh.vertices.size());
     for (std::size_t t = 0; t < cut.kept.size(); ++t) {
@@ -64,8 +64,8 @@ detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     return parts;
 }
 
-/// Finds the triangles to be removed and those to be kept: kept are those that no ball of radius `distance` around a
-/// bare position reaches.
+/// Finds the triangles to be removed and those to be kept: those that no ball of radius `distance` - `slack` around a
+/// bare position reaches are kept, except small pieces.
 class HoleFinder {
 public:
     HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)
@@ -89,8 +89,8 @@ public:
     }
 
 private:
-    /// The positions farther than the distance from all points: vertices, and the points at which edges cross that
-    /// distance.
+    /// The bare positions: vertices farther than the distance from all points, and positions on edges at which the
+    /// interpolated distance to the points is this distance.
     [[nodiscard]] std::vector<Vec3> bare_places() const {
         const auto far = float(distance_);
         std::vector<Vec3> places;
@@ -108,7 +108,8 @@ private:
         return places;
     }
 
-    /// Distance from the bare positions minus the reach, limited to plus or minus the reach; smoothed.
+    /// For each vertex the distance to the bare positions minus the reach, limited to plus or minus the reach, and
+    /// smoothed.
     [[nodiscard]] std::vector<float> from(const std::vector<Vec3>& bare) const {
         std::vector<float> values(to_points_.size(), float(reach_));
         if (bare.empty()) return values;
@@ -122,7 +123,8 @@ private:
         return values;
     }
 
-    /// Removes small kept pieces that border a hole. @return how many
+    /// Removes kept pieces that border a hole and are smaller than a disc whose radius is the distance.
+    /// @return how many
     std::size_t drop_small(holes::CutMesh& cut) const {
         detail::DisjointSets parts = parts_of(cut, true);
         std::vector<char> ends(cut.mesh.vertices.size(), 0);
@@ -204,7 +206,7 @@ double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float
 }
 
 std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
-    // Sides of only one triangle, by their first vertex.
+    // A side is on the boundary if no triangle has it in the other direction.
     std::vector<std::pair<std::uint32_t, std::uint32_t>> sides;
     for (const Triangle& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) sides.emplace_back(t[k], t[(k + 1) % 3]);

@@ -14,11 +14,11 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-// Solutions with updated cotangents: Pinkall and Polthier, Computing discrete minimal surfaces, Exp. Math. 2(1), 1993.
-// The iteration converges, usually in fewer rounds.
+// Maximum number of solutions, each with the cotangents of the previous one: Pinkall and Polthier, Computing discrete
+// minimal surfaces, Exp. Math. 2(1), 1993. The iteration usually converges in fewer rounds.
 constexpr int kMaxRounds = 20;
-// Weights are between this cotangent and its inverse, because triangles without area have none: not decisive, because
-// such triangles contribute no area.
+// Weights are limited to between this cotangent and its inverse, because triangles without area have no cotangents. The
+// limit hardly matters, because such triangles contribute no area.
 constexpr double kMinWeight = 1e-3;
 
 /// Cotangent of the angle between two sides; 0 if they are parallel.
@@ -50,8 +50,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                 if (fixed[a] && fixed[b]) continue;
                 const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
                                       v = at.row(b).transpose() - tip;
-                // At first, all edges have the same weight: that distributes the vertices of a bulge over the future
-                // surface.
+                // In the first round, all edges have the same weight: this distributes the vertices of a bulge over
+                // the future surface.
                 const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kMinWeight, 1 / kMinWeight);
                 edges += (u - v).norm();
                 ++edge_count;

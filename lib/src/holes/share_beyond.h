@@ -7,8 +7,8 @@
 
 namespace covol::detail {
 
-/// The measures of a level set's plain surface, and the fraction of its area that is farther than `distance` from all
-/// points: like measure_fraction_beyond(), but without holding the mesh in memory.
+/// The measures of the mesh extracted from a level set, and the fraction of its area that is farther than `distance`
+/// from all points: like measure_fraction_beyond(), but without holding the mesh in memory.
 struct BeyondPoints {
     StreamedMesh mesh;
     double fraction = 0;

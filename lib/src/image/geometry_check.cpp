@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-/// Sheared axes are accepted, but not axes that lie in a plane. @throws Error Unsupported.
+/// Requires axes of length 1 that do not lie in a plane; they may be sheared. @throws Error Unsupported.
 void check_direction(const std::string& where, const ImageGeometry& g) {
     constexpr double kTolerance = 1e-3, kMinVolume = 0.05;
     const Matrix3& d = g.direction;

@@ -13,18 +13,18 @@
 namespace covol {
 namespace {
 
-/// Number of voxels of the finest level for one of a coarser level along an axis; 0 if it is not an integer.
+/// Number of voxels of the finest level along an axis per voxel of a coarser level; 0 if it is not an integer.
 std::int32_t factor_along(const ImageGeometry& finest, const ImageGeometry& coarse, std::size_t a) {
     constexpr double kSame = 1e-3;
     const double by_spacing = coarse.spacing[a] / finest.spacing[a];
     const double by_size = double(finest.size[a]) / coarse.size[a];
     const auto fits = [&](double factor) {
-        // The last coarse voxel may cover fewer fine ones, or some fine ones may not be covered.
+        // The last coarse voxel may cover fewer fine voxels than the others, or some fine voxels may not be covered.
         return factor >= 1 && std::abs(finest.size[a] - factor * coarse.size[a]) <= factor;
     };
     const double factor = std::round(by_spacing);
     if (std::abs(by_spacing - factor) < kSame * factor && fits(factor)) return std::int32_t(factor);
-    // For files that do not state the spacing.
+    // In files that do not state the spacings of coarser levels, these equal that of the finest level.
     const double factor_by_size = std::exp2(std::round(std::log2(by_size)));
     return coarse.spacing[a] == finest.spacing[a] && fits(factor_by_size) ? std::int32_t(factor_by_size) : 0;
 }

@@ -16,7 +16,7 @@ namespace {
 struct LatticeMap {
     Matrix3 matrix{};
     Vec3 offset{};
-    std::array<int, 3> image_axis{-1, -1, -1};  ///< if separable, the only image axis that changes along a frame axis
+    std::array<int, 3> image_axis{-1, -1, -1};  ///< if separable, the image axis along each frame axis
     bool separable = true;
 };
 
@@ -45,7 +45,7 @@ struct Tap {
     double weight = 0;
 };
 
-/// An axis of the image: number of voxels, index of the first one in memory, and their distance in memory.
+/// An axis of the image: number of voxels, index of the first voxel in memory, and distance of voxels in memory.
 struct Axis {
     std::int32_t size = 0;
     std::int32_t first = 0;
@@ -124,7 +124,7 @@ void sample_affine(const T* data, const Lattice& image, const LatticeMap& map, c
         }
 }
 
-/// The voxels that samples at min..max need; the extremes of an affine map are at corners.
+/// The voxels that samples at the frame indices min to max need; the extremes of an affine map are at corners.
 VoxelBox needed_voxels(const LatticeMap& map, const Index3& size, const Index3& min, const Index3& max) {
     VoxelBox box;
     for (int a = 0; a < 3; ++a) {
@@ -148,7 +148,7 @@ void Image::load(const Domain& frame, const std::vector<VoxelBox>& boxes, const 
     std::vector<VoxelBox> needed;
     for (const VoxelBox& box : boxes) {
         const VoxelBox part = needed_voxels(map, geometry_.size, box.min, box.max);
-        // sample() rejects voxels that are not held
+        // sample() throws if voxels are needed that are not held
         if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
     }
     with_threads(run, [&] { chunks_->load(needed, run); });

@@ -53,8 +53,8 @@ MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     return all;
 }
 
-constexpr double kSamples = 4e6;         ///< for percentiles
-constexpr double kQuickBytes = 1 << 28;  ///< can be read in a second or two
+constexpr double kSamples = 4e6;         ///< number of values from which percentiles are computed
+constexpr double kQuickBytes = 1 << 28;  ///< amount that can be read in a second or two
 
 }  // namespace
 
@@ -74,7 +74,7 @@ std::vector<T> Image::values_of_chunks(double maximum) const {
     };
     for (const std::uint64_t chunk : chunks_->read_chunks()) add(chunk);
     if (boxes.empty()) {
-        constexpr int kPlaces = 3;  // along each axis
+        constexpr int kPlaces = 3;  // number of sampled chunks along each axis
         std::vector<VoxelBox> places;
         for (int n = 0; n < kPlaces * kPlaces * kPlaces; ++n) {
             Index3 voxel;
@@ -105,7 +105,7 @@ const T* Image::row(int j, int k) const {
 }
 
 std::uint64_t Image::slice_bytes() const {
-    // from the first held pixel to the last
+    // from the first held pixel of a slice to the last one
     const Index3 n = held_.size();
     return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) +
             1) *

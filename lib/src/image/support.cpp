@@ -13,7 +13,8 @@ namespace {
 constexpr int kWindow = 4, kBeside = 10;  // half steps
 constexpr int kReach = 10, kPlaces = 2 * kReach + 1;
 
-/// The sampling positions along the normal of a place, as voxels of the image, and their values.
+/// Voxels and values of the image at multiples of half a step along the normal at a place. Negative positions are
+/// before the place, positive ones behind it.
 class Profile {
 public:
     Profile(const Image& image, const Vec3& place, const Vec3& normal, double step)
@@ -38,7 +39,7 @@ public:
         if (!image_.held().contains(index)) return {};
         return index;
     }
-    /// Maximum minus minimum value; none if the window leaves the image.
+    /// Maximum minus minimum value within kWindow half steps; none if these leave the image.
     [[nodiscard]] std::optional<double> range(int around) const {
         double minimum = std::numeric_limits<double>::infinity(), maximum = -minimum;
         for (int at = around - kWindow; at <= around + kWindow; ++at) {
@@ -50,7 +51,7 @@ public:
         return maximum - minimum;
     }
 
-    /// Difference of the two voxels behind and the two before; none if they leave the image.
+    /// Sum of the two values behind minus that of the two before the position; none if these leave the image.
     [[nodiscard]] std::optional<double> slope(int around) const {
         double difference = 0;
         for (const int at : {1, 2})
@@ -61,8 +62,8 @@ public:
             }
         return difference;
     }
-    /// Sum of the three voxels around a place, minus the mean of the sums of the three voxels two steps before and
-    /// behind; none if they leave the image.
+    /// Sum of the three values around the position, minus the mean of the same sums two steps before and two steps
+    /// behind it; none if these leave the image.
     [[nodiscard]] std::optional<double> ridge(int around) const {
         double sum = 0;
         for (const int beside : {-4, 0, 4})
@@ -79,7 +80,7 @@ private:
     Vec3 middle_, half_;
 };
 
-/// The profiles of the places. Loads the voxels up to `reach` half steps before and behind.
+/// The profiles of the places. Loads the image up to `reach` half steps before and behind each place.
 std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                                  double step, int reach, const RunContext& run) {
     std::vector<Profile> profiles;
@@ -98,7 +99,7 @@ std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& pl
 
 using Strengths = std::array<std::optional<double>, kPlaces>;
 
-/// Mean over the lines that have a value at this position; 0 if these are fewer than half.
+/// Mean over the lines with a value at this position; 0 if fewer than half of the lines have one.
 double mean_strength(const std::vector<Strengths>& lines, int at) {
     double sum = 0;
     std::size_t count = 0;

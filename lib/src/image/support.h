@@ -6,16 +6,17 @@
 
 namespace covol::detail {
 
-/// Whether an image varies more at certain places than beside them, no matter whether by a step or a line.
+/// Whether an image varies more at certain places than beside them, be it at a step or a line of intensity.
 struct ImageSupport {
     std::size_t places = 0;  ///< number of places that lie in the image together with the windows beside them
-    double fraction = 0;     ///< probability that the range at a place exceeds the one beside a place; ties count half
+    double fraction = 0;     ///< probability that the range at a place exceeds a range beside one; ties count half
     double error = 0;        ///< standard error of `fraction`
 };
 
-/// Compares the range of the nearest voxels within two steps of each place along its normal with the same around the
-/// points five steps before and behind it. The result is the area under the receiver operating characteristic, computed
-/// from ranks (Mann and Whitney), with the standard error for two samples of the same distribution.
+/// Compares the range of the nearest voxels' values within two steps of each place along its normal with the ranges
+/// around the points five steps before and behind it. The result is the area under the receiver operating
+/// characteristic, computed from ranks (Mann and Whitney), with the standard error for two samples of the same
+/// distribution.
 /// @param places, normals  world units, the same number of both; normals of length 1
 /// @param step  world units; if a voxel is longer along a normal, its length is used instead
 /// @throws Error as Image::load().
@@ -26,19 +27,19 @@ struct ImageSupport {
 /// on each side.
 enum class BorderKind { Slope, Line };
 
-/// The position of the strongest border, in the mean over lines across a surface. If marks are on a border, it is at
-/// the surface.
+/// The position of the strongest border, in the mean over lines across a surface. If the marks of the surface are on a
+/// border, this position is 0.
 struct StrongestBorder {
     std::size_t lines =
-        0;  ///< number of lines used, along which both the surface and the strongest border are in the image
-    double fraction = 1;  ///< mean strength at the surface, within a step, relative to the strongest; signs are ignored
+        0;  ///< number of lines used: those on which both the surface and the strongest border are in the image
+    double fraction = 1;  ///< maximum within a step of the surface, relative to the strongest; signs are ignored
     int at = 0;           ///< position in steps from the surface, along the normals
-    double errors = 0;    ///< difference of the two strengths in standard errors of the mean
+    double errors = 0;    ///< mean difference of these two strengths, in its standard errors
 };
 
 /// Computes the mean strength of a border at whole steps up to ten before and behind each place along its normal, from
-/// nearest voxels. The strength of a slope is the difference between two voxels on each side, that of a line the
-/// difference between its intensity and the intensity two voxels before and behind. Arguments and errors as in
+/// nearest voxels. The strength of a slope is the difference between two values on each side, that of a line the
+/// difference between its intensity and the intensity two steps before and behind. Arguments and errors as in
 /// measure_support().
 [[nodiscard]] StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3>& places,
                                                     const std::vector<Vec3>& normals, double step, BorderKind kind,

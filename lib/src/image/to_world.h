@@ -8,7 +8,7 @@ namespace covol::detail {
 
 /// Factor from lengths of a cloud to those of the image; 1 if either of them has no known unit.
 [[nodiscard]] double unit_factor(const PointCloud& cloud, const ImageGeometry& geometry);
-/// Scales the components of a position that are lengths, but not voxels and slices.
+/// Scales those components of a position that are lengths, not those that count voxels or slices.
 [[nodiscard]] Vec3 scaled(PointSpace space, const Vec3& p, double factor);
 
 }  // namespace covol::detail

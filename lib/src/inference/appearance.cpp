@@ -12,9 +12,9 @@
 namespace covol::inference {
 namespace {
 
-constexpr double kFeatureSigmas[kScales] = {0.6, 1.2, 2.4};  // finest cells
+constexpr double kFeatureSigmas[kScales] = {0.6, 1.2, 2.4};  // [cells]
 constexpr int kRounds = 20;
-constexpr double kConverged = 1e-2;  // fraction of a standardised term's weight
+constexpr double kConverged = 1e-2;  // change of a coefficient below which the iteration ends
 
 }  // namespace
 

@@ -7,7 +7,8 @@
 
 namespace covol::inference {
 
-/// Features of a position: smoothed intensity, slope and Laplacian at several scales, and the guess.
+/// Features of a position: smoothed intensity, its slope (the magnitude of the gradient) and its Laplacian at several
+/// scales, and two features of the guess.
 inline constexpr int kScales = 3, kOfImage = 3 * kScales, kFeatures = kOfImage + 2;
 using Features = std::array<float, kFeatures>;
 
@@ -22,8 +23,8 @@ public:
         for (int f = 0; f < kOfImage; ++f) all[std::size_t(f)] = (*this)[f][node];
         return all;
     }
-    /// The cost of surface at each node by the slope there, in (0,1]: one half if the slope is the median of that at
-    /// the given positions, which lie on the surface.
+    /// The cost of surface at each node, in (0,1]. It decreases with the slope, and is one half if the slope equals its
+    /// median at the given positions, which lie on the surface.
     [[nodiscard]] Field edge(const Lattice& lattice, const std::vector<Vec3>& places) const;
     /// The slope at the scale that determines the weight of edges.
     [[nodiscard]] const Field& slope() const { return fields_[4]; }
@@ -34,7 +35,7 @@ private:
     std::array<Field, kOfImage> fields_;
 };
 
-/// At most `maximum` of the nodes, evenly selected.
+/// At most `maximum` of the nodes, selected at regular intervals.
 [[nodiscard]] std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t maximum);
 
 struct Sample {
@@ -58,8 +59,8 @@ private:
     std::array<float, kTerms> weights_{};
 };
 
-/// Information of a regression about the folds on which it was not trained, bits for each sample: 1 is perfect
-/// prediction, 0 none.
+/// Information in bits per sample that a regression gives about the side of samples in folds on which it was not
+/// trained: 1 for a perfect prediction, 0 for none.
 [[nodiscard]] double held_out_bits(const std::vector<Sample>& samples, int folds);
 
 }  // namespace covol::inference

@@ -25,12 +25,12 @@ using guess::VariationalSurface;
 
 constexpr double kOffsets[] = {0.75, 1.5, 2.5, 3.5};  // distance from a mark, cells
 constexpr int kAllFolds = -1;                         // fold of a sample that is never left out
-constexpr std::size_t kElsewhere = 300;               // samples not taken at marks
-// Number of training marks beside the spread ones: the 55 terms are fitted as well with these, in a fraction of the
-// time.
+constexpr std::size_t kElsewhere = 300;               // maximum number of samples for each call of add_nodes()
+// Maximum number of training marks in addition to the spread ones: the 78 terms are fitted equally well with these, in
+// a fraction of the time.
 constexpr std::size_t kMarksBesideSpread = 300;
 constexpr std::size_t kFewestSamples = 40;
-constexpr int kIterations = 150;  // of minimize_surface(), which ends by itself before unless it converges slowly
+constexpr int kIterations = 150;  // maximum for minimize_surface(), which usually converges earlier
 
 template <typename Visit>
 void for_each_row(const Lattice& lattice, const Visit& visit) {
@@ -70,7 +70,7 @@ public:
                                    middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
         side_ = far < 0 ? -1 : 1;
     }
-    /// Through some of the marks of another surface, near its normals.
+    /// Through some of the marks of another surface, with normals near those of that surface.
     GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal,
                    const GuessedSurface& whole, const std::vector<Vec3>& normals)
         : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
@@ -89,8 +89,8 @@ private:
     double side_ = 1;
 };
 
-/// The guess as two features: its value, and its value reduced with increasing distance from the marks that it was made
-/// of.
+/// The guess as two features: its value, and its value reduced with increasing distance from the marks from which
+/// it was computed.
 void add_guess(double value, double to_mark, double cell, Features& features) {
     constexpr double kFarCells = 8, kFading = 0.3;
     const double cells = value / cell;
@@ -104,7 +104,7 @@ public:
     Samples(const Scene& scene, const GuessedSurface& whole)
         : scene_(scene), whole_(whole), cell_(scene.lattice.finest()) {}
 
-    /// Along the normals of the marks, each with a guess that was made without this mark.
+    /// Adds samples along the normals of the marks, each with the value of a guess that was computed without the mark.
     void add_marks(const Proposal& proposal) {
         const Marks& marks = scene_.marks;
         std::vector<Vec3> normals(marks.places.size());
@@ -118,7 +118,7 @@ public:
             try {
                 held[std::size_t(fold)].emplace(GuessedSurface(marks, rest, proposal, whole_, normals),
                                                 detail::KdTree(at(marks.places, rest)));
-            } catch (const Error&) {  // no surface without this fold: it gives no samples
+            } catch (const Error&) {  // no surface through the other folds: no samples at this one
             }
         });
         const detail::KdTree tree(at(marks.places, marks.spread));
@@ -148,7 +148,7 @@ public:
         of_marks_ = all_.size();
     }
 
-    /// Nodes whose side is known; together they count half as much as the marks.
+    /// Adds nodes whose side is known; their total weight is half of that of the samples at marks.
     void add_nodes(const std::vector<std::size_t>& nodes, bool inside) {
         const std::vector<std::size_t> some = some_of(nodes, kElsewhere);
         for (const std::size_t n : some) {
@@ -209,7 +209,7 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
             const double above =
                 std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.above_hull);
             double value = std::clamp(appearance.log_odds(at), -maximum, maximum);
-            value = std::max(value - maximum * above, -maximum);  // a spacing higher, the side is certain
+            value = std::max(value - maximum * above, -maximum);  // decreases with the height above the hull
             if (refine != nullptr) {
                 const double off = refine->lattice.value(coarse, lattice.place(i, j, k)) / refine->lattice.finest();
                 if (std::abs(off) > kHalfWidthVoxels) value = off < 0 ? maximum : -maximum;
@@ -237,7 +237,7 @@ Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
     return solve_body(lattice, weight, cost, std::move(u), run);
 }
 
-/// Drops parts with few marks; empty if nothing remains, or everything is inside.
+/// Drops parts near few marks. The solid becomes empty if no node or every node is inside.
 void keep_marked_parts(const Scene& scene, Solid& solid) {
     const Parts parts = label_parts(solid.lattice, solid.inside);
     std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
@@ -277,9 +277,9 @@ double area_of(const Solid& solid) {
     return area / kStairs;
 }
 
-/// Log likelihood of a mark. Marks are uniformly distributed on the surface, so that they are the less likely the
-/// larger it is, and the farther they lie off it. The bits that the image gives about both sides of held-out marks are
-/// added.
+/// Log likelihood of a mark. Marks are assumed to be uniformly distributed on the surface, so that the likelihood
+/// decreases with its area and with their distances from it. The bits that the image gives about both sides of
+/// held-out marks are added.
 double score_of(const Scene& scene, const Solid& solid, double bits) {
     const double cell = solid.lattice.finest();
     const Field distance = signed_distance(solid.lattice, solid.inside);
@@ -329,7 +329,7 @@ Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost,
 }
 
 Field Solid::level() const {
-    constexpr double kCells = 0.7;  // enough to smooth the stairs
+    constexpr double kCells = 0.7;  // enough to smooth the steps between cells
     return smooth(lattice, signed_distance(lattice, inside), kCells * lattice.finest());
 }
 

@@ -2,11 +2,11 @@
 // The body that follows from the image and a proposal for the normals:
 // 1. The surface of minimum bending energy through the marks, its normals attracted to given axes
 //    (guess/variational.h).
-// 2. Samples on both sides of the marks along these normals, with a guess that was made without them, train the log
-//    odds of inside against outside (appearance.h).
-// 3. The body of minimum surface with these odds (minimal_surface.h). Surface costs little on the image's edges and at
-//    marks, and much far from any mark. Above the marks' convex hull a body is improbable, because people mark a
-//    structure on all sides.
+// 2. Samples on both sides of the marks along these normals, each with the value of a guess that was computed without
+//    the mark, train the log odds of inside against outside (appearance.h).
+// 3. The body that minimises its weighted surface area and the log odds against it (minimal_surface.h). Surface costs
+//    little on the image's edges and at marks, and much far from any mark. Above the marks' convex hull a body is
+//    improbable, because people mark a structure on all sides.
 #include <memory>
 #include <vector>
 
@@ -17,7 +17,7 @@
 
 namespace covol::inference {
 
-/// [cells] Maximum distance from a mark to a surface; beyond it all misses count the same.
+/// [cells] Distances from marks to a surface are limited to this.
 constexpr double kFarthestMiss = 4;
 
 /// What is known at a lattice's nodes before any candidate is computed.
@@ -28,7 +28,7 @@ struct Scene {
     Field to_mark;                                         ///< distance to the nearest mark
     Field edge;                                            ///< in (0,1]: cost of surface by the image's slope alone
     Field above_hull;                                      ///< height above the marks' convex hull
-    std::vector<std::size_t> known_inside, known_outside;  ///< nodes beside positions whose side is known
+    std::vector<std::size_t> known_inside, known_outside;  ///< nodes around positions whose side is known
 
     Scene(const Image& image, const Lattice& lattice, const Marks& marks, const RunContext& run);
     /// The same image with other marks.
@@ -41,7 +41,7 @@ private:
 /// A body on a lattice.
 struct Solid {
     Lattice lattice;
-    std::vector<char> inside;  ///< by node; empty if there is none
+    std::vector<char> inside;  ///< by node; empty if there is no body
 
     [[nodiscard]] bool empty() const { return inside.empty(); }
     /// Approximate signed distance to its surface, smoothed by less than a cell.
@@ -52,12 +52,12 @@ struct Solid {
 [[nodiscard]] Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u,
                                const RunContext& run);
 
-/// Log odds at known positions, in units of the maximum that the image may give.
+/// Log odds at known positions, as a multiple of the maximum for the image, kInference.max_odds.
 inline constexpr double kKnown = 4;
 
 /// The source of a candidate's normals.
 struct Proposal {
-    std::vector<Vec3> axes;  ///< of each mark, as strong as the bending energy; empty: from the marks alone
+    std::vector<Vec3> axes;  ///< by mark: lines along which normals probably lie; empty: unknown
     guess::Search search = guess::Search::Wide;
     double amplitude = 0;           ///< of VariationalSurface; 0: estimated, which takes three times as long
     const Solid* refine = nullptr;  ///< restricts the body to a band around the surface of this one
@@ -74,7 +74,8 @@ struct Candidate {
 
 [[nodiscard]] Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run);
 
-/// A position that is known to be inside or outside applies up to halfway to the nearest mark, and to a cell at least.
+/// The neighbourhood of a position that is known to be inside or outside, with the same side: up to half the distance
+/// to the nearest mark, and at least one cell.
 struct KnownBall {
     Vec3 middle;
     double radius;
@@ -82,13 +83,14 @@ struct KnownBall {
 };
 [[nodiscard]] std::vector<KnownBall> known_balls(const Marks& marks, double cell);
 
-/// Unit gradients of the image at all marks.
+/// Unit gradients of the smoothed image at all marks. @param sigma_cells  standard deviation of the Gaussian, cells
 [[nodiscard]] std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells);
 
 /// Outward unit normals of a solid at given positions.
 [[nodiscard]] std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places);
 
-/// The surface of minimum bending energy through the spread marks, near these normals (of all marks).
+/// The surface of minimum bending energy through the marks in marks.spread, with normals near the given ones.
+/// @param normals  of all marks
 [[nodiscard]] guess::VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals,
                                                      double amplitude);
 

@@ -6,43 +6,43 @@
 
 namespace covol {
 
-/// The body inferred from marks and image: candidate.cpp and infer.cpp. Cells are the finest edges of a lattice's
-/// cells.
+/// The body inferred from marks and image: candidate.cpp and infer.cpp. As a length, a cell is the shortest edge of a
+/// lattice's cells.
 struct InferenceHeuristics {
-    /// [nodes] Of the lattice on which candidates are compared; that of the result has cells of half the size.
+    /// [nodes] Maximum of the lattice on which candidates are compared; the cells of the result's are half as large.
     double coarse_nodes = heuristic("inference.coarse_nodes", 60000);
-    /// [voxels] Maximum of a box around the marks: a larger one takes long to read.
+    /// [voxels] Maximum of the image's box around the marks; a larger box takes too long to read.
     double max_voxels = limit("inference.max_voxels", 6.4e7);
-    /// [marks] Maximum number from which a guess is made; such a guess predicts the remaining marks. It is also the
-    /// maximum number of positions known to be inside, or outside, that are used. All are chosen as far apart as
-    /// possible.
+    /// [marks] Maximum number from which a guess is computed, and maximum number of positions known to be inside, or
+    /// outside, that are used. If there are more, those are chosen that are as far apart as possible.
     std::size_t guess_marks = heuristic("inference.guess_marks", 150);
-    /// [spacings] Height above the marks' convex hull, from which a body is improbable.
+    /// [spacings] Height above the marks' convex hull from which on a body is improbable.
     double above_hull = heuristic("inference.above_hull", 0.5);
-    /// [log odds] Maximum for a single position, and decrease in a spacing above that height.
+    /// [log odds] Maximum for a single position, and the decrease per spacing above that height.
     double max_odds = heuristic("inference.max_odds", 4);
-    /// [cells of surface] Weight of a cell with log odds of one nat.
+    /// [cells of surface] Area that costs as much as one cell on the wrong side of log odds of 1.
     double odds_weight = heuristic("inference.odds_weight", 0.6);
-    /// [cells or voxels] Maximum plausible distance of a right mark from the surface that it marks.
+    /// [cells or voxels] Maximum plausible distance of a correct mark from the surface that it marks.
     double off_cells = heuristic("inference.off_cells", 2);
-    /// [of the marks] Maximum that a body may leave, or that may be wrong: if more are, the body is wrong instead.
+    /// [of the marks] Maximum fraction that may lie off a body; with more, the body is rejected. It is also the maximum
+    /// fraction that is left out as wrong.
     double max_off = heuristic("inference.max_off", 0.2);
-    /// [of the marks] That are expected to be wrong; a part of the body that fewer marks touch is none.
+    /// [of the marks] Fraction that is expected to be wrong. Parts of a body near a smaller fraction are dropped.
     double wrong = heuristic("inference.wrong", 0.05);
     /// [of the distance by which it misses a mark] Radius around the mark within which a guess is redrawn.
     double redrawn = heuristic("inference.redrawn", 1.8);
     /// [voxels] Maximum distance by which a guess may miss a mark.
     double farthest_miss = heuristic("inference.farthest_miss", 30);
-    /// [bits] Minimum information of the image about the sides of a guess, for the image to redraw it.
+    /// [bits] Minimum information that the image gives about the two sides of a guess; with less it is not redrawn.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
     /// [1 - Dice] Expected value for a result whose error times its area equals its volume. It was fitted to 118 runs
     /// of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were not used for the fit,
     /// 92 % lie in the interval.
     double expected_scale = heuristic("inference.expected_scale", 0.47);
-    /// [power] With which 1 - Dice increases with that error.
+    /// [power] Of that error in the expected value of 1 - Dice.
     double expected_power = heuristic("inference.expected_power", 1.15);
-    /// [ratio] Of the actual to the expected 1 - Dice; it is exceeded in one of twenty runs, and its inverse undercut
-    /// in another.
+    /// [ratio] Of the actual to the expected 1 - Dice: it is larger in one of twenty runs, and smaller than the inverse
+    /// in one of twenty.
     double expected_factor = heuristic("inference.expected_factor", 2);
 };
 COVOL_HEURISTICS InferenceHeuristics kInference{};

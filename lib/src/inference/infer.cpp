@@ -30,7 +30,7 @@ namespace {
 using namespace inference;
 using guess::Search;
 
-constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients used as axes
+constexpr std::array kSigmas{1.0, 2.0};  // [cells] scales of the gradients that are used as axes
 
 /// Signed distances of held-out marks from surfaces, negative inside.
 struct HeldOut {
@@ -38,7 +38,7 @@ struct HeldOut {
     std::vector<double> of_body, of_guess;
     std::vector<double> to_rest2;  // squared distance to the nearest mark of the training set
 
-    /// Distance from the weighted mean of both. @param shrink  factor of the body's errors on a finer lattice
+    /// Weighted mean of both distances. @param shrink  factor by which a finer lattice reduces the body's errors
     [[nodiscard]] double of_both(std::size_t n, double guess_weight, double shrink = 1) const {
         return guess_weight * of_guess[n] + (1 - guess_weight) * shrink * of_body[n];
     }
@@ -51,22 +51,22 @@ public:
         choose_box();
     }
 
-    /// On which candidates are compared.
+    /// The lattice on which candidates are compared.
     [[nodiscard]] Lattice coarse_lattice() const {
         return cover(image_.geometry(), box_.min, box_.max, kInference.coarse_nodes);
     }
 
-    /// False if no candidate has a body.
+    /// Computes the best candidate; false if no candidate has a body.
     [[nodiscard]] bool find(InferenceReport& report);
     /// The body that was found, on a finer lattice.
     [[nodiscard]] Solid refined() const;
-    /// Whether further marks are likely wrong; these are left out from here on, and the body has to be computed again.
+    /// Whether further marks are probably wrong. They are left out from here on, and the body has to be recomputed.
     [[nodiscard]] bool leave_out_wrong(const HeldOut& held);
     [[nodiscard]] bool leaves_out(const Vec3& mark) const {
         return std::find(wrong_.begin(), wrong_.end(), mark) != wrong_.end();
     }
     [[nodiscard]] HeldOut hold_out() const;
-    /// The body, averaged with the surface through the marks by the weight of the latter.
+    /// The body's level set, averaged with the surface through the marks. @param guess_weight  of that surface
     [[nodiscard]] Field pooled(const Solid& body, double guess_weight) const;
     [[nodiscard]] double coarse_cell() const { return coarse_->lattice.finest(); }
 
@@ -84,7 +84,7 @@ private:
     std::optional<Scene> coarse_;
     Solid coarse_body_;
     std::vector<Vec3> wrong_;  // marks that are left out; positions in the frame
-    double amplitude_ = 0;     // of its guess
+    double amplitude_ = 0;     // of the guess of coarse_body_
 };
 
 Candidate Inference::best_candidate() const {
@@ -147,20 +147,20 @@ Solid Inference::refined() const {
 }
 
 bool Inference::leave_out_wrong(const HeldOut& held) {
-    // A single suspect may also lie on a part that the body lacks: at least two wrong marks have to be expected.
+    // A single suspect may also lie on a part that the body lacks, so at least two wrong marks have to be expected.
     if (kInference.wrong * double(held.marks.size()) < 2) return false;
     const Field level = coarse_body_.level();
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
     std::vector<double> off;
-    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes the marks it was made from, even wrong ones
+    for (std::size_t i = 0; i < held.marks.size(); ++i)  // from the bodies computed with and without this mark
         off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
     const std::vector<double> wrong = probability_wrong(off, anywhere, kUniformDeviation * coarse_cell());
     std::vector<Vec3> suspects;
     for (std::size_t i = 0; i < held.marks.size(); ++i)
         if (wrong[i] > 0.5) suspects.push_back(held.marks[i]);
-    // Several suspects close to each other lie on a part that the body lacks. At random positions on a surface with
-    // this median distance between nearest ones, a ring of marks lies within that radius.
+    // Several suspects close to each other lie on a part that the body lacks. For random positions on a surface with
+    // this median distance to the nearest one, the mean number within the radius `beside` is kCommon.ring.
     const double beside = std::sqrt(double(kCommon.ring) / std::numbers::ln2) * marks_.spacing;
     std::vector<Vec3> all = wrong_;
     for (const Vec3& suspect : suspects) {
@@ -218,7 +218,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     const detail::KdTree tree(marks_.places);
     const double cell = lattice.finest(), band = kBandCells * cell;
     const std::vector<KnownBall> balls = known_balls(marks_, cell);
-    const auto is_known = [&](const Vec3& place) {  // the guess does not use known positions, and is ignored there
+    const auto is_known = [&](const Vec3& place) {  // the guess ignores known positions, and is not used there
         return std::any_of(balls.begin(), balls.end(), [&](const KnownBall& ball) {
             return length(minus(place, ball.middle)) <= ball.radius + cell;
         });
@@ -240,10 +240,10 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     return level;
 }
 
-/// The errors with which body and guess predict marks that they were not made from.
+/// The errors with which body and guess predict marks from which they were not computed.
 class Predictions {
 public:
-    /// @param shrink  factor of the body's errors on a finer lattice
+    /// @param shrink  factor by which a finer lattice reduces the body's errors
     Predictions(const HeldOut& held, double cell, double shrink) : small_(kUniformDeviation * cell) {
         const double maximum = kFarthestMiss * cell;
         for (std::size_t n = 0; n < held.of_body.size(); ++n)
@@ -270,7 +270,7 @@ public:
         }
         return weight;
     }
-    /// By how much the guess is worse than the body in the mean squared error, in standard errors.
+    /// The mean squared error of the guess minus that of the body, in standard errors.
     [[nodiscard]] double guess_worse() const {
         double sum = 0, squares = 0;
         for (const auto& [body, guess] : off_) {
@@ -295,13 +295,13 @@ double median_size(const std::vector<double>& values) {
     return sizes.empty() ? 0.0 : cloud::median(sizes);
 }
 
-/// A solid as a level function of world positions.
+/// A level set on a lattice as a function of world positions.
 class Level {
 public:
     Level(const ImageGeometry& geometry, const Lattice& lattice, const Field& field)
         : geometry_(geometry), lattice_(lattice), field_(field) {}
 
-    /// Beyond the lattice the body does not exist, except beyond the image's end, where its last values are continued.
+    /// Positions beyond the lattice are outside. If the lattice ends with the image, its last values are continued.
     [[nodiscard]] double operator()(const Vec3& world) const {
         const Vec3 place = to_frame(geometry_, world);
         double beyond = 0;
@@ -322,7 +322,7 @@ private:
     const Field& field_;
 };
 
-/// Dice of two levels at the lattice's nodes, and the size of the second one.
+/// Dice coefficient of two level sets at the lattice's nodes, and volume and area of the second one.
 struct Overlap {
     double dice = 0, volume = 0, area = 0;
 };
@@ -341,7 +341,7 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
     return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
 }
 
-/// In the image's frame; a spread-out subset if there are very many.
+/// Adds positions in the image's frame: at most kInference.guess_marks, as far apart as possible.
 void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, std::vector<Vec3>& places) {
     if (world.empty()) return;
     for (const std::size_t n : guess::spread_out(world, kInference.guess_marks))
@@ -371,7 +371,7 @@ std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
     return wrong(sides.inside, -1) + wrong(sides.outside, 1);
 }
 
-/// Increase of the error with the distance from the marks: the slope of the line through 0 that fits the squares best.
+/// Increase of the error with the distance from the marks, from a line through 0 that is fitted to their squares.
 double error_slope(const HeldOut& held, double guess_weight, double shrink) {
     double errors = 0, distances = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
@@ -449,7 +449,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });
-        const auto reject_body = [&](const char* reason) {  // also discards its classification of the marks
+        const auto reject_body = [&](const char* reason) {  // also restores marks that it shows as wrong
             report.wrong_marks.clear();
             result.marks = world;
             keep_guess(reason);
@@ -457,10 +457,10 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
-        // If both agree, the simpler one is taken unless it is significantly worse (the one-standard-error rule:
-        // Breiman et al., Classification and Regression Trees, 1984); otherwise the body, unless it is significantly
-        // worse.
-        // The measured errors decide, not those extrapolated to a finer lattice.
+        // If both agree, the guess, which is simpler, is used unless it is significantly worse (the one-standard-error
+        // rule: Breiman et al., Classification and Regression Trees, 1984). Otherwise the body is used, unless it is
+        // significantly worse.
+        // The comparison uses the measured errors, not those that are extrapolated to a finer lattice.
         const double worse = Predictions(held, cell, 1).guess_worse();
         if (overlap.dice > 1 - kCommon.minority ? worse <= 1 : worse < -2) {
             keep_guess(

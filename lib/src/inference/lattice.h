@@ -59,16 +59,16 @@ struct Lattice {
 /// The image at the nodes: its voxels, or their mean with weights that decrease to 0 at the neighbouring nodes.
 [[nodiscard]] Field sample(const Image& image, const Lattice& lattice, const RunContext& run);
 
-/// Convolved with a Gaussian; @param sigma  a length of the frame. Beyond the boundary the last value is repeated.
+/// The field convolved with a Gaussian. Beyond the boundary the last value is repeated. @param sigma  in the frame
 [[nodiscard]] Field smooth(const Lattice& lattice, const Field& field, double sigma);
 
 /// Central differences along an axis, one-sided at the boundary.
 [[nodiscard]] Field derivative(const Lattice& lattice, const Field& field, int axis);
 
-/// Signed distance to the border of a body of nodes, negative inside, accurate to half a cell; large without a border.
+/// Signed distance to the border of a body of nodes, negative inside, accurate to half a cell; large if there is none.
 [[nodiscard]] Field signed_distance(const Lattice& lattice, const std::vector<char>& inside);
 
-/// Labels of the connected parts (by faces) of a body from 1, 0 outside, and their number.
+/// Labels of the parts of a body that are connected through faces, from 1; 0 outside; and the number of parts.
 struct Parts {
     std::vector<int> number;
     int count = 0;

@@ -10,22 +10,23 @@ namespace covol::inference {
 /// Number of folds of the marks; each is held out once.
 inline constexpr int kFolds = 5;
 
-/// Marks in the image's frame. Their order, and thus their folds, is by the distance from their middle: it depends
-/// neither on the order in which they were given nor on a reflection of the image.
+/// Marks in the image's frame. Their order, and thus their folds, is by the distance from their centroid: it depends
+/// neither on the order in which the marks were given nor on a reflection of the image.
 struct Marks {
     std::vector<Vec3> places;
-    std::vector<std::size_t> spread;  ///< a subset, as far apart as possible, ascending: guesses are made of these
+    std::vector<std::size_t> spread;  ///< a subset, far apart, ascending: guesses are computed from these
     double spacing = 0;               ///< median distance to the nearest other mark
     double variance = 0;              ///< of a position along an axis
-    /// Half-spaces around all marks, n.x <= offset. Where marks lie close to the image's end they extend up to it.
+    /// Half-spaces n.x <= offset that contain all marks. If marks lie close to an end of the image, the hull extends
+    /// up to it.
     std::vector<std::pair<Vec3, double>> hull;
     std::vector<Vec3> inside, outside;  ///< positions whose side is known
 
     Marks(const ImageGeometry& geometry, const std::vector<Vec3>& world);
-    /// Without every kFolds-th mark. @param left_out  indices of these
+    /// The marks without one fold. @param rest, left_out  indices of the marks that remain, and of those in the fold
     [[nodiscard]] Marks without(int fold, const ImageGeometry& geometry, std::vector<std::size_t>& rest,
                                 std::vector<std::size_t>& left_out) const;
-    /// Without the given ones.
+    /// The marks without those at the given positions.
     [[nodiscard]] Marks without(const std::vector<Vec3>& left_out, const ImageGeometry& geometry) const;
     /// Height above the hull, negative inside of it.
     [[nodiscard]] double above_hull(const Vec3& place) const;

@@ -1,4 +1,4 @@
-// A guess of another tool, redrawn from the image near the marks that it misses.
+// Redraws a given guess, such as the result of another tool, from the image near the marks that it misses.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -97,7 +97,7 @@ private:
         const double deep = std::abs(double(distance_[n])) / miss.off;
         return std::clamp(std::max((double(freedom_[n]) - 1) / (kInference.redrawn - 1), 2 * (deep - 1)), 0.0, 1.0);
     }
-    /// Nodes within a cell.
+    /// Nodes at most one cell from a position.
     [[nodiscard]] std::vector<std::size_t> nodes_beside(const Vec3& place) const {
         std::vector<std::size_t> nodes;
         Index3 low, high;
@@ -124,9 +124,9 @@ private:
     std::vector<Miss> misses_;
     Lattice lattice_;
     Solid guess_;
-    Field distance_;  // to it
+    Field distance_;  // to guess_, signed
     ImageFeatures image_;
-    Field freedom_;                     // distance to the nearest missed mark, relative to its miss
+    Field freedom_;                     // distance to the nearest missed mark, relative to its Miss::off
     std::vector<const Miss*> nearest_;  // that mark
     std::vector<Sample> samples_;
     Field level_;  // of the redrawn surface
@@ -154,7 +154,7 @@ double Redrawing::learn() {
     return held_out_bits(samples_, kFolds);
 }
 
-/// Drops parts without connection to known nodes: pieces without the guess's own inside, voids without its outside.
+/// Assigns parts of one side, inside or outside, to the other side if they lie entirely in the region that is redrawn.
 void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const {
     std::vector<char> side(body.size());
     for (std::size_t n = 0; n < body.size(); ++n) side[n] = (body[n] != 0) == of_inside ? 1 : 0;
@@ -247,7 +247,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
             misses.push_back({to_frame(geometry, marks[n]), std::abs(levels[n]), levels[n] > 0});
     if (misses.empty()) return result;
     with_threads(run, [&] {
-        // The start is clamped: the distance by which a mark is missed has to be measured again.
+        // The guess is clamped, so that the distance by which a mark is missed has to be measured again.
         const Solid wide = solid_of(*guess, geometry, around(geometry, misses, kInference.farthest_miss * voxel));
         const Field distance = signed_distance(wide.lattice, wide.inside);
         for (Miss& miss : misses) miss.off = std::max(std::abs(wide.lattice.value(distance, miss.place)), miss.off);

@@ -30,11 +30,11 @@ namespace {
 /// File descriptors in the started program: the shared memory of the orders and of the results, the writing end of a
 /// pipe that is closed when the program ends, and the first descriptor that the program does not inherit.
 constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
-constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // from the terminal; they do not mean a crash
+constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // the started program ignores them
 
 enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kNoMemory, kCrashed };
 
-/// State of a piece, shared by both processes. All zeros mean that the piece is waiting.
+/// State and answer of a piece, shared by both processes. Memory of zeros means that the piece is waiting.
 struct Slot {
     std::uint32_t state;
     std::int32_t code;
@@ -49,7 +49,7 @@ struct Slot {
         std::strncpy(text, what, sizeof text - 1);
         set(kRefused);
     }
-    /// A malicious file may have taken over the program, so `code` may hold any number.
+    /// A malicious file may have made the started program write any number into `code`.
     [[nodiscard]] Error refusal() const {
         const bool known = code >= 0 && code <= static_cast<std::int32_t>(Errc::Cancelled);
         return {known ? static_cast<Errc>(code) : Errc::InvalidInput, std::string(text, strnlen(text, sizeof text))};
@@ -100,7 +100,7 @@ private:
     SharedMemory memory_;
 };
 
-/// Pieces [begin, end) of the work.
+/// The pieces with the indices [begin, end), which one process works on.
 struct Batch {
     Slot* slots;
     std::size_t begin, end;
@@ -112,7 +112,7 @@ struct Batch {
     }
 };
 
-/// The same descriptor, moved to a number that the started program does not inherit.
+/// Moves a file descriptor to a number that the started program does not inherit. @returns the number
 int above_inherited(int descriptor) {
     const int other = descriptor < 0 ? -1 : fcntl(descriptor, F_DUPFD_CLOEXEC, kFirstOther);
     if (descriptor >= 0) close(descriptor);
@@ -199,11 +199,12 @@ double cpu_seconds(pid_t process) {
 }
 
 /// Waits until the program ends. Kills it if it takes too long for a piece, or if the run is cancelled.
-/// @param pipe  sees a hang-up when the program ends
+/// @param pipe  the reading end of a pipe whose writing end is closed when the program ends
+/// @param seconds  maximum CPU time for one piece
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
     constexpr int kLongestPause = 20;  // milliseconds
-    constexpr double kMaxPauses = 10;  // for a program that uses no CPU time, because of a slow disk for example
+    constexpr double kMaxPauses = 10;  // maximum elapsed time / `seconds`: limits waiting without CPU time (slow disk)
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
     double computed_before = 0;
@@ -235,7 +236,7 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     wait_for(child, alive.from, batch, seconds, run);
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
-    if (batch.slots[n].now() != kBegun)  // not the file's fault: libraries start threads when they are loaded
+    if (batch.slots[n].now() != kBegun)  // no file was read yet: loading the libraries failed, which start threads
         throw Error(Errc::Io, program +
                                   ": the reader process ended before it could read a file; "
                                   "allow more processes, threads or memory");
@@ -269,7 +270,7 @@ SharedMemory::SharedMemory(std::uint64_t bytes)
                    std::max<std::uint64_t>(bytes, 1)) {}
 
 SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(descriptor), bytes_(bytes) {
-    // Seals: neither process may shrink the memory that the other has mapped.
+    // The seals prevent both processes from changing the size of memory that the other process has mapped.
     const bool made = ftruncate(descriptor, off_t(bytes)) == 0 &&
                       fcntl(descriptor, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) == 0;
     const int why = made ? 0 : errno;
@@ -343,7 +344,7 @@ int serve_pieces(int count, char** arguments, const std::function<void(const Pie
     setrlimit(RLIMIT_CORE, &none);
     const Orders orders(SharedMemory(SharedMemory::Given{kOrders}));
     const SharedMemory results(SharedMemory::Given{kResults});
-    if (getppid() != orders.head().parent) return 2;  // the parent ended before prctl()
+    if (getppid() != orders.head().parent) return 2;  // the parent ended before the call of prctl()
     const std::size_t end = std::strtoull(arguments[2], nullptr, 10);
     for (std::size_t n = std::strtoull(arguments[1], nullptr, 10); n < end; ++n) do_piece(work, orders, results, n);
     _exit(0);  // skips destructors, because those of libraries may crash, too

@@ -21,7 +21,7 @@ class SharedMemory {
 public:
     /// @throws std::bad_alloc
     explicit SharedMemory(std::uint64_t bytes);
-    /// Memory that another process has made. Takes over its descriptor. @throws std::bad_alloc
+    /// Maps memory that another process has made, and takes ownership of its file descriptor. @throws std::bad_alloc
     struct Given {
         int descriptor;
     };
@@ -51,7 +51,7 @@ struct Piece {
     std::uint64_t bytes = 0;  ///< of the result
 };
 
-/// Bytes of the answer that a piece returns besides its result.
+/// Size of the answer in bytes that the program returns for each piece besides the result.
 inline constexpr std::size_t kAnswerBytes = 4096;
 
 /// The outcome for one piece.
@@ -84,12 +84,13 @@ struct PieceAtWork {
 /// not start it; otherwise it does not return.
 int serve_pieces(int count, char** arguments, const std::function<void(const PieceAtWork&)>& work);
 
-/// Maximum seconds that a library may compute for a header, or a voxel: far more than valid files need.
+/// Maximum CPU time in seconds for reading a header or a single voxel: far more than valid files need.
 constexpr double kMaxSecondsForHeader = 10;
-/// The same for so many bytes of pixels. Even slow formats (text, JPEG 2000) need only a twentieth of it.
+/// Maximum CPU time in seconds for reading this many bytes of pixels. Even slow formats (text, JPEG 2000) need only a
+/// twentieth of it.
 [[nodiscard]] double max_seconds_for_pixels(std::uint64_t bytes);
 
-/// The reason why `library` cannot read the image `path`; empty if it can.
+/// The reason why `library` cannot read the image `path`; empty if `trial`, the attempt to read it, succeeded.
 std::optional<Error> reading_error(const PieceOutcome& trial, const std::string& path, const char* library);
 
 }  // namespace covol::detail

@@ -34,7 +34,7 @@ std::string one_line(std::string text) {
     return text;
 }
 
-/// Runs one call into OpenVDB and converts its exceptions.
+/// Calls a function that uses OpenVDB, and converts its exceptions to Error.
 template <typename Call>
 auto with_openvdb(Errc code, const std::string& what, Call&& call) {
     try {
@@ -53,9 +53,8 @@ std::map<std::string, std::string> to_text(const vdb::MetaMap& metadata) {
     return result;
 }
 
-/// Reads single grids from a .vdb file. Unlike openvdb::io::File, it does not read beyond the end of a damaged file, or
-/// allocate strings of any length that such a file states: the stream throws at the file's end, and lengths are checked
-/// before OpenVDB reads them.
+/// Reads single grids from a .vdb file. Unlike openvdb::io::File, it is safe on damaged files: the stream throws at the
+/// end of the file, and lengths in the file are checked before OpenVDB allocates memory for them.
 class Reader : public vdb::io::Archive {
 public:
     explicit Reader(const std::string& path) : stream_(path, std::ios::binary) {
@@ -86,7 +85,7 @@ public:
     }
     ~Reader() override {
         stream_.exceptions(std::ios::goodbit);
-        // The metadata is destroyed before the stream.
+        // The stream refers to its metadata, which is destroyed before the stream.
         vdb::io::clearStreamMetadataPtr(stream_);
     }
     Reader(const Reader&) = delete;
@@ -94,20 +93,21 @@ public:
 
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
-    /// A unique name: "surface[1]" is the second grid named "surface", as printed by OpenVDB's programs.
+    /// The name of a grid, with an index if the name is repeated, as OpenVDB's programs print it: "surface[1]" is the
+    /// second grid named "surface".
     [[nodiscard]] std::string unique_name(std::size_t n) const {
         std::size_t before = 0;
         for (std::size_t other = 0; other < n; ++other) before += name(other) == name(n) ? 1 : 0;
         return before == 0 ? name(n) : name(n) + "[" + std::to_string(before) + "]";
     }
-    /// Whether the name is the grid's unique name; [0] may be added for the first of several.
+    /// Whether `wanted` is the unique name of the grid, or this name followed by "[0]".
     [[nodiscard]] bool is_named(std::size_t n, const std::string& wanted) const {
         return unique_name(n) == wanted || unique_name(n) + "[0]" == wanted;
     }
     [[nodiscard]] std::string type(std::size_t n) const { return entries_[n].descriptor.gridType(); }
     [[nodiscard]] bool is_half(std::size_t n) const { return entries_[n].descriptor.saveFloatAsHalf(); }
 
-    /// Reads metadata and transform; the tree is left empty.
+    /// Reads the metadata and the transform of a grid, whose tree is left empty.
     vdb::GridBase::Ptr read_metadata(std::size_t n) {
         const Entry& entry = entries_[n];
         seek_to_grid(entry);
@@ -117,7 +117,7 @@ public:
         return entry.empty_grid;
     }
 
-    /// Compression of the grid that was read last. @return OpenVDB's flags
+    /// @return OpenVDB's flags for the compression of the grid that was read last
     [[nodiscard]] std::uint32_t grid_compression() { return vdb::io::getDataCompression(stream_); }
 
     vdb::GridBase::Ptr read_whole(std::size_t n) {
@@ -149,8 +149,8 @@ private:
         vdb::GridBase::Ptr empty_grid;
     };
 
-    /// Keeps a partially read tree for ever: its nodes refer to children that do not exist, so it must not be
-    /// destroyed.
+    /// Keeps a partially read grid until the program ends: nodes of its tree refer to children that do not exist, so it
+    /// must not be destroyed.
     static void leak_grid(const vdb::GridBase::Ptr& grid) {
         static std::mutex mutex;
         static auto& kept = *new std::vector<vdb::GridBase::Ptr>;
@@ -170,7 +170,7 @@ private:
         });
     }
 
-    /// @pre the stream is at the grid
+    /// Checks the sizes of all blocks of a tree. @pre the stream is at the beginning of the grid
     void walk_tree(const Entry& entry) {
         if (fileVersion() < vdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) return;
         readGridCompression(stream_);
@@ -210,7 +210,7 @@ std::string unusable(const std::string& where, const std::string& path) {
 
 bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 
-/// "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)"
+/// The names and types of all grids: "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)".
 std::string list_grids(const Reader& reader) {
     std::string list;
     for (std::size_t n = 0; n < reader.size(); ++n)
@@ -247,7 +247,7 @@ void make_repeatable(const std::string& path) {
         return true;
     };
     if (!file || !is_uuid()) OPENVDB_THROW(vdb::IoError, "expected a UUID in the header of the file just written");
-    // Two hashes that use a mixing step like MurmurHash's. https://github.com/aappleby/smhasher
+    // Two hashes of 64 bits with a mixing step like that of MurmurHash. https://github.com/aappleby/smhasher
     std::array<std::uint64_t, 2> sums{0x9e3779b97f4a7c15, 0xc2b2ae3d27d4eb4f};
     std::vector<std::uint64_t> words(1U << 16);
     while (file) {
@@ -261,7 +261,7 @@ void make_repeatable(const std::string& path) {
     }
     sums[1] ^= sums[0] >> 32;
     std::array<char, kLength + 1> text{};
-    // Version 8: the bits are defined by the writer. https://www.rfc-editor.org/rfc/rfc9562
+    // UUID version 8, whose bits are defined by the program. https://www.rfc-editor.org/rfc/rfc9562
     std::snprintf(text.data(), text.size(), "%08x-%04x-8%03x-%04x-%012llx", unsigned(sums[0] >> 32),
                   unsigned(sums[0] >> 16 & 0xFFFF), unsigned(sums[0] & 0xFFF),
                   unsigned(0x8000 | (sums[1] >> 48 & 0x3FFF)),
@@ -318,8 +318,8 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
     return info;
 }
 
-/// @throws Error InvalidInput unless floating-point numbers represent the grid's lattice accurately; transforms that
-/// are not linear have no lattice.
+/// @throws Error InvalidInput if floating-point numbers do not represent the positions of the grid's voxels accurately.
+/// Grids whose transform is not linear are not checked.
 void check_place(const std::string& path, const FloatGrid& grid) {
     const auto& transform = grid.transform();
     if (!transform.isLinear()) return;
@@ -345,7 +345,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     };
     vdb::MetaMap file_metadata;
     add_provenance(file_metadata);
-    vdb::GridPtrVec copies;  // copies of the metadata; the trees are shared
+    vdb::GridPtrVec copies;  // copies with metadata of their own and the trees of the originals
     for (const FloatGridPtr& grid : grids) {
         const FloatGridPtr copy = grid->copy();
         add_provenance(*copy);

@@ -1,4 +1,4 @@
-// The level set in a .vdb file, which may also hold grids of other names and classes.
+// Reads a level set from a .vdb file, which may also contain other grids.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/ValueTransformer.h>
@@ -13,7 +13,7 @@
 namespace covol {
 namespace {
 
-/// The name of the level set that is used if none is named.
+/// The name of the level set that is used if the user names none; empty if there is no suitable grid.
 std::string choose_level_set(const std::string& path, const RunContext& run) {
     std::vector<std::string> level_sets, others;
     for (const VdbGridInfo& grid : list_vdb(path)) {
@@ -34,7 +34,7 @@ std::string choose_level_set(const std::string& path, const RunContext& run) {
     return chosen;
 }
 
-/// The range of values of active voxels, tiles and the background.
+/// The minimum and maximum of all values of the grid, including tiles, inactive voxels and the background.
 std::array<float, 2> range_of(const FloatGrid& grid) {
     std::array<float, 2> range{grid.background(), grid.background()};
     for (auto value = grid.cbeginValueAll(); value; ++value) {
@@ -44,7 +44,7 @@ std::array<float, 2> range_of(const FloatGrid& grid) {
     return range;
 }
 
-/// Converts a grid of values >= 0 that is 0 outside: values above half of the maximum are inside.
+/// Converts a grid of values >= 0 that is 0 outside to a level set; values above `half` become inside.
 void make_level_set(FloatGrid& grid, float half) {
     const auto h = float(domain_of(grid).voxel_size);
     openvdb::tools::dilateActiveValues(grid.tree(), 2, openvdb::tools::NN_FACE_EDGE_VERTEX);

@@ -41,7 +41,7 @@ T read(std::istream& stream) {
     return value;
 }
 
-/// @return the length of a text or value; the stream is at that length
+/// Reads the length of a text or value at the stream's position, and checks that the file is long enough for it.
 std::uint32_t read_length(std::istream& stream, const std::string& what, std::int64_t file_bytes) {
     const auto length = read<std::uint32_t>(stream);
     if (length > file_bytes - std::int64_t(stream.tellg()))
@@ -54,16 +54,17 @@ void check_bool(std::uint8_t value) {
     if (value > 1) throw std::runtime_error("expected 0 or 1 for false or true, got " + std::to_string(value));
 }
 
-/// Checks Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes.
+/// Checks the header of Blosc, four words: versions, flags and element size; unpacked bytes; block size; packed bytes.
 void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t bytes, std::int64_t packed) {
     if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
         throw std::runtime_error("a block's size differs from that in its header");
 }
 
-/// Checks OpenVDB's data about each leaf for delayed loading: two arrays, each either packed after its packed size, or
-/// unpacked after a 0; the second may be missing. @param length  total length; more than 0
+/// Checks OpenVDB's metadata for delayed loading, which consists of two arrays with one value for each leaf. Each array
+/// follows its packed size, or a 0 if it is not packed; the second array may be missing.
+/// @param length  of the metadata in bytes; more than 0
 void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t file_bytes) {
-    constexpr std::int64_t kMinLeaf = 64;  // bytes; the size of its mask
+    constexpr std::int64_t kMinLeaf = 64;  // minimum size of a leaf in bytes: the size of its mask
     constexpr std::uint32_t kMissing = 0xFFFFFFFF;
     using vdb_io::DelayedLoadMetadata;
     const auto begin = stream.tellg();
@@ -80,7 +81,7 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
         if (packed > 0) {
             if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
             const auto header = read<std::array<std::uint32_t, 4>>(stream);
-            // OpenVDB pads small blocks with zeros.
+            // OpenVDB pads small blocks with zeros before it packs them.
             constexpr std::int64_t kPadded = 128;
             check_blosc_header(header, bytes < kPadded && header[1] == kPadded ? kPadded : bytes, stored);
         }
@@ -106,7 +107,7 @@ public:
             internal_node(5);
         }
         for (const std::int64_t active : leaves_) {
-            skip(kLeafValues / 8);  // the mask is repeated
+            skip(kLeafValues / 8);  // the leaf's mask is stored a second time
             values(kLeafValues, active);
         }
     }
@@ -122,7 +123,7 @@ private:
     void skip(std::int64_t bytes) {
         if (bytes < 0 || bytes > layout_.file_bytes - std::int64_t(stream_.tellg()))
             throw std::runtime_error("a block of " + std::to_string(bytes) + " bytes does not fit into the file");
-        // Seeking discards the stream's read-ahead, so short distances are read instead.
+        // Seeking discards the stream's buffer, so reading and ignoring is faster for short distances.
         constexpr std::int64_t kFar = 1 << 16;
         if (bytes < kFar)
             stream_.ignore(bytes);
@@ -144,11 +145,12 @@ private:
             else
                 internal_node(log2 - 1);
     }
-    /// @param count  number of values of the node
-    /// @param active  number of active ones
+    /// Skips the values of a node.
+    /// @param count  number of all values
+    /// @param active  number of active values
     void values(std::int64_t count, std::int64_t active) {
         const auto kind = read<std::int8_t>();
-        // io/Compression.h: the kind states which inactive values follow
+        // The byte states which inactive values follow: io/Compression.h of OpenVDB.
         if (kind == vdb_io::NO_MASK_AND_ONE_INACTIVE_VAL || kind == vdb_io::MASK_AND_ONE_INACTIVE_VAL)
             skip(value_.whole);
         if (kind == vdb_io::MASK_AND_TWO_INACTIVE_VALS) skip(2 * value_.whole);

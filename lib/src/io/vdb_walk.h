@@ -3,15 +3,15 @@
 #include <istream>
 #include <string>
 
-// Checks data that OpenVDB reads from a file without checking, lengths above all. Each function begins at the stream's
-// position, and throws a std::exception if the data is inconsistent; the stream throws at the file's end.
+// Checks data, mostly lengths, that OpenVDB reads from a file without checking. Each function begins at the stream's
+// position, and throws a std::exception if the data is inconsistent. The stream has to throw at the end of the file.
 namespace covol::detail {
 
-/// Skips a text after its length. @param what  for the message
+/// Skips a length and the text that follows it. @param what  name of the text, for the message
 void skip_vdb_text(std::istream& stream, const char* what, std::int64_t file_bytes);
 
-/// Skips a list of metadata: names, types and values. OpenVDB reads as many bytes as a value's type has, even if the
-/// file states another length.
+/// Skips and checks a list of metadata: names, types and values. OpenVDB reads as many bytes as the type of a value
+/// has, even if the file states another length.
 void skip_vdb_metadata(std::istream& stream, std::int64_t file_bytes);
 
 /// How a tree is stored in a .vdb file.
@@ -22,8 +22,8 @@ struct VdbTreeLayout {
     std::int64_t file_bytes = 0;
 };
 
-/// Goes through a tree without reading its values, and checks the size of each block: OpenVDB reads as many bytes as a
-/// block claims into a buffer of the size that it should have. Trees of types other than 5_4_3 of float, double, int32,
+/// Goes through a tree without reading its values, and checks the size of each block. OpenVDB would read as many bytes
+/// as the file states into a buffer of the correct size. Trees of types other than 5_4_3 of float, double, int32,
 /// int64, vec3s and vec3d are not checked. Supports files since OpenVDB 3.0 (version 222).
 /// @param stream  at the beginning of the tree, after the grid's transform; its final position is undefined
 /// @throws std::exception if a block does not have the expected size, or does not fit into the file.

@@ -16,7 +16,7 @@ struct XmlTag {
     }
 };
 
-/// Iterates over the tags of an XML text; comments and declarations are skipped. It ends at the first syntax error.
+/// Iterates over the tags of an XML text. Comments and declarations are skipped; the iteration ends at a syntax error.
 class XmlTags {
 public:
     /// @param text  has to outlive this object

@@ -7,9 +7,9 @@
 // Lengths and positions that floating-point numbers represent well, for files of any kind.
 namespace covol::detail {
 
-// Volumes are cubes of lengths, and some are stored in single precision.
+// Their cubes, which are volumes, are also valid in single precision.
 constexpr double kMinLength = 1e-12, kLargestLength = 1e12;
-// Distance from 0 at which double precision still resolves a millionth of a voxel.
+// Distance from 0, in voxels, at which double precision still resolves a millionth of a voxel.
 constexpr double kFarthestVoxel = 4294967296.0;
 
 /// Maximum distance from 0 of the origin of an image or a grid with voxels of that size, in world units.

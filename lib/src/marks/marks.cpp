@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kMaxInLines = 4;  // structures; for more only warnings are logged
 
-/// Adds the hints of the points that `marks` ends with. Lists are created once a cloud has values for them.
+/// Adds the hints of the cloud's points, which are the last points of `marks`. Each list is created once a cloud has
+/// values for it.
 void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, Marks& marks) {
     const std::size_t before = marks.points.size() - world.size();
     std::vector<Vec3>& normals = marks.hints.normals;
@@ -42,7 +43,7 @@ void take(std::vector<Vec3>& list, const std::vector<std::uint32_t>& which) {
     list = std::move(taken);
 }
 
-/// 1 where the image has that label, else 0.
+/// The mask of a label: 1 at its voxels, else 0.
 Image only(const Image& labels, int label) {
     const auto [ni, nj, nk] = labels.geometry().size;
     std::vector<std::uint8_t> values;

@@ -44,7 +44,7 @@ private:
     std::map<const PaintedImage*, Painted> images_;
 };
 
-/// A core that the points enclose is farther than D from all of them, and lies in their box.
+/// Rejects D above the diagonal of the points' box: an enclosed position at that distance from all points cannot exist.
 void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
     if (points.empty()) return;
     const WorldBox box = bounding_box(points);
@@ -105,12 +105,12 @@ public:
 private:
     [[nodiscard]] double h() const { return marks_options_.contours.step; }
 
-    /// The lines become marks, and the sections determine the sides.
+    /// Adds contours in planes of several directions: their lines as marks, and positions in their sections as seeds.
     static void add_network(const Contours& network, Marks& marks, SegmentOptions& options) {
         const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
             list.insert(list.end(), more.begin(), more.end());
         };
-        // Other points have no normals, and the list has to be complete.
+        // Not with other points: these have no normals, and the list must contain one for every mark.
         if (marks.points.empty()) {
             marks.hints.normals = network.outward;
             marks.hints.is_outward = true;
@@ -123,7 +123,8 @@ private:
         if (!marks.hints.to_sensor.empty()) marks.hints.to_sensor.resize(marks.points.size());
     }
 
-    /// The contours of the only view of the only painted image, which needs no common lattice; or null.
+    /// The contours of one painted label, on the lattice of its image. Null if there are further painted labels or
+    /// contours, which need a common lattice, or if the label has no view.
     std::shared_ptr<const Contours> own_contours(const Marks& marks, const RunContext& run) {
         if (marks.paint.size() != 1 || !marks.contours.empty()) return nullptr;
         const PaintedLabel& label = paint_.label_of(marks.paint.front(), run);
@@ -134,7 +135,7 @@ private:
         return contours;
     }
 
-    /// Adds outlines in the world, to be combined with other contours.
+    /// Adds the outlines of painted labels in world coordinates, to be combined with other contours.
     void add_outlines(Marks& marks, const RunContext& run) {
         for (const Marks::Paint& paint : marks.paint)
             for (const PaintedView& view : paint_.label_of(paint, run).views) {
@@ -177,7 +178,7 @@ private:
         return seeds;
     }
 
-    /// Paint is inside of its own structure, and outside of the others.
+    /// Adds the paint of the structure itself as seeds inside, and the paint of the other structures as seeds outside.
     void add_paint_as_seeds(std::size_t own, SegmentOptions& options, const RunContext& run) {
         const std::size_t given = options.inside.size() + options.outside.size();
         std::set<const PaintedImage*> images;

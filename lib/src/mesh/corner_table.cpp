@@ -28,7 +28,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     std::atomic<std::uint32_t> twice = kNone;
     tbb::parallel_for(std::uint32_t(0), corners, [&](std::uint32_t c) {
         const std::uint32_t from = vertex(previous(c)),
-                            to = vertex(next(c));  // the side in the direction of the other triangle
+                            to = vertex(next(c));  // the side as the adjacent triangle contains it
         for (std::uint32_t n = first[from]; n < first[from + 1]; ++n) {
             if (vertex(next(leaving[n])) != to) continue;
             if (opposite_[c] != kNone) twice = c;

@@ -14,7 +14,7 @@ public:
     static constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
     /// @param triangles  kept by reference, and changed by flip() and collapse().
-    /// @throws Error InvalidInput if an edge has more than two triangles, or two of the same direction.
+    /// @throws Error InvalidInput if an edge has more than two triangles, or two that contain it in the same direction.
     CornerTable(std::vector<Triangle>& triangles, std::size_t vertices);
 
     static std::uint32_t next(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
@@ -27,7 +27,7 @@ public:
     [[nodiscard]] bool is_closed() const {
         return std::find(on_boundary_.begin(), on_boundary_.end(), 1) == on_boundary_.end();
     }
-    /// A corner at the vertex, kNone if it has no triangle; for a boundary vertex the first one counter-clockwise.
+    /// A corner at the vertex, kNone if this has no triangle; at a boundary vertex the first one counter-clockwise.
     [[nodiscard]] std::uint32_t corner_of(std::uint32_t v) const { return corner_of_[v]; }
 
     /// Calls visit(corner) for each corner at the vertex, counter-clockwise.
@@ -56,7 +56,7 @@ public:
     /// topology: no vertices except the two opposite to the edge are adjacent to both of its ends.
     [[nodiscard]] bool can_collapse(std::uint32_t corner) const;
     /// Collapses the edge from vertex(next(corner)) to vertex(previous(corner)) into the former; the latter and two
-    /// triangles are removed: is_gone(). @pre can_collapse(corner)
+    /// triangles are removed, see is_gone(). @pre can_collapse(corner)
     void collapse(std::uint32_t corner);
     [[nodiscard]] bool is_gone(std::uint32_t triangle) const { return triangles_[triangle][0] == kNone; }
 

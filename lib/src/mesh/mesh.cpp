@@ -22,7 +22,8 @@ Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(
 
 bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/// A triangle's side from corner k to corner k+1, number 3 t + k, stored at its lower vertex.
+/// The side of triangle t from corner k to corner k+1, number 3 t + k; stored with its vertex of lower number, `high`
+/// is the other one.
 struct Side {
     std::uint32_t high;
     std::uint32_t number;
@@ -35,7 +36,7 @@ std::uint32_t corner_vertex(const TriangleMesh& mesh, std::uint32_t corner) {
 }
 std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 
-/// Calls visit(first, last) with the sides on each edge; degenerate triangles have none.
+/// Calls visit(first, last) with the sides of triangles on each edge; degenerate triangles are skipped.
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
     const std::uint32_t corners = meshing::corner_count(mesh.triangles.size());
@@ -150,8 +151,8 @@ std::array<float, 3> meshing::unit_normal(const Vec3& sum) {
 
 std::vector<std::array<float, 3>> meshing::vertex_normals(const std::vector<std::array<float, 3>>& vertices,
                                                           const std::vector<Triangle>& triangles) {
-    // Computing the angles dominates the time and is parallel; the sums are in the order of the triangles for any
-    // number of threads.
+    // The angles, which take most of the time, are computed in parallel; the sums are always computed in the order of
+    // the triangles, so that they do not depend on the number of threads.
     constexpr std::size_t kAtOnce = 1 << 15;
     std::vector<Vec3> sums(vertices.size(), Vec3{0, 0, 0});
     std::vector<std::array<Vec3, 3>> parts(std::min(kAtOnce, triangles.size()));

@@ -9,20 +9,20 @@ namespace {
 
 using Corner = std::array<double, 2>;
 
-/// Twice the signed area.
+/// Twice the signed area of a triangle, positive if its corners are counter-clockwise.
 double turn(const Corner& a, const Corner& b, const Corner& c) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/// Projects the corners to the coordinate plane most perpendicular to Newell's normal, counter-clockwise. Empty if the
-/// normal is 0.
+/// Projects the corners along the axis closest to Newell's normal; the result is counter-clockwise. Empty if the normal
+/// is 0.
 std::vector<Corner> flatten(const std::vector<Vec3>& corners) {
     Vec3 normal{0, 0, 0};
     for (std::size_t n = 1; n + 1 < corners.size(); ++n) {
         const Vec3 part = cross(minus(corners[n], corners[0]), minus(corners[n + 1], corners[0]));
         for (std::size_t a = 0; a < 3; ++a) normal[a] += part[a];
     }
-    // Drops the axis along which the normal is longest: areas keep their sign if the other two are in cyclic order.
+    // Omits the axis with the normal's largest component: areas keep their sign if the others are in cyclic order.
     std::size_t out = 0;
     for (std::size_t a = 1; a < 3; ++a)
         if (std::abs(normal[a]) > std::abs(normal[out])) out = a;

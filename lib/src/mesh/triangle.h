@@ -19,7 +19,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
 
-/// Three for each triangle. @throws Error Unsupported if 32 bits are not enough to number them.
+/// The number of corners. @throws Error Unsupported if 32 bits are not enough to number them.
 inline std::uint32_t corner_count(std::uint64_t triangles) {
     constexpr std::uint64_t kMax = (~std::uint32_t(0)) / 3;
     if (triangles > kMax)
@@ -28,7 +28,7 @@ inline std::uint32_t corner_count(std::uint64_t triangles) {
     return static_cast<std::uint32_t>(3 * triangles);
 }
 
-/// Six times the signed volume between a triangle and `origin`.
+/// Six times the signed volume of the tetrahedron of a triangle and `origin`.
 inline double six_volumes(const std::array<Vec3, 3>& p, const Vec3& origin) {
     return dot(minus(p[0], origin), cross(minus(p[1], origin), minus(p[2], origin)));
 }

@@ -15,7 +15,7 @@ namespace {
 /// The rounding error of a product of three lengths, in double precision from differences of single-precision numbers,
 /// is far below this.
 constexpr double kRounding = 1e-13;
-constexpr double kFacing = 0.05;  // minimum cosine between triangles of a single sheet and its direction
+constexpr double kFacing = 0.05;  // minimum cosine between normals in a single sheet and its direction
 
 /// Whether the projections onto an axis are disjoint.
 bool separates(const Vec3& axis, const Vec3* s, const Vec3* t, double margin) {
@@ -47,8 +47,8 @@ bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
     return false;
 }
 
-/// Corner 0 is shared and is the origin: whether a plane through it separates the other two corners of the two
-/// triangles. At most one corner of each may lie in the plane, and these two in different directions.
+/// For triangles that share corner 0, which is the origin: whether a plane through it separates their other corners. At
+/// most one of these may lie in the plane for each triangle, in different directions from the origin.
 bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     const double margin = kRounding * size * size * size;
     const auto side = [&](const Vec3& axis, const Vec3& p) { return dot(axis, p); };
@@ -78,11 +78,11 @@ bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     return false;
 }
 
-/// The side 0-1 is shared: the triangles are apart unless they are in one plane and on one side.
+/// For triangles that share the side 0-1: they are apart unless they lie in one plane, on the same side of the edge.
 bool apart_at_side(const Vec3* s, const Vec3* t, double size) {
     const Vec3 ns = area_normal(s[0], s[1], s[2]), nt = area_normal(t[0], t[1], t[2]);
     if (std::abs(dot(ns, minus(t[2], t[0]))) > kRounding * size * size * size) return true;
-    return dot(ns, nt) < 0;  // both in the order 0, 1, 2
+    return dot(ns, nt) < 0;  // normals of the order 0, 1, 2 in both
 }
 
 template <typename PerThread>
@@ -142,7 +142,7 @@ void ContactFinder::rebuild() {
     float longest = 0;
     for (int a = 0; a < 3 && !positions.empty(); ++a) longest = std::max(longest, high[a] - low[a]);
     const float scale = longest > 0 ? float((1 << kBits) - 1) / longest : 0.0F;
-    std::vector<std::uint64_t> keyed;  // position along a Z curve, number
+    std::vector<std::uint64_t> keyed;  // position along a Z-order curve, then number
     keyed.reserve(triangles.size());
     for (std::size_t n = 0; n < triangles.size(); ++n)
         if (triangles[n][0] < positions.size()) keyed.push_back(n);
@@ -347,7 +347,7 @@ bool ContactFinder::would_touch(const std::vector<Change>& changed, const std::a
 }
 
 bool ContactFinder::face_along_sheet(const std::vector<Change>& changed, const Position& around) const {
-    constexpr double kAlong = 0.3;  // cosine
+    constexpr double kAlong = 0.3;  // minimum cosine
     const Vec3 direction = single_sheet(around);
     return dot(direction, direction) > 0 && std::all_of(changed.begin(), changed.end(), [&](const Change& change) {
                const Vec3 n = area_normal(*positions_, change.corners);

@@ -27,10 +27,10 @@ public:
 
     /// Pairs of triangles that are not certainly apart, each once, lower number first, sorted. Removed triangles (with
     /// a corner that is not a vertex) touch nothing.
-    /// @param was_free  whether the mesh is that of a closed surface without contacts whose vertices have moved by less
-    /// than a triangle: single sheets are then skipped.
+    /// @param was_free  whether the mesh is closed and had no contacts before its vertices moved by less than the size
+    /// of a triangle: single sheets are then skipped.
     [[nodiscard]] std::vector<Pair> contacts(bool was_free);
-    /// The same for pairs that contain one of these triangles; sorted, unique.
+    /// The same for pairs that contain one of these triangles.
     [[nodiscard]] std::vector<Pair> contacts_of(const std::vector<std::uint32_t>& some) const;
 
     /// Sorts the triangles again; call when most have changed or many are removed.
@@ -86,7 +86,7 @@ private:
 
     const Positions* positions_ = nullptr;
     const std::vector<Triangle>* triangles_ = nullptr;
-    std::vector<std::uint32_t> order_, place_;  ///< triangles in the order of the leaves, and position of each
+    std::vector<std::uint32_t> order_, place_;  ///< triangles in the order of the leaves, and each one's position
     std::vector<Box> boxes_;                    ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
     std::vector<Box> triangle_boxes_;           ///< in the tree's order
     struct Cell {
@@ -101,7 +101,7 @@ private:
     std::size_t runs_ = 1;  ///< leaves of the tree, a power of two
 };
 
-/// Calls visit(position in the order) for the triangles whose boxes intersect this one, starting from a run.
+/// Calls visit(position in order_) for the triangles in `first_run` and later runs whose boxes intersect `box`.
 template <typename Visit>
 void ContactFinder::descend(const Box& box, std::size_t first_run, const Visit& visit) const {
     struct Node {

@@ -19,8 +19,8 @@
 namespace covol::meshing {
 namespace {
 
-/// The cost of a collapse is multiplied by a factor if it makes a triangle whose smallest angle is below that of the
-/// cosine, 23, 14 or 6 degrees, and smaller than before.
+/// The cost of a collapse is multiplied by `factor` if it makes a triangle whose smallest angle is smaller than before
+/// and than the angle of `cosine`: 23, 14 and 6 degrees.
 struct Needle {
     double cosine;
     float factor;
@@ -145,8 +145,8 @@ private:
         return std::uint32_t(handle.idx());
     }
 
-    /// The decimater queries all edges that leave a vertex in sequence, to queue the cheapest one, and that one again
-    /// when it is due.
+    /// Whether an edge may be collapsed. The decimater queries all edges that leave a vertex in sequence, to queue the
+    /// cheapest one, and queries that one again immediately before the collapse.
     bool is_chosen(HalfEdges::HalfedgeHandle edge) {
         const auto lost = mesh().from_vertex_handle(edge);
         const bool again = requested_ == number(lost);
@@ -189,8 +189,8 @@ private:
         }
     }
 
-    /// Checks the chosen collapse again, because the neighbours of neighbours may have changed or other triangles may
-    /// be in its way. In that case this vertex is checked more thoroughly next time, which most vertices do not need.
+    /// Checks the chosen collapse again, because neighbours of neighbours may have changed. If triangles would touch,
+    /// choose() will also check contacts for this vertex, which is not necessary for most vertices.
     bool is_free_still(HalfEdges::HalfedgeHandle edge) {
         if (!mesh().keeps_topology(edge)) return false;
         gather(edge);
@@ -232,7 +232,7 @@ private:
         float factor = 1;
         for (const Needle& needle : kNeedles)
             if (worst > needle.cosine) factor = needle.factor;
-        // With a tolerance the goal is well-shaped triangles, not few.
+        // With a tolerance, needles are not accepted: good shapes are preferred to few triangles.
         return goal_.tolerance > 0 && factor > 1 ? std::numeric_limits<float>::infinity() : factor;
     }
 
@@ -257,7 +257,7 @@ private:
     std::optional<Level> level_;
     std::vector<std::uint8_t> holds_;
     bool trust_ = false;
-    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and at the last rebuild of the finder
+    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and at the last rebuild of finder_
     std::uint32_t requested_ = kNoVertex;            // the vertex whose edges the decimater queries
     bool queued_ = false;                            // whether its chosen edge was among them
     std::vector<HalfEdges::HalfedgeHandle> chosen_;  // edge that leaves each vertex; invalid if no collapse is possible
@@ -281,7 +281,7 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     decimater.initialize();
     for (int pass = 0; pass < kCommon.rounds && decider.left() > goal.triangles; ++pass) {
         decider.begin_pass();
-        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // a collapse removes two
+        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // two for each collapse
     }
     return decider.is_free();
 }

@@ -29,8 +29,8 @@ public:
     [[nodiscard]] const std::vector<Left>& left() const { return left_; }
     [[nodiscard]] const std::array<std::uint32_t, 2>& going() const { return going_; }
 
-    /// Collapses the edge to a point unless a triangle would touch another one beyond shared corners. @return whether
-    /// it did. @pre look() returned true, and nothing has changed since.
+    /// Collapses the edge to `there` unless a triangle would then touch another one beyond shared corners. @return
+    /// whether it was collapsed. @pre select() returned true, and nothing has changed since.
     bool collapse(const Position& there);
 
 private:

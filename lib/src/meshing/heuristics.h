@@ -6,14 +6,15 @@ namespace covol {
 
 /// Triangles without slivers: relax.cpp.
 struct RelaxHeuristics {
-    /// [moves] Of all vertices in each round.
+    /// [moves] Number of moves of each chosen vertex in a round.
     int moves_per_round = heuristic("relax.moves_per_round", 5);
-    /// [tangential moves] Maximum of the projection onto the level set that follows a move.
+    /// [tangential moves] Maximum length of the projection onto the level set after a move; otherwise no move is made.
     double drop = heuristic("relax.drop", 0.5);
-    /// [cosine] Of an angle, 30 degrees, half of that of equilateral triangles: triangles without smaller angles are
-    /// skipped after the first round, and the shortest side of those with smaller ones is collapsed.
+    /// [cosine] Of 30 degrees, half of the angle of equilateral triangles. Triangles with a smaller angle are slivers:
+    /// their shortest side is collapsed, and rounds after the first process only them and their surroundings.
     double sliver = heuristic("relax.sliver", 0.866);
-    /// [voxels] Maximum distance from the level set of a flipped edge, unless it was as far before, and of merged ends.
+    /// [voxels] Maximum distance from the level set of the middle of an edge that is collapsed, or results from a flip
+    /// (unless the middle was as far away before).
     double off_level = heuristic("relax.off_level", 0.1);
 };
 COVOL_HEURISTICS RelaxHeuristics kRelax{};
@@ -27,8 +28,8 @@ COVOL_HEURISTICS DecimateHeuristics kDecimate{};
 
 /// Projection of vertices onto the level set: level.cpp.
 struct LevelHeuristics {
-    /// [fraction of the slope of a distance] Minimum slope for estimates of the distance, because it vanishes between
-    /// two walls.
+    /// [fraction of the slope of a distance] Lower bound of the slope in estimates of the distance, because the slope
+    /// vanishes midway between two walls.
     double min_slope = heuristic("level.min_slope", 0.5);
 };
 COVOL_HEURISTICS LevelHeuristics kLevel{};

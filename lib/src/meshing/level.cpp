@@ -12,7 +12,7 @@
 namespace covol::meshing {
 namespace {
 
-constexpr int kSteps = 6;            // of Newton's method, which converges faster or not at all
+constexpr int kSteps = 6;            // maximum; Newton's method converges in fewer or not at all
 constexpr double kConverged = 1e-4;  // voxels
 constexpr double kNearFace = 0.01;   // voxels: twice the chamfer of extract_mesh()
 
@@ -30,8 +30,8 @@ void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, c
     visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
 }
 
-/// The second difference of smaller magnitude, 0 if the signs differ: across a crease no second difference of the
-/// distance is valid on both sides.
+/// The one of two second differences that has the smaller magnitude, 0 if their signs differ: across a crease of the
+/// distance, no second difference is valid on both sides.
 double minmod(double a, double b) {
     if (a * b <= 0) return 0;
     return std::abs(a) < std::abs(b) ? a : b;
@@ -49,8 +49,8 @@ Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isov
     }
 }
 
-/// Inverse of LatticeClip::position(): the distance between the last layer within and that on the face is not one
-/// voxel.
+/// The inverse of LatticeClip::position(), whose last layer inside a face and the layer on the face are not one voxel
+/// apart. @param stretch  receives the derivative
 double Level::lattice(int axis, double index, double& stretch) const {
     stretch = 1;
     for (const bool upper : {false, true}) {
@@ -156,7 +156,7 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
         const double whole = here.value / std::sqrt(steep);
         const double move = std::clamp(whole, -kCommon.precision_voxels * h, kCommon.precision_voxels * h);
         gone += std::abs(move);
-        if (!(gone <= h)) return {};  // farther away it may be another sheet
+        if (!(gone <= h)) return {};  // a zero farther away may belong to another sheet
         p = plus(p, -move / std::sqrt(steep), g);
     }
     return {};

@@ -16,7 +16,7 @@
 
 namespace covol::meshing {
 
-/// The surface on which extract_mesh() takes points on the lattice's edges: the isosurface of an interpolated grid, cut
+/// The surface on which extract_mesh() places its vertices: the isosurface of an interpolated grid, cut
 /// off at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second differences along its
 /// edges, which makes it third-order; without the correction its error is up to h^2/8 times the second derivative along
 /// each axis. Use one object per thread.
@@ -27,13 +27,13 @@ public:
     Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const Vec3& origin);
 
     struct Sample {
-        double value = 0;  ///< minus the isovalue, world units; < 0 inside
+        double value = 0;  ///< interpolated value minus the isovalue, world units; < 0 inside
         Vec3 gradient{};
     };
     [[nodiscard]] Sample sample(const Vec3& world) const;
     [[nodiscard]] double voxel_size() const { return domain_.voxel_size; }
 
-    /// The point of the surface found from a point along the gradient, at most about a voxel away; none if there is
+    /// The point of the surface that a search along the gradient finds, at most about a voxel away; none if it finds
     /// none. Coordinates whose bit is set in `held` do not change.
     [[nodiscard]] std::optional<Vec3> project(const Vec3& world, unsigned held = 0) const;
     /// Distance of a point from the surface, to first order, world units.
@@ -48,8 +48,8 @@ public:
     [[nodiscard]] bool on_chamfer(const Position& p) const;
 
 private:
-    /// A cell of the lattice: the values at its corners, z fastest, and the second difference of each edge along an
-    /// axis.
+    /// A cell of the lattice: the values at its corners, z fastest, and for each axis the second differences along the
+    /// four edges in its direction.
     struct Cell {
         openvdb::Coord base{std::numeric_limits<int>::min()};
         std::array<double, 8> corner{};
@@ -69,14 +69,14 @@ private:
     std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite if there is none
 };
 
-/// The same surface for any number of threads.
+/// The surface of a Level, for any number of threads: each thread uses an own level().
 class Surface {
 public:
     /// @param level_set  kept by reference; its clip is undone as in extract_mesh().
     /// @param origin  of the meshes of this surface
     Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin);
     [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_, origin_}; }
-    /// From points at most a voxel apart; faces of the clip are excluded.
+    /// Deviation of a mesh from the surface, in voxels, at points at most a voxel apart; without faces of the clip.
     [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
 
 private:
@@ -89,7 +89,7 @@ private:
 
 /// What a vertex lies on and must not leave when it moves.
 enum Hold : std::uint8_t {
-    kFaces = 7,     ///< a bit for each axis: on a face of the clip across it
+    kFaces = 7,     ///< a bit for each axis: on a face of the clip that is perpendicular to it
     kOnLevel = 8,   ///< on the isosurface; together with a face, on the face's rim
     kChamfer = 16,  ///< between two faces of the clip: is not moved on its own
     kFixed = 32     ///< on the mesh's boundary or without triangles: does not move

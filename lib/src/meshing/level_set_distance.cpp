@@ -19,7 +19,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kFewPoints = 2048;  // up to these, testing every leaf is faster than a tree of all crossings
+constexpr std::size_t kFewPoints = 2048;  // up to this, testing every leaf is faster than a tree of all crossings
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
@@ -69,7 +69,7 @@ struct LeafReach {
     }
 };
 
-/// Crossings that include the nearest one of each point.
+/// A set of crossings that contains the nearest one to each point.
 std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec3>& points) {
     const double limit = 2 * surface.voxelSize()[0];
     std::vector<const Leaf*> leaves;
@@ -101,7 +101,7 @@ std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec
 
 std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec3>& points) {
     using Range = tbb::blocked_range<std::size_t>;
-    // Within a voxel of the band's end, corners of a point's cell lie outside it, where values are clamped.
+    // Less than a voxel from the band's end, corners of a point's cell lie outside the band, where values are clamped.
     const double limit = double(surface.background()) - surface.voxelSize()[0];
     std::vector<double> distances(points.size());
     std::vector<char> is_far(points.size());

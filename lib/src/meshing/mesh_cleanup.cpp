@@ -142,7 +142,7 @@ struct Work {
     [[nodiscard]] double voxel_size() const { return domain_of(*level_set).voxel_size; }
 };
 
-/// In both directions: one shows parts that are lost, the other parts that are added.
+/// The larger of the distances in both directions: one detects parts that are lost, the other parts that are added.
 MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
     const auto samples = [](const TriangleMesh& mesh) {
         std::vector<Vec3> points;
@@ -170,8 +170,8 @@ CleanupStep step_report(const Work& work, const TriangleMesh& before) {
     return step;
 }
 
-/// A round solid with vertices on its surface loses the volume outside the chords; a constant offset along the normals
-/// restores it. Vertices on the faces of a clip are not moved.
+/// Restores the volume by a constant offset along the normals: the triangles of a mesh whose vertices lie on a round
+/// solid enclose less volume than the solid. Vertices on the faces of a clip are not moved.
 void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::Surface* surface) {
     const MeshMeasures after = measure(mesh);
     if (!before.closed || !after.closed || !(after.area > 0)) return;
@@ -186,7 +186,7 @@ void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::
 }
 
 CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
-    constexpr int kRounds = 3;  // of relaxing the triangles after decimation
+    constexpr int kRounds = 3;  // of relaxation after decimation
     const TriangleMesh before = work.mesh;
     std::optional<meshing::Surface> surface;
     if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue, work.mesh.origin);
@@ -212,8 +212,8 @@ void smooth_step(TriangleMesh& mesh, double weight) {
             mesh.vertices[v][c] += float(weight * (sums[v][c] / sums[v][3] - mesh.vertices[v][c]));
 }
 
-/// Taubin 1995: alternates a shrinking and an inflating step. Weights of nearly equal magnitude keep the gain at low
-/// frequencies, and with it the growth of the volume, below 1e-4 per iteration.
+/// Taubin 1995: alternates a shrinking and an inflating step. Because their weights have nearly equal magnitudes, low
+/// frequencies, and with them the volume, grow by less than 1e-4 per iteration.
 CleanupStep smooth(const Work& work, bool proper) {
     const TriangleMesh before = work.mesh;
     for (int i = 0; i < work.options.smooth_iterations; ++i) {

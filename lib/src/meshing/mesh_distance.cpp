@@ -39,12 +39,12 @@ public:
             triangles_.emplace_back(to_cgal(mesh.place(t[0])), to_cgal(mesh.place(t[1])), to_cgal(mesh.place(t[2])));
         }
         tree_.insert(triangles_.begin(), triangles_.end());
-        // A tree of the vertices, for initial bounds, would take as much time as all queries: the result for the
-        // previous point is a better bound.
+        // By default, CGAL would build a tree of vertices for initial bounds, which takes as much time as all queries;
+        // the result for the previous point is a better bound.
         tree_.do_not_accelerate_distance_queries();
         tree_.build();  // now, because it must be complete before parallel queries
     }
-    /// The closest to the query of `guess` and all points of the triangles.
+    /// The point closest to the query among `guess` and all points of the triangles.
     [[nodiscard]] Cartesian::Point_3 closest_point(const Cartesian::Point_3& query,
                                                    const Cartesian::Point_3& guess) const {
         return tree_.closest_point(query, guess);
@@ -70,8 +70,8 @@ private:
     CGAL::AABB_tree<CGAL::AABB_traits<Cartesian, Primitive>> tree_;
 };
 
-/// Several trees of consecutive triangles, which mostly are close together: CGAL builds a tree on one thread, and
-/// smaller trees faster. Each additional tree costs a query one test of its root.
+/// Several trees, each of consecutive triangles, most of which are close together. CGAL builds a tree on one thread, so
+/// several trees are built in parallel. Each additional tree costs a query one test of its root.
 std::vector<std::unique_ptr<TriangleTree>> trees_of(const TriangleMesh& mesh) {
     constexpr std::size_t kTriangles = 1 << 17;
     const std::size_t count = mesh.triangles.size();
@@ -122,7 +122,7 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
 
 double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
     constexpr std::size_t kMaxRays = 512;
-    constexpr double kThinFraction = 0.01;  // ignores single slivers, which do not represent the wall
+    constexpr double kThinFraction = 0.01;  // quantile: ignores single slivers, which do not represent the wall
     const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMaxRays);
     std::vector<double> walls(rays, std::numeric_limits<double>::infinity());
     with_threads(run, [&] {

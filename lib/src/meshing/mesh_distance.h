@@ -6,7 +6,7 @@
 
 namespace covol::detail {
 
-/// The distance of each point to a mesh, exact to its triangles; in parallel.
+/// The distance of each point to the triangles of a mesh, not only to its vertices; in parallel.
 /// @pre mesh.triangles is not empty
 [[nodiscard]] std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points);
 

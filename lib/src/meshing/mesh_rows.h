@@ -31,7 +31,8 @@ public:
         for_each_slice(lattice.size[2], [&](std::uint32_t t, int k) { order_[next[k]++] = t; });
     }
 
-    /// Fills the slices [first, first + size[2]), i fastest; 1 inside. @throws Error InvalidInput, with `not_closed`.
+    /// Fills the slices [first, first + size[2]), i fastest; 1 inside. @throws Error InvalidInput with the message
+    /// `not_closed` if the mesh is not closed.
     void fill(int first, const Index3& size, std::vector<std::uint8_t>& out, const std::string& not_closed) const {
         std::fill(out.begin(), out.end(), std::uint8_t(0));
         std::vector<std::uint8_t> open(std::size_t(size[2]), 0);
@@ -70,7 +71,8 @@ private:
         }
     }
 
-    /// Twice the signed area of (a, b, row) in the plane of j and k; exactly the negative for (b, a, row).
+    /// Twice the signed area of (a, b, row) in the plane of j and k, exactly the negative of that of (b, a, row), and
+    /// its sign after the infinitesimal shift of the row.
     struct Turn {
         double area;
         int sign;
@@ -86,7 +88,7 @@ private:
         return swapped ? Turn{-area, -sign} : Turn{area, sign};
     }
 
-    /// False if a row does not leave the solid as often as it enters it.
+    /// Fills one slice. @return false if a row does not leave the solid as often as it enters it
     bool fill_slice(int k, const Index3& size, std::uint8_t* out) const {
         std::vector<Crossing> crossings;
         for (std::size_t n = triangles_of_[k]; n < triangles_of_[k + 1]; ++n) {

@@ -22,11 +22,11 @@ namespace covol {
 namespace meshing {
 namespace {
 
-// Length of a move, as a fraction of the way to the neighbours' mean: the largest at which no wave overshoots, because
-// the mean of six even neighbours reverses a wave by at most half.
+// Length of a move, as a fraction of the way to the neighbours' mean: the largest one that reverses no undulation,
+// because the mean of six evenly distributed neighbours is at least -1/2 times an undulation.
 constexpr double kStep = 2.0 / 3.0;
 
-// Cosine by which a flip has to increase the smallest angle: only prevents flips without end between equal angles.
+// Minimum decrease of the smallest angle's cosine by a flip: only prevents endless flips between equal angles.
 constexpr double kGain = 1e-3;
 
 class Relaxer {
@@ -40,7 +40,7 @@ public:
           tolerance_(tolerance),
           run_(run) {}
 
-    /// The first round processes the whole mesh, the others only badly shaped triangles.
+    /// The first round processes the whole mesh, the others only badly shaped triangles and their surroundings.
     void relax(int rounds, RelaxReport& report) {
         for (int round = 0; round < rounds; ++round) {
             if (round > 0) report.collapses += std::int64_t(collapse_slivers());
@@ -60,8 +60,8 @@ public:
     }
 
 private:
-    /// Chooses the corners of triangles worse than this, their neighbours, and the triangles around all these; all if
-    /// `poor` is above 1.
+    /// Chooses the corners of triangles whose worst_cosine() is above `poor`, their neighbours, and the triangles
+    /// around all of these; chooses all if `poor` is above 1.
     void choose(double poor) {
         std::vector<std::uint8_t> vertex(mesh_.vertices.size(), poor > 1), triangle(mesh_.triangles.size(), 0);
         if (poor <= 1) {
@@ -121,7 +121,7 @@ private:
         std::uint32_t corner, across;  ///< corners opposite to the edge
     };
 
-    /// @return the flipped edges, in this order
+    /// Flips edges until no flip is worthwhile. @return the flips in the order in which they were made
     std::vector<Flip> flip_edges() {
         std::vector<std::uint8_t> wanted(3 * scope_.size(), 0);
         const auto corner = [&](std::size_t n) { return 3 * scope_[n / 3] + std::uint32_t(n % 3); };
@@ -224,7 +224,7 @@ private:
     /// Moves vertices back to `before` and undoes flips until no triangles touch that did not touch before.
     void undo_contacts(const Positions& before, std::vector<Flip>& turned) {
         finder_.update();
-        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // is then faster
+        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // checking all is then faster
         std::vector<ContactFinder::Pair> contacts =
             all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
         while (!contacts.empty()) {
@@ -244,7 +244,7 @@ private:
             contacts = finder_.contacts_of(changed);
         }
     }
-    /// The chosen triangles and those of flips.
+    /// The chosen triangles and those that flips have changed.
     [[nodiscard]] std::vector<std::uint32_t> touched(const std::vector<Flip>& turned) const {
         std::vector<std::uint32_t> all = scope_;
         for (const Flip& flip : turned) {
@@ -256,7 +256,7 @@ private:
         return all;
     }
 
-    /// Collapses the shortest sides of slivers that moves cannot widen, because they are on an edge of the solid that
+    /// Collapses the shortest sides of slivers. Moves cannot widen those on a part of the solid, such as an edge, that
     /// is narrower than a triangle. @return how many
     std::size_t collapse_slivers() {
         finder_.update();
@@ -296,8 +296,8 @@ private:
         return best;
     }
 
-    /// Positions at which an edge's ends can merge: halfway if they are bound to the same surfaces, otherwise the end
-    /// that is bound to all surfaces of the other one.
+    /// Positions at which an edge's ends can merge: halfway if they are held on the same surfaces (see Hold), and each
+    /// end that is held on all surfaces of the other one.
     [[nodiscard]] std::vector<Position> meeting_points(std::uint32_t a, std::uint32_t b) const {
         const Level& level = levels_.local();
         const unsigned all = holds_[a] | holds_[b];

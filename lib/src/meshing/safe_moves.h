@@ -9,7 +9,7 @@
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
 
-// Moves of vertices that are undone if they do harm.
+// Moves of vertices that are undone if triangles turn over or touch.
 namespace covol::meshing {
 
 /// Whether a corner of the triangle has moved.
@@ -23,7 +23,7 @@ namespace covol::meshing {
     return has_moved(t, before, after) && !(dot(was, is) > cosine * length(was) * length(is));
 }
 
-/// Those of these triangles for which bad(number) is true; it is called from many threads.
+/// The triangles among `some` for which bad(number) is true; `bad` is called from many threads.
 template <typename Bad>
 [[nodiscard]] std::vector<std::uint32_t> those(const std::vector<std::uint32_t>& some, const Bad& bad) {
     std::vector<std::uint8_t> found(some.size(), 0);
@@ -36,7 +36,7 @@ template <typename Bad>
     return result;
 }
 
-/// Moves the corners of these triangles back. @return the triangles that change, sorted
+/// Moves the corners of these triangles back to `before`. @return all triangles that change, sorted
 std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
                                    const Positions& before, Positions& after);
 
@@ -52,7 +52,7 @@ std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vect
 }
 
 /// Moves all vertices to `goal`, except those whose triangles would turn over or touch others that they did not touch
-/// before. @return how many do not move. @throws Error InvalidInput (a mesh that is not manifold)
+/// before. @return the number of vertices that do not move. @throws Error InvalidInput (a mesh that is not manifold)
 std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal);
 
 }  // namespace covol::meshing

@@ -6,7 +6,8 @@ namespace covol {
 
 /// Interpretation of painted labels: painted.cpp, whole_runs.cpp.
 struct PaintedHeuristics {
-    /// [ratio] Minimum of the widest patch to a run of painted slices, for them to be separate slices.
+    /// [ratio] Width of the widest patch over the number of adjacent painted slices, from which on the slices count as
+    /// painted one by one.
     int thin_run = heuristic("painted.thin_run", 3);
 };
 COVOL_HEURISTICS PaintedHeuristics kPainted{};
@@ -15,9 +16,9 @@ COVOL_HEURISTICS PaintedHeuristics kPainted{};
 /// error is below 0.025 voxel (0.44 with a Gaussian of 1 voxel at radius 1.5), the root mean square 0.10 to 0.13 from
 /// radius 5 on, compared to 0.235 for the staircase.
 struct OutlineHeuristics {
-    /// [voxels] Half-width along the line of the quadratic that smooths it.
+    /// [voxels] Half-width, along the outline, of the window in which a quadratic smooths it.
     int window = heuristic("outline.window", 8);
-    /// [of the line's length] Maximum of this half-width.
+    /// [of the line's length] Maximum half-width of that window.
     double window_of_line = heuristic("outline.window_of_line", 0.15);
     /// [voxels] Maximum width of a scribble.
     int widest_stroke = heuristic("outline.widest_stroke", 4);

@@ -26,7 +26,7 @@ std::vector<double> quadratic_weights(int n) {
     return weights;
 }
 
-/// Traces the lines between the voxels of a slice, over the edges of the lattice between neighbours' centres.
+/// Traces the lines between voxels inside and outside, through the midpoints between neighbouring voxels' centres.
 class Walk {
 public:
     explicit Walk(const Slice& slice) : slice_(slice), seen_(2 * nodes(), 0) {}
@@ -113,7 +113,7 @@ std::vector<int> depths(const Slice& slice) {
     return depth;
 }
 
-/// @param deepest  the largest depth; @param sum  of all depths
+/// Classifies a patch by the depths of its voxels. @param deepest  the largest depth; @param sum  of all depths
 Patch classified(std::size_t area, int deepest, double sum) {
     Patch patch;
     patch.area = area;

@@ -49,12 +49,12 @@ private:
 
 /// Properties of the slices across one axis.
 struct AxisPaint {
-    std::vector<int> areas;           ///< slices with an area
+    std::vector<int> areas;           ///< slices with an area: a patch that is no stroke and wider than one voxel
     std::vector<int> painted;         ///< slices with any paint
     std::vector<std::size_t> voxels;  ///< by painted slice
     std::vector<char> small;          ///< by painted slice: only patches that are neither areas nor strokes
-    int widest = 0;                   ///< voxels
-    int longest_run = 0;              ///< of neighbouring slices with an area
+    int widest = 0;                   ///< width of the widest area, voxels
+    int longest_run = 0;              ///< largest number of adjacent slices with an area
 };
 [[nodiscard]] AxisPaint properties_across(const Paint& paint, int axis);
 

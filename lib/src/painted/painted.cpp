@@ -176,7 +176,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
             if (const std::optional<int> a = painted::find_whole_runs(paint, labels.geometry()))
                 result.views.push_back(view_of(paint, *a, with_tips(axes[*a]), source));
         if (result.views.empty() && as == PaintedAs::Slices) {
-            // The axis along which the smallest fraction of the slices of the paint's box contains any.
+            // The axis along which the smallest fraction of the slices of the paint's box contains paint.
             const auto fraction = [&](int a) { return double(axes[a].painted.size()) / box.size()[a]; };
             int best = 2;
             for (const int a : {1, 0})

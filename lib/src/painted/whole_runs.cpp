@@ -10,18 +10,19 @@
 namespace covol::painted {
 namespace {
 
-/// An end of a piece's slices.
+/// The first or last slice of a piece of paint.
 struct End {
     double fraction = 0;  ///< ratio of the end slice's section to the largest one
-    bool blunt = false;   ///< larger than that of any ellipsoid that ends before the next slice
+    bool blunt = false;   ///< section larger than that of any ellipsoid that ends before the next slice
 };
 
-/// @param areas      of the slices, beginning at the end
-/// @param elongated  whether the sections are: across a tube's side they shrink like its chords, not like their squares
+/// @param areas      of the slices, beginning with the end slice
+/// @param elongated  whether the sections are elongated: such sections of a tube shrink with its chord, not with the
+/// chord's square
 End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     const auto largest = double(*std::max_element(areas.begin(), areas.end()));
-    // The ellipsoid's middle lies beside the first slice that is about as large as the largest, and it ends at most a
-    // slice beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
+    // The ellipsoid's middle is assumed at the first slice that is about as large as the largest, and its pole at most
+    // one slice beyond the end slice: a section w slices from the middle has 1 - (w / (w + 1))^2 of the largest area.
     double w = 0;
     for (const std::size_t area : areas) {
         if (double(area) >= (1 - kCommon.minority) * largest) break;
@@ -31,10 +32,11 @@ End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     return {fraction, w == 0 || fraction > (elongated ? std::sqrt(of_round) : of_round)};
 }
 
-/// The width of the ends across the axis, as the mean of the ratios; 0 if none is blunt.
+/// The mean, over the piece's ends along the axis, of the ratio of the end section to the largest one; 0 if no end is
+/// blunt, 1 if both lie at the image's ends.
 double blunt_ends(const Paint& piece, int axis) {
     const AxisPaint slice_paint = properties_across(piece, axis);
-    // A stroke, or a wall of strokes on neighbouring slices.
+    // The piece is a stroke, or a wall of strokes on neighbouring slices.
     if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
         return 0;
     const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
@@ -62,7 +64,7 @@ bool is_cube(const VoxelBox& box, const Vec3& spacing) {
 }  // namespace
 
 std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry) {
-    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // weighted means of the ratios, and voxels of the pieces
+    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // mean ratios, weighted by voxels; voxels of blunt pieces
     for (const Paint& piece : paint.pieces())
         for (int a = 0; a < 3; ++a) {
             const double ends = blunt_ends(piece, a);

@@ -28,10 +28,10 @@ using Entry = std::pair<Point, std::size_t>;
 using PointMap = CGAL::First_of_pair_property_map<Entry>;
 using Tag = CGAL::Parallel_tag;
 
-constexpr std::size_t kFewest = 7;  // minimum number for a meaningful neighbourhood
+constexpr std::size_t kFewest = 7;  // minimum number of points: each then has six neighbours
 
 class Cleaner {
-    // CGAL keeps references to its arguments.
+    // point_map_ and not_cancelled_ are members because CGAL keeps references to its arguments.
     [[nodiscard]] auto parameters() const { return CGAL::parameters::point_map(point_map_).callback(not_cancelled_); }
 
 public:
@@ -70,7 +70,7 @@ public:
         run_.check();
         double sum = 0;
         for (std::size_t n = 0; n < entries_.size(); ++n) {
-            // Quadrics cannot be fitted to points on a line.
+            // The result is not finite for points on a line, to which no quadric can be fitted.
             if (!is_finite(entries_[n].first)) entries_[n] = before[n];
             const double shift = std::sqrt(CGAL::squared_distance(entries_[n].first, before[n].first));
             sum += shift;
@@ -83,7 +83,8 @@ public:
     void smooth_by_wlop(CloudCleanupReport& report) {
         if (entries_.size() < kFewest) return;
         run_.check();
-        // Two rings of new neighbours; CGAL's default of 8 spacings flattens curved surfaces.
+        // The automatic radius is twice the mean distance of the new points to their eight neighbours; CGAL's default
+        // of 8 spacings flattens curved surfaces.
         const auto automatic = [&] {
             const double ring = CGAL::compute_average_spacing<Tag>(entries_, unsigned(kCommon.ring), parameters());
             return 2 * ring / std::sqrt(options_.wlop_fraction);
@@ -108,7 +109,8 @@ public:
     }
 
 private:
-    /// If there are few points, neighbours are too far away for the other criterion.
+    /// Removes the points of find_isolated_points(). In small clouds, the distances to `neighbours` others do not
+    /// distinguish them, because these distances are long for all points.
     std::size_t remove_isolated() {
         std::set<std::size_t> isolated;
         for (const IsolatedPoint& one : find_isolated_points(points())) isolated.insert(entries_[one.index].second);
@@ -118,7 +120,7 @@ private:
     [[nodiscard]] unsigned neighbours() const {
         return static_cast<unsigned>(std::min<std::size_t>(std::size_t(options_.neighbours), entries_.size() - 1));
     }
-    /// Removes the entries that CGAL has moved behind `end` and restores the input's order. Returns how many.
+    /// Removes the entries from `end` on and sorts the others into the input's order. @return the number removed
     std::size_t keep_until(std::vector<Entry>::iterator end) {
         run_.check();
         const auto removed = static_cast<std::size_t>(entries_.end() - end);
@@ -133,13 +135,13 @@ private:
     const CloudCleanupOptions& options_;
     const RunContext& run_;
     const PointMap point_map_{};
-    /// Called by CGAL, possibly from another thread; false stops CGAL.
+    /// The progress callback, which CGAL may call from another thread; if it returns false, CGAL stops.
     struct NotCancelled {
         const RunContext& run;
         bool operator()(double) const { return !run.cancelled(); }
     };
-    // Not a std::function: CGAL 5.5 keeps a reference to its own temporary copy of one; other callables are copied
-    // permanently.
+    // Not a std::function, of which CGAL 5.5 makes a temporary copy and keeps a reference to that; it stores copies of
+    // other callables.
     const NotCancelled not_cancelled_{run_};
     std::vector<Entry> entries_;
 };

@@ -19,7 +19,7 @@ std::vector<HalfSpace> convex_hull(const std::vector<Vec3>& points) {
     std::vector<Kernel::Point_3> all;
     all.reserve(points.size());
     for (const Vec3& p : points) all.emplace_back(p[0], p[1], p[2]);
-    constexpr std::size_t kFewest = 4;  // both of points and of facets: points in a plane have one or two
+    constexpr std::size_t kFewest = 4;  // minimum number of points, and of facets of a hull with volume
     if (all.size() < kFewest) return {};
     Hull hull;
     CGAL::convex_hull_3(all.begin(), all.end(), hull);
@@ -32,7 +32,7 @@ std::vector<HalfSpace> convex_hull(const std::vector<Vec3>& points) {
             if (n < corner.size()) corner[n++] = hull.point(v);
         const Kernel::Vector_3 normal = CGAL::cross_product(corner[1] - corner[0], corner[2] - corner[0]);
         const double length = std::sqrt(normal.squared_length());
-        if (!(length > 0)) continue;  // a sliver; its neighbours bound the same set
+        if (!(length > 0)) continue;  // zero area; the other facets alone bound the hull
         const Vec3 unit{normal.x() / length, normal.y() / length, normal.z() / length};
         facets.push_back({unit, unit[0] * corner[0].x() + unit[1] * corner[0].y() + unit[2] * corner[0].z()});
     }

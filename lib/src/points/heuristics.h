@@ -10,40 +10,41 @@ namespace covol {
 struct NeighboursHeuristics {
     /// [spacings] Initial search radius; affects the time, not the result.
     double first_radius = limit("neighbours.first_radius", 2);
-    /// [spacings] Search radius at which the search ends.
+    /// [spacings] Radius above which the search radius is not doubled again, even if there are too few neighbours.
     double max_radius = limit("neighbours.max_radius", 40);
 };
 COVOL_HEURISTICS NeighboursHeuristics kNear{};
 
 /// Distance to the nearest point: spacing.cpp.
 struct SpacingHeuristics {
-    /// [points] Maximum number of sampled points. All lengths of a cloud are relative to their median, hence more than
-    /// common.sample.
+    /// [points] Maximum number of points whose distance to the nearest other point is measured. It is larger than
+    /// common.sample because other lengths are multiples of the median of these distances.
     std::size_t queries = limit("spacing.queries", 50000);
 };
 COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 
-/// Scans whose layer of points is thicker than their spacing: scan_noise.cpp.
+/// Scans with noise larger than the spacing of their points: scan_noise.cpp.
 struct ScanNoiseHeuristics {
-    /// [voxels] Maximum mean distance to the local plane for a voxel size that resolves the layer as one surface.
+    /// [voxels] Maximum mean distance of points from the local plane at which a voxel size is large enough for the
+    /// layer of points to appear as one surface.
     double thin_fraction = heuristic("scan_noise.thin_fraction", 0.35);
-    /// [voxels] The same if larger voxel sizes exceed it because the surface is curved; scans as thick as their spacing
-    /// have 0.3 to 0.45.
+    /// [voxels] The same maximum if it has been exceeded at all larger voxel sizes, as on curved surfaces; scans with
+    /// noise as large as their spacing have 0.3 to 0.45.
     double clean_fraction = heuristic("scan_noise.clean_fraction", 0.25);
-    /// [voxels] Radius of the local plane.
+    /// [voxels] Radius of the neighbourhood to which the local plane is fitted.
     double plane_voxels = heuristic("scan_noise.plane_voxels", 2.5);
-    /// [steps] Of common.growth from the spacing to the largest voxel size.
+    /// [steps] Number of factors common.growth between the spacing and the largest voxel size that is tried.
     int coarsest = heuristic("scan_noise.coarsest", 5);
-    /// [passes] Of averaging layers.
+    /// [passes] Number of times that average_layers() projects all points onto local planes.
     int passes = heuristic("scan_noise.passes", 2);
 };
 COVOL_HEURISTICS ScanNoiseHeuristics kScan{};
 
 /// Marks from misplaced clicks: isolated_points.cpp.
 struct IsolatedHeuristics {
-    /// [median links] Alternative to `gap`: minimum length of the shortest link to an isolated point, because the gap
-    /// may be hidden by several isolated points at different places. For marks on the same seven structures, links are
-    /// at most 2.6.
+    /// [median links] Length of the next link of the minimum spanning tree above which the groups that it joins are
+    /// separate, even if it is not common.clear_ratio times as long as the link before, as with several isolated
+    /// points. Links between marks on seven structures are at most 2.6 long.
     double far = heuristic("isolated.far", 6.0);
 };
 COVOL_HEURISTICS IsolatedHeuristics kIsolated{};

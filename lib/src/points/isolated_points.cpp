@@ -1,4 +1,4 @@
-// Finds misplaced marks by single linkage, whose links are the edges of the minimum spanning tree.
+// Finds misplaced marks by single-linkage clustering, whose links are the edges of the minimum spanning tree.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,7 +18,7 @@ struct Link {
     std::size_t from, to;
 };
 
-/// Prim's algorithm, which evaluates every distance once; the shortest link first.
+/// The edges of the minimum spanning tree by Prim's algorithm, sorted by length.
 std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
     std::vector<double> squared(points.size(), std::numeric_limits<double>::infinity());
     std::vector<std::size_t> nearest(points.size(), 0), left(points.size() - 1);
@@ -58,20 +58,20 @@ public:
         large_ += is_large(minimum);
         if (size_[minimum] > size_[largest_]) largest_ = minimum;
     }
-    /// Counts two points at the same position as one. @pre no link between different positions was joined
+    /// Joins two points at the same position, which then count as one. @pre join() has not been called
     void merge(const Link& link) {
         sets_.unite(of(link.from), of(link.to));
         --places_;
     }
     [[nodiscard]] std::size_t places() const { return places_; }
     [[nodiscard]] std::uint32_t largest() const { return largest_; }
-    /// Whether all other groups are small enough to be misplaced clicks, and contain few points in total.
+    /// Whether all groups but the largest have fewer than four points, and few points in total.
     [[nodiscard]] bool largest_is_all_but_few() const {
         return large_ == 1 && double(size_[largest_]) >= (1 - kCommon.minority) * double(places_);
     }
 
 private:
-    /// Four points already enclose a volume.
+    /// 1 if the group has at least four points, which can enclose a volume and may thus be a structure; else 0.
     [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] >= 4; }
 
     detail::DisjointSets sets_;
@@ -101,8 +101,8 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     if (points.size() < 2 || points.size() > kCommon.sample) return {};
     const std::vector<Link> links = shortest_tree(points);
     Groups groups(points.size());
-    // Marks that were read or clicked twice are merged first: compared with the distance between them, every other link
-    // would be long.
+    // Marks at the same position are merged first: the links between them are so short that any other link would be
+    // long in comparison.
     const auto first =
         std::size_t(std::upper_bound(links.begin(), links.end(), kCommon.same_place * links.back().length,
                                      [](double length, const Link& link) { return length < link.length; }) -
@@ -113,8 +113,8 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);
         const double next = links[n + 1].length;
-        // For marks on seven structures, evenly distributed and on outlines, successive links differ by a factor of at
-        // most 1.4.
+        // For marks on seven structures, both evenly distributed and on outlines, each link is at most 1.4 times as
+        // long as the one before it.
         const bool is_long = next > kCommon.clear_ratio * links[n].length || next > kIsolated.far * usual;
         if (is_long && groups.largest_is_all_but_few()) return points_outside(groups.largest(), groups, points);
     }

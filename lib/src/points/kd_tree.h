@@ -12,18 +12,18 @@ inline double squared_distance(const Vec3& a, const Vec3& b) {
     return x * x + y * y + z * z;
 }
 
-/// A balanced kd-tree in an array: the median of each range splits it, recursively, so that clusters do not slow it
-/// down. Queries may run in parallel.
+/// A balanced kd-tree in an array: each range is split at its median, recursively, so that the depth is the same for
+/// clustered points. Queries may run in parallel.
 class KdTree {
 public:
     explicit KdTree(std::vector<Vec3> points);
     /// Squared distance to the nearest point; infinite if there is none.
     [[nodiscard]] double nearest(const Vec3& query) const;
-    /// The nearest point. @pre there is one
+    /// The nearest point. @pre the tree is not empty
     [[nodiscard]] Vec3 nearest_point(const Vec3& query) const;
-    /// The nearest point that is closer than `distance`; null: none is.
+    /// The nearest point if it is closer than `distance`, otherwise null.
     [[nodiscard]] const Vec3* nearest_within(const Vec3& query, double distance) const;
-    /// Squared distance from one of the points to the nearest other point.
+    /// Squared distance from `query`, which is one of the points, to the nearest other one; infinite if there is none.
     [[nodiscard]] double nearest_other(const Vec3& query) const;
 
 private:

@@ -20,7 +20,7 @@ struct Neighbour {
     }
 };
 
-/// Sums over neighbours, of their positions relative to a point.
+/// Sums of the positions of neighbours relative to a point, and of the outer products of these positions.
 struct Moments {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
@@ -37,10 +37,11 @@ struct Moments {
     return moments;
 }
 
-/// visit(point, neighbours), from several threads, with the input index of each point and its `count` nearest other
-/// points, the nearest first; fewer if there are no more, or they are farther than 40 spacings.
+/// Calls visit(point, neighbours), from several threads, with the input index of each point and its `count` nearest
+/// other points, the nearest first. There are fewer if the cloud or the last search radius, the first one above
+/// kNear.max_radius spacings, contains fewer.
 /// @param cells   with an edge of about two spacings
-/// @param wanted  (sorted position) -> whether that point is visited
+/// @param wanted  function of a point's position in the sorted order: whether the point is visited
 template <typename Visit, typename Wanted>
 void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit, Wanted wanted) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.sorted().size(), 512), [&](const auto& some) {

@@ -11,7 +11,7 @@
 namespace covol::cloud {
 namespace {
 
-constexpr int kKeyBits = 20;  // per axis
+constexpr int kKeyBits = 20;  // number of bits of a cell's index along each axis
 constexpr std::int64_t kMaxRowsPerCell = 4;
 
 std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {

@@ -1,5 +1,5 @@
-// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): distances of points from them,
-// and the projection onto them (a moving average of order one).
+// Fits planes to neighbourhoods of a scan by principal component analysis (Hoppe et al. 1992), measures the distances
+// of points from them and projects points onto them.
 #include "covol/scan_noise.h"
 
 #include <tbb/parallel_for.h>
@@ -19,7 +19,8 @@ namespace {
 
 Eigen::Vector3d vector(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
-/// The points in cells of edge `radius`: all points within that distance of a position are in 27 cells.
+/// The points, sorted by cells of edge `radius`: all points within that distance of a position are in the 27 cells
+/// around it.
 class Neighbourhoods {
 public:
     Neighbourhoods(const std::vector<Vec3>& points, double radius) : points_(points), radius_(radius) {
@@ -29,7 +30,7 @@ public:
         std::sort(cells_.begin(), cells_.end());
     }
 
-    /// visit(point, squared distance) for all points within the radius of x, including x itself.
+    /// Calls visit(point, squared distance) for all points within the radius of x, including x if it is one of them.
     template <typename Visit>
     void around(const Vec3& x, Visit visit) const {
         const Index3 c = cell(x);
@@ -49,11 +50,11 @@ public:
 private:
     [[nodiscard]] Index3 cell(const Vec3& p) const {
         Index3 c;
-        for (int a = 0; a < 3; ++a)  // coarser at a distance of 2^20 radii: slow, but correct
+        for (int a = 0; a < 3; ++a)  // all farther points are in the last cell: slow, but correct
             c[a] = static_cast<int>(std::min((p[a] - lowest_[a]) / radius_, double(1 << 20)));
         return c;
     }
-    // One is added so that the cells below the lowest have keys as well.
+    // One is added because the neighbours of the lowest cells have the index -1.
     [[nodiscard]] static std::uint64_t key(const Index3& c) {
         return (std::uint64_t(c[0] + 1) << 42) + (std::uint64_t(c[1] + 1) << 21) + std::uint64_t(c[2] + 1);
     }
@@ -70,7 +71,7 @@ struct Plane {
     [[nodiscard]] double height(const Vec3& p) const { return normal.dot(vector(p) - center); }
 };
 
-/// @param weight  of a neighbour, from its squared distance.
+/// @param weight  function of a neighbour's squared distance: its weight
 template <typename Weight>
 Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
     Plane plane;
@@ -135,8 +136,8 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     if (!(spacing > 0) || points.empty()) return choice;
     const double widest = second_longest_edge(bounding_box(points)) / 2;
     bool any = false, thin = false, thick = false;
-    // Starts from the coarsest size: in a ball of a few spacings, even points that fill space are few enough to fit a
-    // plane.
+    // Starts from the largest size: a ball with a radius of a few spacings contains so few points that a plane fits
+    // them even if they fill space.
     for (int k = kScan.coarsest; k >= 0; --k) {
         const double h = spacing * std::pow(kCommon.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;

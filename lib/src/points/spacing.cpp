@@ -1,4 +1,4 @@
-// Spatial properties of points: duplicates, order, spacing.
+// Duplicates, spatial order and spacing of points.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -22,7 +22,7 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
     if (!(cell >= 0) || !std::isfinite(cell))
         throw Error(Errc::InvalidOptions, "cell: expected >= 0, got " + std::to_string(cell));
     struct Item {
-        Vec3 key;  ///< the cell, or the point itself
+        Vec3 key;  ///< indices of the cell, or the point itself if `cell` is 0
         std::size_t index;
     };
     std::vector<Item> items(points.size());
@@ -35,7 +35,7 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
                        [](const Item& a, const Item& b) { return a.key != b.key ? a.key < b.key : a.index < b.index; });
     std::vector<std::uint8_t> keep(points.size(), 0);
     const double minimum = 0.25 * cell * cell;
-    std::vector<std::size_t> kept;  // in the current cell; few, because they are at least cell/2 apart
+    std::vector<std::size_t> kept;  // indices in the current cell; few, because they are at least cell / 2 apart
     for (std::size_t n = 0; n < items.size(); ++n) {
         if (n == 0 || items[n].key != items[n - 1].key) kept.clear();
         const Vec3& point = points[items[n].index];

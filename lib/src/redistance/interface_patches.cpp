@@ -20,7 +20,7 @@ Point cross(const Point& a, const Point& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-constexpr int kSide = kLeafDim + 1;                                 ///< voxels along an edge of a leaf's cells
+constexpr int kSide = kLeafDim + 1;                                 ///< voxels along an edge of a leaf's cube of cells
 constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< marks a voxel outside the domain
 
 constexpr int cell_voxel(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
@@ -35,7 +35,7 @@ class CellValues {
 public:
     CellValues(const FloatGrid& u, const Domain& domain) : accessor_(u.getConstAccessor()), domain_(box_of(domain)) {}
 
-    /// False if no cell has a crossing.
+    /// Loads the values for the leaf at `origin`. Returns false if no cell has a crossing.
     bool load(const Coord& origin) {
         std::array<Block, 8> blocks;
         for (int block = 0; block < 8; ++block)

@@ -16,8 +16,8 @@ struct Patch {
     Coord origin;
     std::array<float, 3> center;
     std::array<float, 3> normal;  ///< unit; of the whole polygon
-    float radius;                 ///< no vertex is farther from the axis (center, normal) ...
-    float height;                 ///< ... nor from the plane through the center
+    float radius;                 ///< maximum distance of a vertex from the axis (center, normal)
+    float height;                 ///< maximum distance of a vertex from the plane through the center
     std::uint32_t first;          ///< vertices [first, first + count)
     std::uint32_t count;
 };

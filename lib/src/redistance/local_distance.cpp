@@ -14,7 +14,7 @@ namespace {
 constexpr float kFallTolerance = 5e-3F;  // voxels
 constexpr float kUnclamped = 0.99F;
 
-/// Loads a padded leaf of u; beyond the domain there is no surface.
+/// Loads a padded leaf of u. Values are mirrored at the domain's end, so that there is no surface beyond it.
 void load_u(const HaloField& u, const LeafBand& band, const Domain& domain, std::size_t leaf, float* out) {
     load_star(u, leaf, out);
     const LeafBounds bounds(domain, band.origin(leaf));
@@ -65,8 +65,8 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
     load_star_from(distance(leaf), across, out);
 }
 
-// Visits leaves in two colours; a leaf is visited again if a leaf across a face has changed since then, in the rows
-// beside.
+// Visits leaves in two colours. A leaf is visited again, in the rows next to the changes, if a leaf across a face has
+// changed since.
 void LocalDistance::spread() {
     const SchemeKernels& kernel = kernels();
     std::vector<RowMask> decreased(band_.size() + 1, 0);  // rows that decreased in the last visit
@@ -90,7 +90,7 @@ void LocalDistance::spread() {
     }
 }
 
-// The rows of a leaf beside which rows of leaves across its faces decreased.
+// The rows of a leaf next to rows, in the leaves across its faces, that have decreased.
 RowMask LocalDistance::beside(const std::vector<RowMask>& decreased, std::size_t leaf) const {
     constexpr RowMask kFirst = 0x0101010101010101ULL;  // j = 0
     RowMask across[6];

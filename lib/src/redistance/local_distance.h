@@ -9,8 +9,8 @@
 
 namespace covol::detail {
 
-/// How far the band of a moving surface extends, in voxels: the 3 of the clamp and about two that the surface may move
-/// before the band is rebuilt.
+/// The half width of the band of a moving surface, in voxels: 3 up to the clamp, and about 2 by which the surface may
+/// move before the band is rebuilt.
 inline constexpr double kTrackingWidth = 5.0;
 
 /// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with
@@ -26,15 +26,15 @@ public:
     };
 
     /// @param u        in voxels; blocks beyond the band contain no distances
-    /// @param zone     one flag for each leaf: those to compute; the others contribute their |u|
-    /// @param clamp    |u| from there on is not a distance
+    /// @param zone     by leaf: nonzero if its distances are computed; other leaves contribute |u|
+    /// @param clamp    values of |u| from this on are not distances
     /// @param width    maximum distance, voxels
     /// @param scratch  its content is not read
     LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone,
                   const Domain& domain, float clamp, float width, Scratch scratch);
     void compute();
 
-    /// The width if the surface is farther away.
+    /// The distances of a leaf's voxels; `width` if the surface is farther away.
     [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
     /// The same, but next to the surface |u| is only scaled, see SchemeKernels::settle.
     [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
@@ -56,7 +56,7 @@ private:
     const Domain& domain_;
     float clamp_, width_;
     LeafArray<float> far_;
-    Scratch scratch_;  // the cuts become the settled values
+    Scratch scratch_;  // compute() replaces the cuts by the settled values
 };
 
 }  // namespace covol::detail

@@ -31,8 +31,8 @@ COVOL_INLINE Real unit(Real x) {
     return x < 1.0F ? x : Real{} + 1.0F;
 }
 
-// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a single float and
-// for eight.
+// The nearest point lies in a triangle, on the common edge of two triangles, or on the outline. Real is a float or a
+// vector of eight.
 template <typename Real>
 COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
     Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;

@@ -21,8 +21,8 @@ struct PatchFan {
         float from[3];  ///< the first vertex, from the centre
         float edge[3];  ///< from the first to the second vertex
         float normal[3];
-        float from_from, from_to, to_to;   ///< products of the vertices' arms
-        float area;                        ///< the normal's square; 0 if there is none
+        float from_from, from_to, to_to;   ///< scalar products of the vectors from the centre to the vertices
+        float area;                        ///< the squared length of the normal; 0 if there is none
         float inverse_area;                ///< infinite if there is none
         float inverse_from, inverse_edge;  ///< of squared lengths; 0 if there is none
     };
@@ -35,24 +35,25 @@ struct PatchFan {
 };
 
 struct PatchHit {
-    float squared;     ///< distance
+    float squared;     ///< squared distance
     bool is_interior;  ///< the nearest point lies within the polygon, not on its outline
 };
 
 /// @param arm  from the polygon's centre to the query point
 [[nodiscard]] PatchHit nearest_on(const PatchFan& fan, const float arm[3]);
 
-/// A cylinder above and below a polygon, in a leaf's voxels, and the nearest patches of the leaf's voxels so far.
+/// A cylinder above and below a polygon; positions are in voxels relative to the leaf's first voxel.
 struct PatchCylinder {
     float center[3];     ///< of the polygon
     float radius;        ///< of the cylinder
-    float half_width;    ///< voxels farther away are ignored
-    float patch_radius;  ///< no part of the polygon is farther from the axis ...
-    float patch_height;  ///< ... nor from the plane through the center
+    float half_width;    ///< voxels farther from the polygon's plane are ignored
+    float patch_radius;  ///< maximum distance of the polygon from the axis
+    float patch_height;  ///< maximum distance of the polygon from the plane through the center
 };
+/// The nearest patch that was found so far, for each voxel of a leaf.
 struct PatchLeaf {
     float* squared;           ///< 512 squared distances
-    std::int32_t* patch;      ///< the patches that these refer to
+    std::int32_t* patch;      ///< by voxel: the nearest patch
     std::uint64_t* interior;  ///< 512 bits, PatchHit::is_interior
 
     /// Voxel p takes the patch `index` if that is nearer than its current one. @return whether it did

@@ -53,9 +53,9 @@ public:
           patch_(band.size(), kNoPatch, 0),
           interior_(band.size(), LeafMask{}) {}
 
-    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
-    // lie in none; they, and those that inaccurate normals of the patches exclude, get candidates from their
-    // neighbours.
+    // A voxel whose nearest point lies within a patch lies in the cylinder above and below that patch. Voxels beside a
+    // crease lie in no cylinder. These voxels, and those that are missed because normals of patches are inaccurate, get
+    // candidates from their neighbours.
     void find(const RunContext& run) {
         seed();
         // Two voxels that are both above the inside of their patches cannot improve each other.
@@ -83,7 +83,7 @@ private:
         return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
     }
 
-    /// Sources of one colour are three leaves apart, so that they reach no leaf in common.
+    /// Leaves of one colour are at least three leaves apart, so that no two of them write to the same one.
     void seed() {
         std::array<std::vector<std::size_t>, 27> colours;
         for (std::size_t n = 0; n < interface_.leaves.size(); ++n) {
@@ -147,7 +147,7 @@ private:
         return result;
     }
 
-    static constexpr float kSlack = 0.25F;  ///< voxels, by which neighbouring patches' cylinders overlap
+    static constexpr float kSlack = 0.25F;  ///< [voxels] added to the radius of cylinders, so that they overlap
     const InterfacePatches& interface_;
     const LeafBand& band_;
     float half_width_;

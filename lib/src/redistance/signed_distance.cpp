@@ -17,7 +17,7 @@
 namespace covol::detail {
 namespace {
 
-/// The position of the interface, relative to a voxel beside it.
+/// The nearest point of the interface to a voxel beside it, approximately.
 struct Foot {
     Vec3 point;                   // index space
     std::array<float, 3> normal;  // towards phi > 0
@@ -28,7 +28,7 @@ struct Field {
     const LeafBand& band;
     const LeafArray<float>& phi;
     const std::vector<LeafMask>& valid;  // voxels that are used
-    std::vector<LeafMask> inside;        // phi < 0, of those
+    std::vector<LeafMask> inside;        // used voxels with phi < 0
 
     /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; none if it is not used.
     [[nodiscard]] std::optional<float> at(std::size_t leaf, int i, int j, int k) const {
@@ -66,7 +66,7 @@ void for_each_on(const LeafMask& mask, const Visit& visit) {
         for (std::uint64_t bits = mask[word]; bits != 0; bits &= bits - 1) visit(word << 6 | __builtin_ctzll(bits));
 }
 
-/// The foot of voxel (i,j,k), which lies beside the interface, and its distance to it.
+/// The foot of voxel (i,j,k), which lies beside the interface, and the distance between them.
 Foot find_foot(const Field& field, std::size_t leaf, int i, int j, int k, float& distance) {
     const float centre = *field.at(leaf, i, j, k);
     float nearest_crossing = std::numeric_limits<float>::max();
@@ -77,7 +77,7 @@ Foot find_foot(const Field& field, std::size_t leaf, int i, int j, int k, float&
         const float down = low ? centre - *low : 0.0F, up = high ? *high - centre : 0.0F;
         const bool crosses_down = low && (*low < 0) != (centre < 0), crosses_up = high && (*high < 0) != (centre < 0);
         if (crosses_down || crosses_up) {
-            // The slope across the interface; phi may have another branch on the far side.
+            // The slope across the interface: on the other side of the voxel, phi may belong to another surface.
             gradient[a] = crosses_down && (!crosses_up || std::abs(down) > std::abs(up)) ? down : up;
             nearest_crossing = std::min(nearest_crossing, std::abs(centre / gradient[a]));
         } else {
@@ -114,8 +114,8 @@ struct Interface {
     std::vector<LeafMask> inside;    ///< by leaf: phi < 0
     std::vector<LeafMask> beside;    ///< by leaf: voxels with a foot
     std::vector<Foot> feet;          ///< by leaf, then by voxel
-    std::vector<float> distances;    ///< of those voxels
-    std::vector<std::size_t> first;  ///< foot of each leaf
+    std::vector<float> distances;    ///< of these voxels from their feet
+    std::vector<std::size_t> first;  ///< by leaf: index of its first foot
 
     [[nodiscard]] std::vector<Vec3> points() const {
         std::vector<Vec3> result(feet.size());

@@ -5,9 +5,9 @@ namespace covol::detail {
 
 /// Signed distance, in voxels and clamped to [-width, width], to the interface between voxels of phi < 0 and phi >= 0.
 ///
-/// Beside the interface, phi determines its position between two voxels; the scale of phi does not matter. Each such
-/// voxel gives one foot point with a normal; the distances of the other voxels are those to the plane of the nearest
-/// foot point.
+/// Beside the interface, phi determines its position between two voxels; the scale of phi does not matter. Each
+/// voxel beside the interface gives one foot point with a normal; the distances of the other voxels are those to the
+/// plane of the nearest foot point.
 /// @param inside_domain  by leaf; other voxels are ignored and get +width.
 /// @param width  at most a few voxels; leaves of the band that the result needs must exist.
 [[nodiscard]] LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& phi,

@@ -41,7 +41,7 @@ void remove_leaf(const Coord& origin, bool is_inside, FloatGrid& u) {
         u.tree().addTile(1, origin, is_inside ? -u.background() : u.background(), false);
 }
 
-/// Leaves with an edge, possibly to the next leaf, that the surface crosses; sorted.
+/// The leaves with a voxel edge, in the leaf or to the next leaf, that the surface crosses; sorted.
 std::vector<Coord> crossed_leaves(const FloatGrid& u) {
     const LeafBand band(u);
     std::vector<LeafMask> negative(band.size());
@@ -66,9 +66,9 @@ std::vector<Coord> crossed_leaves(const FloatGrid& u) {
     return result;
 }
 
-/// Recomputes the distances on the leaves of a region that are in the zone; u is not changed if no surface is near one
-/// of these.
-/// @return whether there is one
+/// Recomputes the distances on the leaves of a region that are in the zone. If the surface is near none of them, u is
+/// not changed.
+/// @return whether the surface is near one of them
 bool recompute(const LeafBand& region, const std::vector<unsigned char>& zone, FloatGrid& u, const Domain& domain,
                double clamp) {
     const auto limit = static_cast<float>(clamp), h = static_cast<float>(domain.voxel_size);
@@ -117,9 +117,9 @@ bool recompute(const LeafBand& region, const std::vector<unsigned char>& zone, F
 
 constexpr float kNear = 1.5F;  // voxels
 
-/// |u| / |grad u| next to the front, its distance to second order, from voxel `u` of a padded buffer, in voxels;
-/// infinity if u is not close to a distance, or has a kink: the slope towards the front is then not that of central
-/// differences.
+/// The distance of a voxel next to the front, to second order: |u| / |grad u|, in voxels. Infinity if u is not close to
+/// a distance, or has a kink, so that upwind and central differences disagree.
+/// @param u  the voxel in a padded buffer
 float near_distance(const float* u) {
     constexpr float kKink = 0.25F, kNone = std::numeric_limits<float>::infinity();
     if (!(std::abs(*u) < kNear * float(kSteepest))) return kNone;
@@ -140,7 +140,7 @@ float near_distance(const float* u) {
 
 std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
                                       double clamp) {
-    // One more ring for the values of the leaves beyond.
+    // The region has one more ring of leaves, whose values are only read.
     std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());

@@ -13,12 +13,11 @@ namespace covol::detail {
 inline constexpr double kFlattest = 0.5, kSteepest = 2.0;
 
 /// Redistances u: the signed distance to its zero level set, clamped to `clamp` voxels (at most kTrackingWidth), in a
-/// band of kTrackingWidth voxels inside the domain, to first order by Godunov's scheme, as in the redistancing every
-/// few steps.
+/// band of kTrackingWidth voxels inside the domain, to first order by Godunov's scheme (LocalDistance).
 ///
-/// Under curvature alone a profile flattens at its clamp, which drags the surface (for a sphere, first-order
-/// convergence was lost), so it needs the whole width. Under advection the profile becomes a step as high as the clamp,
-/// and a higher step creeps faster off an image edge.
+/// If only curvature moves the surface, u flattens near the clamp, which disturbs the motion (for a sphere, first-order
+/// convergence was lost): the clamp should be kTrackingWidth. Under advection u becomes a step as high as the clamp,
+/// and a higher step moves off an image edge faster: the clamp should be smaller.
 /// @throws Error InvalidInput if u has no zero level set.
 void track_surface(FloatGrid& u, const Domain& domain, double clamp);
 
@@ -29,14 +28,14 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
                                       double clamp);
 
 /// The half width, in voxels, of the band of a surface that neither points nor edges hold. The influence of the band's
-/// end, which does not move, on the motion of the front decreases by a factor of e for each sqrt(delta tau): with tau =
-/// h^2 / delta to a thousandth.
+/// end, which does not move, on the motion of the front decreases by a factor of e for each sqrt(delta tau): for tau =
+/// h^2 / delta it is a thousandth at this width.
 inline constexpr double kFreeWidth = 7.0;
 
-/// Redistances u for a surface that neither points nor edges will hold, so that its path is the result. Where |grad u|
-/// is between kFlattest and kSteepest, voxels next to the front get u / |grad u|, which is accurate to second order and
-/// does not move the front: a ball of 16 voxels moves by less than 0.002. The others get the exact distance to the
-/// front's polygons, which lie within a convex front.
+/// Redistances u for a surface that neither points nor edges will hold, so that its path is the result, not a steady
+/// state. If |grad u| is between kFlattest and kSteepest, voxels next to the front get u / |grad u|, which is accurate
+/// to second order and does not move the front: a ball of 16 voxels moves by less than 0.002. The others get the exact
+/// distance to the front's polygons, which lie within a convex front.
 /// @throws Error InvalidInput if u has no zero level set.
 void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& run);
 

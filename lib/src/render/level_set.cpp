@@ -11,7 +11,7 @@
 namespace covol::figure {
 namespace {
 
-/// The extent of positions near the surface, the centres of voxels, which `add` joins.
+/// The extent of the centres of voxels within a voxel of the surface; add(centre, extent) enlarges an extent.
 template <typename Add>
 Extent extent_of(const FloatGrid& grid, const Add& add) {
     const openvdb::tree::LeafManager<const FloatGrid::TreeType> leaves(grid.tree());

@@ -12,7 +12,7 @@ namespace covol::figure {
 inline openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
 /// The cubic B-spline whose coefficients are the voxels: twice differentiable, so that normals do not show the voxels.
-/// It lies h/(3R) voxels inside a ball of radius R. For one thread.
+/// For a ball of radius R, its zero lies h/(3R) voxels inside, where h is the voxel size. For one thread.
 class SmoothField {
 public:
     explicit SmoothField(const FloatGrid& grid);
@@ -21,7 +21,7 @@ public:
         Vec3 gradient;  ///< world
     };
     [[nodiscard]] Sample at(const Vec3& world);
-    /// Only the value; away from the band that of the nearest voxel.
+    /// Only the value; outside the band that of the nearest voxel.
     [[nodiscard]] double value(const Vec3& world);
     [[nodiscard]] double voxel_size() const { return h_; }
 
@@ -37,13 +37,14 @@ private:
     double h_;
 };
 
-/// The world box of the voxels inside or near the surface.
+/// The world box of the centres of voxels within a voxel of the surface.
 /// @throws Error InvalidInput if there are none, or the voxels are not cubes.
 [[nodiscard]] WorldBox surface_box(const FloatGrid& grid);
 
-/// The extent of the surface.
+/// The extent of the same centres along the axes of a basis.
 [[nodiscard]] Extent surface_extent(const FloatGrid& grid, const Basis& basis);
-/// Its extent from `center` if it is rotated about the vertical axis through it, seen from that elevation.
+/// The extent, relative to `center`, of all rotations of the surface about the z axis through `center`, seen from an
+/// elevation in degrees.
 [[nodiscard]] Extent turning_extent(const FloatGrid& grid, const Vec3& center, double elevation);
 
 }  // namespace covol::figure

@@ -12,8 +12,8 @@
 namespace covol::figure {
 namespace {
 
-/// For each axis of the image the world axis along which it runs, and whether in the opposite direction. The three
-/// world axes are different.
+/// For each axis of the image the closest world axis, and whether they have opposite directions. The three world axes
+/// are different.
 struct Directions {
     std::array<int, 3> world{0, 1, 2};
     std::array<bool, 3> reversed{false, false, false};
@@ -33,7 +33,7 @@ Directions directions_of(const ImageGeometry& geometry) {
     return best;
 }
 
-/// Range of a world box in indices along an axis.
+/// The range of indices of a world box along an axis of the image.
 std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometry& geometry) {
     double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
     for (const Vec3& corner : corners(box)) {
@@ -44,7 +44,7 @@ std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometr
     return {low, high};
 }
 
-/// The same, limited to the image.
+/// A range of indices limited to the image.
 std::array<double, 2> inside(const std::array<double, 2>& range, int axis, const ImageGeometry& geometry) {
     const double last = geometry.size[axis] - 1.0;
     return {std::clamp(range[0], 0.0, last), std::clamp(range[1], 0.0, last)};
@@ -71,7 +71,7 @@ Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& ge
     }
     for (int a = 0; a < 3; ++a) {
         const double wider = margin * longest / geometry.spacing[a] + 0.5;
-        // Beyond the image only if a structure extends there.
+        // The region extends beyond the image only if a structure does.
         const double beyond = 0.25 * wider, little = 0.01 * (ranges[a][1] - ranges[a][0]);
         const double first = -0.5, last = geometry.size[a] - 0.5;
         const double low = ranges[a][0] < first - little ? ranges[a][0] - beyond : first;
@@ -87,7 +87,8 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
         constexpr std::array<std::array<int, 2>, 3> kLaid{{{2, 1}, {0, 2}, {0, 1}}};
         return {axis, index, kLaid[axis][0], kLaid[axis][1], false, false};
     }
-    // The patient's left is on the right, in sagittal planes the back; down is the back in axial planes, else the feet.
+    // The right side of the picture is the patient's left, in sagittal planes the back; the lower side is the feet, in
+    // axial planes the back.
     const Directions directions = directions_of(scene.image->geometry());
     const int normal = directions.world[axis], right = normal == 0 ? 1 : 0, down = normal == 2 ? 1 : 2;
     Plane plane{axis, index, 0, 0, false, false};
@@ -105,9 +106,10 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
 }
 
 MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeometry& geometry) {
-    constexpr double kNear = 0.1, kMax = 0.9;  // of an index; fraction of the marks
+    constexpr double kNear = 0.1;      // maximum distance from an integer index
+    constexpr double kOnSlices = 0.9;  // minimum fraction of the marks
     MarkedSlices found;
-    double min_fraction = 0.6;  // fraction of the slices between the first and the last mark
+    double sparsest = 0.6;  // marked slices / all slices from the first to the last of them; only fewer count
     for (const int a : {2, 1, 0}) {
         std::set<int> slices;
         std::size_t on = 0;
@@ -117,10 +119,11 @@ MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeome
             slices.insert(int(std::lround(at)));
             ++on;
         }
-        if (slices.empty() || double(on) < kMax * double(marks.size()) || 2 * slices.size() > marks.size()) continue;
+        if (slices.empty() || double(on) < kOnSlices * double(marks.size()) || 2 * slices.size() > marks.size())
+            continue;
         const double fraction = double(slices.size()) / (*slices.rbegin() - *slices.begin() + 1.0);
-        if (fraction >= min_fraction && slices.size() > 1) continue;
-        min_fraction = fraction;
+        if (fraction >= sparsest && slices.size() > 1) continue;
+        sparsest = fraction;
         found = {a, {slices.begin(), slices.end()}};
     }
     return found;
@@ -161,7 +164,7 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
         int cut = 0;
         for (const WorldBox& box : boxes) {
             const auto range = inside(range_of(box, axis, geometry), axis, geometry);
-            // Near a box's end only the tip of a structure is cut.
+            // Near a box's end, a slice only cuts the tip of the structure.
             const double tip = 0.15 * (range[1] - range[0]);
             cut += slice >= range[0] + tip && slice <= range[1] - tip ? 1 : 0;
         }

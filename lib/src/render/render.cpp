@@ -20,9 +20,9 @@ namespace figure {
 namespace {
 
 constexpr double kLow = 0.005, kHigh = 0.998;  // intensity percentiles shown as black and white
-constexpr double kRegionMargin = 0.08;         // around the structures on slices, of their longest side
+constexpr double kRegionMargin = 0.08;         // around the structures on slices, fraction of their longest side
 constexpr double kVolumeMargin = 0.15;
-constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // fraction of a view around its content
+constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // margins, as fractions of a view
 // Opacity of structures around others, and of all structures if the image's volume is to be visible inside.
 constexpr double kEnclosingOpacity = 0.35, kVolumeOpacity = 0.16;
 constexpr double kVolumeDensity = 4.0;
@@ -30,7 +30,7 @@ constexpr double kBytesPerPixel = 90;  // of colours, depths and normals while a
 constexpr int kPlanes = 3;
 constexpr std::size_t kMaxBalls = 3000;
 
-/// Text size that suits a picture of that size.
+/// Size of the font for a picture of this size, pixels.
 double text_size(int width, int height) { return std::max(9.0, 0.0185 * std::sqrt(double(width) * height)); }
 
 class Drawing {
@@ -125,8 +125,8 @@ private:
         }
     }
 
-    /// Puts the planes into the order of ways(). Beside the first plane the second lies on its side, so that both share
-    /// an axis; in other arrangements it lies like the third. Slices come column by column.
+    /// Puts the planes into the order of ways(). In the first arrangement the second plane is beside the first one and
+    /// has the same vertical axis; in the others its axes are exchanged. Slices are ordered column by column.
     void arrange(int way) {
         if (options_.slices) {
             std::vector<Plane> ordered;
@@ -249,7 +249,7 @@ private:
         draw_balls(canvas_, balls, camera, layer, radius_, slack);
     }
 
-    /// Of very many marks only some, because they would hide the surface.
+    /// Adds only every n-th mark if there are very many, because they would hide the surface.
     void add_balls(const std::vector<Vec3>& marks, const Color& color, std::vector<Ball>& balls) const {
         const std::size_t stride = all_marks_.size() / kMaxBalls + 1;
         for (std::size_t n = 0; n < marks.size(); n += stride) balls.push_back({marks[n], color});
@@ -279,7 +279,7 @@ private:
         return {"x", "y", "z"};
     }
 
-    /// Pixels below a view, for axes and the scale bar.
+    /// Height in pixels of the strip below a view for axes and the scale bar.
     [[nodiscard]] int rim() const { return int(std::lround(3.0 * text_)); }
 
     [[nodiscard]] double aspect() const {
@@ -292,7 +292,7 @@ private:
         draw_legend(canvas_, available.x, available.y, legend(), text_, theme_.ink);
     }
 
-    /// A large view, and the structures from the front, from the right and from above.
+    /// A large view, and the structures from the front, the right (the left if axes are anatomical) and above.
     void draw_views(const Rect& available) {
         std::array<const char*, kPlanes> names{"front", scene_.is_anatomical ? "left" : "right", "top"};
         std::array<Basis, kPlanes> bases;
@@ -378,8 +378,6 @@ private:
 
 }  // namespace
 }  // namespace figure
-
-namespace {}
 
 ViewDirection parse_view(const std::string& text, bool is_anatomical) {
     const double left = is_anatomical ? 90 : -90;

@@ -8,8 +8,8 @@
 
 namespace covol::figure {
 
-/// A key light over the left shoulder, a weaker one from the right, and ambient light; a wide and faint highlight;
-/// parts that turn away from the eye are darker, as under a cloudy sky.
+/// A key light from the viewer's upper left, a weaker light from the right, and ambient light; a wide and faint
+/// highlight. Parts whose normals turn away from the eye are darker.
 struct Lights {
     explicit Lights(const Basis& basis)
         : to_eye(basis.to_eye),

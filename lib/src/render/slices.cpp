@@ -16,9 +16,9 @@ namespace covol::figure {
 namespace {
 
 constexpr std::size_t kMaxMarks = 120;
-constexpr int kMaxSamples = 4;  // of the image along each side of a pixel
+constexpr int kMaxSamples = 4;  // samples of the image along each side of a pixel
 constexpr float kFar = 1e6F;    // pixels
-constexpr double kFlat = 0.2;   // slope below which the surface lies in the plane rather than across it
+constexpr double kFlat = 0.2;   // minimum slope within the plane: below it, the surface is nearly parallel to the plane
 
 /// The image's values in one plane.
 class Slice {
@@ -138,7 +138,7 @@ private:
         });
     }
 
-    /// For each pixel the two structures whose outlines are nearest: signed distances in pixels.
+    /// The two structures whose outlines are nearest to a pixel, with their signed distances in pixels.
     struct Nearest {
         int structure[2] = {-1, -1};
         float away[2] = {kFar, kFar};
@@ -152,7 +152,7 @@ private:
         }
     };
 
-    /// The zero of the level set: the distance from it is the value divided by its slope within the plane.
+    /// Adds the distances from the outline, the zero of a level set: its value divided by its slope within the plane.
     void find_outline(int n, std::vector<Nearest>& nearest) const {
         const int width = at_.width + 2, height = at_.height + 2;  // one more pixel on every side, for slopes
         std::vector<float> values(std::size_t(width) * height);
@@ -228,7 +228,7 @@ private:
             if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] <= 0.5 * thick)
                 places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
         }
-        // Of very many marks only some, because they would hide the outline.
+        // Draws only every n-th mark if there are very many, because they would hide the outline.
         const std::size_t stride = places.size() / kMaxMarks + 1;
         for (std::size_t n = 0; n < places.size(); n += stride) {
             const auto [x, y] = places[n];
@@ -253,7 +253,7 @@ private:
         draw_text(canvas_, at_.right() - pad, middle_y, across[plane_.mirror_across ? 1 : 0], style);
         style.align = Align::Center;
         draw_text(canvas_, middle_x, at_.bottom() - pad, down[plane_.mirror_down ? 1 : 0], style);
-        // Below the name if that extends beyond the middle.
+        // The upper letter is below the plane's name if that extends beyond the middle.
         const bool under = at_.x + 2 * pad + text_width(name, size) > middle_x - 0.5 * size;
         draw_text(canvas_, middle_x, at_.y + pad + cap + (under ? 1.2 * size : 0), down[plane_.mirror_down ? 0 : 1],
                   style);

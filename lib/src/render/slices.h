@@ -11,7 +11,7 @@ namespace covol::figure {
 
 /// A plane perpendicular to one of the image's axes, with its orientation on the picture.
 struct Plane {
-    int axis = 2;                                     ///< to which it is perpendicular
+    int axis = 2;                                     ///< the axis to which it is perpendicular
     double index = 0;                                 ///< along that axis
     int across = 0, down = 1;                         ///< axes of the image that run to the right and down
     bool mirror_across = false, mirror_down = false;  ///< the index increases to the left, upwards
@@ -35,20 +35,20 @@ struct Region {
 /// axes.
 [[nodiscard]] Plane plane_across(int axis, double index, const RenderScene& scene);
 
-/// Slices that a person marked: perpendicular to the axis along which the marks lie on few, whole indices; -1 and none
-/// if there is no such axis.
+/// The slices on which a person has set marks: perpendicular to the axis along which the marks have few indices, which
+/// are integers. If there is no such axis, `axis` is -1.
 struct MarkedSlices {
     int axis = -1;
     std::vector<int> slices;  ///< sorted
 };
 [[nodiscard]] MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeometry& geometry);
 
-/// `count` slices spread over the structures' boxes; each is the closest marked one if that is near enough.
+/// `count` slices spread over the structures' boxes; marked slices are preferred if they are near enough.
 [[nodiscard]] std::vector<int> spread_slices(int axis, int count, const std::vector<WorldBox>& boxes,
                                              const MarkedSlices& marked, const ImageGeometry& geometry);
 
-/// The index along an axis that cuts the most structures, closest to their middle; a marked slice if the axis has some
-/// within the structures.
+/// The slice that cuts the largest number of structures, and of several the one closest to their middle; a marked slice
+/// if there are any within the structures.
 [[nodiscard]] int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlices& marked,
                                const ImageGeometry& geometry);
 
@@ -71,7 +71,7 @@ void draw_slice(Canvas& canvas, const Rect& at, const Plane& plane, const Region
 [[nodiscard]] std::array<double, 2> place_on(const Rect& at, const Plane& plane, const Region& region, double pixel,
                                              const Vec3& index, const ImageGeometry& geometry);
 
-/// The letters of the directions to which and from which the image's axis points, "L" and "R" for example. For
+/// The letters of the directions to which and from which an axis of the image points, "L" and "R" for example. Only for
 /// anatomical axes.
 [[nodiscard]] std::array<std::string, 2> letters_of(int axis, const ImageGeometry& geometry);
 

@@ -25,16 +25,16 @@ constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
 constexpr double kOneWall = 1;                           // voxels: bodies closer than that have a common wall
 constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
 constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
-constexpr double kOpaque = 0.999;                        // hides everything behind
+constexpr double kOpaque = 0.999;                        // fraction from which on everything behind is hidden
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
-constexpr double kCosEdge = 0.8;  // cosine of the angle between neighbours' normals, above which a pixel is smooth
+constexpr double kCosEdge = 0.8;  // cosine between neighbouring pixels' normals: below it, there is an edge
 constexpr int kRows = 8;
 
 struct Hit {
     double depth = kMissing;  // towards the eye
     Vec3 normal{0, 0, 0};
     int body = -1;
-    bool enters = true;  ///< the ray enters the body here
+    bool enters = true;  ///< whether the ray enters the body here
 };
 
 /// The result of one ray.
@@ -86,7 +86,7 @@ public:
     }
 
 private:
-    /// If the ray leaves one body and enters the next through their common wall, the next is visible.
+    /// Whether the ray leaves a body through a wall in common with a body that it enters: only the latter is drawn.
     [[nodiscard]] bool is_behind_neighbour(const Hit& hit) const {
         if (hit.enters) return false;
         return std::any_of(hits_.begin(), hits_.end(), [&](const Hit& other) {
@@ -113,8 +113,8 @@ private:
         }
     }
 
-    /// The position on the smooth field nearest to the ray's intersection with the voxels. No body if the ray only
-    /// grazes the voxels, because their own outline would be visible.
+    /// The intersection of the ray with the smooth field's zero, near that with the interpolated voxels. Has no body if
+    /// the ray only grazes the voxels, because their outline would be visible otherwise.
     Hit refined(int n, const Vec3& origin, double t) {
         SmoothField& field = fields_[n];
         const Vec3 along = times(-1, camera_.basis.to_eye);

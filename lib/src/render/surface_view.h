@@ -20,11 +20,11 @@ struct Layer {
     int width = 0, height = 0;
     std::vector<Color> color;
     std::vector<float> fraction;
-    std::vector<float> depth;  ///< of the first surface, towards the eye from the camera's center; far away: -infinity
-    std::vector<float> solid;  ///< the same for the first that hides everything behind it
+    std::vector<float> depth;  ///< of the first surface, from the camera's center towards the eye; -infinity if none
+    std::vector<float> solid;  ///< the same for the first surface that hides everything behind it
 };
 
-/// One ray for each pixel, and sixteen where neighbours differ.
+/// Casts one ray for each pixel, and sixteen for pixels that differ from their neighbours.
 /// @throws Error InvalidInput (a grid that is not a level set), Cancelled.
 [[nodiscard]] Layer cast_surfaces(const std::vector<Body>& bodies, const Camera& camera, const RunContext& run);
 

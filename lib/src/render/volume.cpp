@@ -13,7 +13,7 @@ namespace {
 constexpr double kMaxVoxels = 3.2e7;
 constexpr double kMaxRays = 1.2e6;
 constexpr int kMaxSteps = 1200;
-constexpr double kDark = 0.12;  // treated as empty
+constexpr double kDark = 0.12;  // values up to this one are treated as empty
 
 Index3 choose_step(const VoxelBox& region, const Vec3& spacing) {
     Index3 step{1, 1, 1};

@@ -10,12 +10,12 @@
 
 namespace covol::figure {
 
-/// The image's values between black and white, as bytes; large images are downsampled by averaging.
+/// The image's values as bytes, from 0 for black to 255 for white; large images are downsampled by averaging.
 class Volume {
 public:
     /// @throws whatever reading the image throws.
     Volume(const Image& image, const VoxelBox& region, const std::array<double, 2>& window, const RunContext& run);
-    /// In [0,1]; at an index of the image, trilinear; 0 outside.
+    /// The trilinearly interpolated value in [0,1] at an index of geometry(); 0 outside.
     [[nodiscard]] double at(const Vec3& index) const;
     [[nodiscard]] const ImageGeometry& geometry() const { return geometry_; }
 
@@ -24,8 +24,8 @@ private:
     std::vector<std::uint8_t> voxels_;
 };
 
-/// The view of it behind the plane through the camera's center. Bright voxels hide what is behind them: with a
-/// `density` of 1, bright voxels along one side of the volume are nearly opaque.
+/// The view of the part of the volume behind the plane through the camera's center. Bright voxels hide what is behind
+/// them: with a `density` of 1, white voxels along the shortest side of the volume are nearly opaque.
 [[nodiscard]] Layer cast_volume(const Volume& volume, const Camera& camera, double density, bool on_white,
                                 const RunContext& run);
 

@@ -11,8 +11,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kGrowth = 1.15;  // of the cells, until the triangles are few enough
-// Of the edge at which that is expected: starting too fine costs an iteration, too coarse loses detail.
+constexpr double kGrowth = 1.15;  // of the cell size per iteration, until the triangles are few enough
+// First cell size, relative to the one at which this is expected: a smaller one costs iterations, a larger one detail.
 constexpr double kFirstFraction = 0.8;
 constexpr std::uint64_t kAxisBits = 21;  // of a cell's number, per axis
 
@@ -111,8 +111,8 @@ PageMesh cluster(PageMesh in, std::int64_t maximum) {
     if (std::int64_t(mesh.triangles.size()) <= maximum) return in;
     const Box box = box_of(mesh);
     const double longest = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]});
-    // Cells are no finer than their numbers allow. For a mesh with extent the loop ends, once one cell contains all of
-    // it.
+    // Cells are at least so large that kAxisBits suffice for their numbers. The loop ends at the latest when one cell
+    // contains the whole mesh.
     double edge = std::max(kFirstFraction * std::sqrt(2 * area_of(mesh) / double(maximum)), longest / double(1 << 20));
     if (!(edge > 0) || !std::isfinite(edge)) return in;
     Cells cells = cells_of(mesh, box, edge);

@@ -8,11 +8,11 @@
 // Encodings of bytes as text for a page.
 namespace covol::detail {
 
-/// RFC 4648, with padding.
+/// Base64 according to RFC 4648, with padding.
 [[nodiscard]] std::string to_base64(const std::uint8_t* data, std::size_t count);
 /// A zlib stream (RFC 1950). @param level  1: fast, to 9: small
 [[nodiscard]] std::string deflated(const std::vector<std::uint8_t>& bytes, int level);
-/// The same as base64.
+/// A zlib stream as base64.
 [[nodiscard]] std::string pack(const std::vector<std::uint8_t>& bytes);
 
 /// JSON text for a script element: no character in it ends the element or begins a comment.

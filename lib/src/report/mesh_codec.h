@@ -13,25 +13,25 @@ namespace covol::detail {
 struct CodedMesh {
     std::uint32_t vertex_count = 0, triangle_count = 0;
     std::array<float, 3> min{}, max{};  ///< the box, world units
-    /// For each axis x, y, z: the low bytes, then the high bytes, of each vertex's step from the one before, modulo
-    /// 2^16. Vertices are in the order in which the triangles use them.
+    /// For each axis x, y, z: the low bytes, then the high bytes, of the differences between each vertex and the
+    /// previous one, modulo 2^16. Vertices are in the order in which the triangles use them.
     std::vector<std::uint8_t> positions;
-    /// For each corner how far its vertex is behind the next new one, 7 bits per byte, the lowest first, all but the
-    /// last byte with the bit 128: 0 is that new vertex.
+    /// For each corner the number of vertices used so far, minus the number of its vertex: 0 is a new vertex. 7 bits
+    /// per byte, the lowest first; all bytes of a number except the last have the bit 128.
     std::vector<std::uint8_t> corners;
-    std::vector<std::uint32_t> from;  ///< the mesh's vertex for each coded one
+    std::vector<std::uint32_t> from;  ///< for each coded vertex its number in the mesh
 };
 [[nodiscard]] CodedMesh encode(const TriangleMesh& mesh);
 
 /// The mesh that a browser decodes.
 [[nodiscard]] TriangleMesh decode(const CodedMesh& coded);
 
-/// Values in 255 steps between their minimum and maximum; each byte is the difference from the one before.
+/// Values in 255 steps between their minimum and maximum; each byte is the difference from the previous value.
 struct CodedValues {
     float min = 0, max = 0;
     std::vector<std::uint8_t> steps;
 };
-/// Of values[from[0]], values[from[1]], ...; values that are not finite count as the maximum of the others.
+/// Encodes values[from[0]], values[from[1]], ...; values that are not finite count as the maximum of the others.
 [[nodiscard]] CodedValues encode(const std::vector<float>& values, const std::vector<std::uint32_t>& from);
 
 }  // namespace covol::detail

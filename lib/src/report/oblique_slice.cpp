@@ -25,7 +25,7 @@ Vec3 place_of(const ObliqueRequest& wanted, double x, double y) {
     return place;
 }
 
-/// The voxels of a level around some positions in its own indices, limited to the level.
+/// The voxels of a level between two positions, given as the level's indices, and around them; limited to the level.
 VoxelBox box_around(const Vec3& low, const Vec3& high, const Index3& size) {
     VoxelBox box;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -36,7 +36,7 @@ VoxelBox box_around(const Vec3& low, const Vec3& high, const Index3& size) {
     return box;
 }
 
-/// Interpolates between the voxels of a box; beyond it the outermost values continue.
+/// Interpolates between the voxels of a box; beyond the box, the nearest value in it is used.
 double sample(const std::vector<float>& values, const VoxelBox& box, const Vec3& place) {
     const Index3 size = box.size();
     std::array<std::size_t, 3> at{}, next{};
@@ -67,7 +67,7 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
         throw Error(Errc::InvalidOptions,
                     "oblique slice: expected 1 to " + std::to_string(kMaxPixels) + " pixels along each side");
     const double pixel = std::clamp(std::min(length(wanted.right), length(wanted.down)), 1.0, double(1 << 20));
-    // A power of two, like the factors of levels.
+    // Rounded down to a power of two, as factors of levels usually are.
     const std::size_t at = image.level_for(1 << int(std::floor(std::log2(pixel))));
     const ImageLevels::Level& level = image.levels()[at];
     const Index3& whole = image.levels().front().size;
@@ -100,7 +100,7 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
             if (high[a] < -0.5 || low[a] > level.size[a] - 0.5) return;
         const VoxelBox box = box_around(low, high, level.size);
         const Index3 size = box.size();
-        // Pixels that are far apart are read one by one.
+        // If pixels are so far apart that the box is too large, the voxels of each pixel are read separately.
         const bool is_whole = double(size[0]) * size[1] * size[2] <= kMaxOfTile;
         std::vector<float> values;
         const auto load = [&](const VoxelBox& part) {

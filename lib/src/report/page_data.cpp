@@ -61,7 +61,7 @@ SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
     return plan;
 }
 
-/// The first and last voxel of a pixel. A coarse level may lack the image's last voxels: then its own last one is used.
+/// The first and last voxel of a pixel. If a coarse level does not cover the image's end, its last voxel is used there.
 std::array<std::int32_t, 2> voxels_of(std::int32_t pixel, std::int32_t step, std::int32_t size) {
     const std::int32_t first = std::int32_t(std::min(std::int64_t(pixel) * step, std::int64_t(size) - 1));
     return {first, std::int32_t(std::min(std::int64_t(first) + step, std::int64_t(size)) - 1)};
@@ -104,7 +104,7 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
                           const RunContext& run) {
     const SlicePlan plan = plan_slice(image, wanted);
     const int width = plan.part.width, height = plan.part.height;
-    if (!image.is_in_chunks() && image.image().chunks()) {  // a compressed stream: its layers are decoded once
+    if (!image.is_in_chunks() && image.image().chunks()) {  // a compressed stream: the slice is decoded once, here
         VoxelBox slice = image.image().held();
         slice.min[plan.along] = slice.max[plan.along] = plan.at;
         image.image().load(slice, run);
@@ -113,7 +113,8 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
     PageSlice coded{width, height, *std::max_element(factor.begin(), factor.end()), {}};
     const std::size_t bytes_of_row = 2 * std::size_t(width);
     std::vector<std::uint8_t> bytes(bytes_of_row * std::size_t(height));
-    // For an image in chunks, as many rows at once that each chunk is looked up only once; more would take much memory.
+    // For an image in chunks, the rows of one layer of chunks are coded at once, so that each chunk is looked up once;
+    // more rows would take much memory.
     const int chunk = image.is_in_chunks() ? std::max(1, image.chunk_size(plan.level)[plan.down] / plan.rows) : 1;
     const int offset = plan.part.y % chunk;
     tbb::parallel_for(0, (offset + height - 1) / chunk + 1, [&](int n) {

@@ -15,9 +15,9 @@ struct SlicePlan {
     Index3 step{1, 1, 1};  ///< voxels of the image per voxel shown
     Index3 size{0, 0, 0};  ///< voxels that are shown
 };
-/// At most `maximum` voxels, if three along each axis allow it: all that are held, or, if these are too many, the
-/// voxels around `places`, subsampled along the finest axis first.
-/// @param places  world units; none: the whole image is used
+/// Chooses at most `maximum` voxels, unless three along each axis are more: all held voxels, or, if these are too many,
+/// those around `places`, which are subsampled along the axis with the smallest spacing first if necessary.
+/// @param places  world units; if there are none, all held voxels are used
 [[nodiscard]] SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held,
                                     const std::vector<Vec3>& places, std::int64_t maximum);
 
@@ -28,7 +28,7 @@ struct CodedSlices {
     double black = 0, white = 0;
     std::vector<std::string> jpegs;  ///< base64
 };
-/// Along i and j voxels are averaged, along k every n-th slice represents its neighbours.
+/// Voxels are averaged along i and j; along k, only every step[2]-th slice is used.
 /// @throws Error Cancelled; whatever reading the image throws.
 [[nodiscard]] CodedSlices encode_slices(const Image& image, const SlicePlan& plan, int quality, const RunContext& run);
 

@@ -50,7 +50,7 @@ const SchemeKernels& kernels() {
     return chosen;
 }
 
-// Plane by plane, then row by row, then voxel by voxel: what is copied may itself be a copy.
+// Planes are copied first, then rows, then voxels, because a copied value may itself be a copy.
 void mirror_outside(float* values, const int lo[3], const int hi[3]) {
     for (int i = -1; i <= 8; ++i)
         if (const int from = std::clamp(i, lo[0], hi[0]); from != i)

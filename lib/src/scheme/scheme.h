@@ -52,7 +52,7 @@ struct SchemeConstants {
     float edge_epsilon2;  ///< ε² of |∇g|, per voxel
 };
 
-/// Properties of the rows of a leaf.
+/// Properties of the equations (matrix rows) of a leaf.
 struct RowFacts {
     float largest;    ///< maximum of Σ_q |a_pq| over active rows
     double residual;  ///< Σ (Gauss-Seidel value - u)² over active voxels at u = u^{n-1}
@@ -62,8 +62,8 @@ struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
     /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22), divided by the row's diagonal, c[q] = -a_pq / a_pp >= 0,
-    /// so that a row is u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each is accurate to half a unit, and their sum
-    /// is less than 1.
+    /// so that a row is u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each c is accurate to half of 1/kFractionUnit,
+    /// and their sum is less than 1.
     /// @param u      padded, with edges and corners
     /// @param phi    padded (faces), potential of the points' attraction; null if there is none
     /// @param g      padded (faces), edge detector; null if there is none
@@ -81,7 +81,7 @@ struct SchemeKernels {
                     int inner, const NextRows& next);
 
     /// out = fraction * image + weight * Σ_q u_q - out on every voxel, the sum over the six neighbours: a step of
-    /// Clenshaw's recurrence in their mean.
+    /// Clenshaw's recurrence in the mean of the neighbours.
     void (*mean_step)(const LeafStar& u, const float* image, float fraction, float weight, float* out);
 
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
@@ -111,13 +111,13 @@ struct SchemeKernels {
 /// boundary is elsewhere) take the value of the nearest voxel inside.
 void mirror_outside(float* padded_values, const int lo[3], const int hi[3]);
 
-/// Removes the faces on that boundary from the rows, and rows outside it altogether.
+/// Sets the coefficients of faces on the boundary lo..hi, and all coefficients of voxels outside of it, to 0.
 void close_faces(Fraction* c, const int lo[3], const int hi[3]);
 
-/// The fastest set that this processor supports; COVOL_SIMD=baseline|avx2|avx512 in the environment chooses another.
+/// The fastest kernels that this processor supports; COVOL_SIMD=baseline|avx2|avx512 in the environment selects others.
 const SchemeKernels& kernels();
 
-/// Every set that this processor supports, the slowest first.
+/// All kernels that this processor supports, the slowest first.
 std::vector<const SchemeKernels*> available_kernels();
 
 }  // namespace covol::detail

@@ -120,7 +120,7 @@ void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask
             add(norm, sums.norm);
             for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
         }
-        // The ninth faces of eight rows form one more bundle, whose lanes run along j.
+        // The ninth faces of eight rows form one more vector, whose lanes run along j.
         const float* q = voxel(i, 0) + 8;
         const float* z = vertex(i, 0) + 8;
         const auto lanes = [](const float* first) { return load_strided(first, kRow); };

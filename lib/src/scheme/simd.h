@@ -1,5 +1,5 @@
 #pragma once
-// Bundles of 8 floats by the compiler's vector extension: one source for SSE2, AVX2, AVX-512 and other processors.
+// Vectors of 8 floats by the compiler's vector extension: one source for SSE2, AVX2, AVX-512 and other processors.
 // Only for files that are compiled for one instruction set each: everything here has internal linkage.
 
 #if defined(__SSE2__)
@@ -19,7 +19,7 @@ typedef unsigned UnsignedLanes __attribute__((vector_size(32)));
 
 inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
 inline void store(float* p, Lanes v) { *reinterpret_cast<LooseLanes*>(p) = v; }
-/// Eight whole numbers of 16 bits, 0 to 65535.
+/// Eight 16-bit integers, 0 to 65535, as floats.
 inline Lanes load_fractions(const unsigned short* p) {
 #if defined(__AVX2__)
     const LaneBits whole = (LaneBits)_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
@@ -31,9 +31,9 @@ inline Lanes load_fractions(const unsigned short* p) {
 inline void store(unsigned short* p, LaneBits v) {
     *reinterpret_cast<LooseShorts*>(p) = __builtin_convertvector(v, LooseShorts);
 }
-/// v[k-1], and at k = 0 of `edge`.
+/// Lane k is v[k-1]; lane 0 is edge[0].
 inline Lanes shifted_up(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 8, 0, 1, 2, 3, 4, 5, 6); }
-/// v[k+1], and at k = 7 of `edge`.
+/// Lane k is v[k+1]; lane 7 is edge[7].
 inline Lanes shifted_down(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 1, 2, 3, 4, 5, 6, 7, 15); }
 inline Lanes broadcast(float x) { return Lanes{} + x; }
 inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
@@ -47,7 +47,7 @@ inline bool any(LaneBits mask) {
     return bits != 0;
 #endif
 }
-/// Every `stride`-th float.
+/// Eight floats, `stride` apart.
 inline Lanes load_strided(const float* p, int stride) {
     return Lanes{p[0],          p[stride],     p[2 * stride], p[3 * stride],
                  p[4 * stride], p[5 * stride], p[6 * stride], p[7 * stride]};

@@ -16,7 +16,7 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr double kMaxReach = 1 << 22;  // voxels from a lattice's origin, with some margin
+constexpr double kMaxReach = 1 << 22;  // maximum distance from a lattice's origin, voxels, with some margin
 
 /// Sets the weights of terms of Eq. (3) to zero if the input that they need is missing.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
@@ -47,14 +47,14 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
     const double maximum = away[away.size() * 99 / 100];
-    // Otherwise the others hardly fit without it: the voxels are too small.
+    // No outlier: the farthest point fits, or the others hardly fit without it, because the voxels are too small.
     if (far < kMaxReach * h || maximum >= kMaxReach / 2 * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
                                         " times as far as 99 % of them; remove it if it is a mistake");
 }
 
-// Points without an image are a cloud if they enclose something, so that they determine inside and outside themselves.
+// Points without an image are a cloud if they do not lie in one plane, and are many or fill a solid.
 bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
     if (is_any<CloudStart>(o.start)) {
@@ -125,7 +125,7 @@ Choices with_flow(const Problem& problem, Choices c) {
     if (!c.evolve.delta) c.evolve.delta = delta_voxels * c.h;
     const bool is_final_start =
         (guesses || c.start == StartMethod::Cloud) && problem.is_guided() && uses_points(c.evolve);
-    if (is_final_start || c.start == StartMethod::Corrected) return c;  // no flow follows; a later frame may need delta
+    if (is_final_start || c.start == StartMethod::Corrected) return c;  // no flow; a later time frame may need delta
     if (!problem.options.evolve.delta)
         remarks.choose("delta", number(*c.evolve.delta), number(delta_voxels) + " voxels", run);
     c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels set their own time steps
@@ -194,7 +194,7 @@ Resolved resolve(const Problem& problem) {
         const Timed timed(c.report.seconds.tag);
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
-        // If a cloud encloses nothing, or fills a solid, its surface is that of the indicator alone.
+        // Without quadrics (the cloud encloses nothing, or fills a solid) the surface is that of the indicator alone.
         const double h = c.cloud->has_quadrics ? 0 : kCommon.precision_voxels * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;
@@ -213,7 +213,7 @@ Resolved resolve(const Problem& problem) {
         }
     }
     points = merged(points, c.h, run);
-    // Points of walls within the body are reported as such; they do not lie on the surface.
+    // Points enclosed by the surface, such as on walls within the body, are reported separately and not measured.
     const bool are_enclosed = c.cloud && c.cloud->enclosed > 0;
     c.measured_marks = options.contours ? problem.given : are_enclosed ? c.cloud->points : points;
     if (c.start == StartMethod::Tagged) c.start = guess_or_tag(problem, points, remarks);
@@ -239,7 +239,7 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     const auto finer = [&](double spacing, double enough) {
         const double times = std::sqrt(double(distinct.size()) / enough);
-        // If points lie on curves, their spacing is too small for the extent of the surface.
+        // If points lie densely on curves, their spacing would give too many voxels for the extent of the surface.
         const WorldBox box = bounding_box(distinct);
         double area = 0;
         for (int a = 0; a < 3; ++a)
@@ -261,8 +261,8 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
         return {h, number(kCommon.precision_voxels) + " times the noise of the points, " + number(scale.noise)};
     }
     const double spacing = measure_spacing(distinct).median;
-    // A guess is well defined between its points, whatever the noise: its surface gets as many voxels as that of the
-    // maximum number of points.
+    // A guess is smooth between its points, regardless of their noise: its surface gets as many voxels as one through
+    // the maximum number of marks of a guess.
     if (!tagged) return finer(spacing, double(kAutomatic.max_guess_marks));
     const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
     // With few points and voxels as large as their spacing, the surface would be so few voxels wide that curvature

@@ -14,7 +14,7 @@ namespace covol::pipeline {
 /// Warns of marks that lie far from all others, before any processing.
 [[nodiscard]] Remarks doubt_isolated_marks(const Problem& problem);
 
-/// Which of a set of positions distributed over the image's border lie inside `u`; empty without an image.
+/// For each of a fixed set of positions on the image's border, whether it is inside `u`; empty without an image.
 [[nodiscard]] std::vector<char> inside_on_border(const Problem& problem, const FloatGrid& u);
 
 /// Rejects a surface that is inside out: most of the image's border is inside although neither marks, nor seeds, nor a
@@ -23,12 +23,11 @@ namespace covol::pipeline {
 /// @throws Error InvalidInput
 void require_outside(const Problem& problem, const FloatGrid& u, const std::vector<char>& in_start);
 
-/// Distance from every mark, beyond which the marks do not support a surface any more: half the diagonal of their box,
-/// the radius of the ball around it.
+/// Distance from all marks beyond which the marks do not support a surface: half of the diagonal of their bounding box.
 [[nodiscard]] double far_from_marks(const std::vector<Vec3>& marks);
 
 /// Maximum plausible distance of a mark from the surface that it marks, world units.
-/// @param noise  of a cloud, else 0
+/// @param noise  standard deviation of a cloud's noise; 0 for other points
 [[nodiscard]] double largest_error_of_marks(const Problem& problem, double h, double noise);
 
 /// Whether so many trusted marks lie off the zero level set of `u` that it cannot be the marked surface.

@@ -8,18 +8,19 @@ namespace covol {
 
 /// Automatic choices: choices.cpp.
 struct AutomaticHeuristics {
-    /// [marks] Maximum for a guess, or for the correction of a start: more take long, and are dense enough for tagging.
+    /// [marks] Maximum number for a guess, or to correct a start. More take long, and are dense enough for tagging.
     std::size_t max_guess_marks = limit("automatic.max_guess_marks", 4000);
     /// [voxels] Displacement of a surface from which on it is noticeable: closer points are merged, and thicker layers
     /// of them are averaged.
     double noticeable_voxels = heuristic("automatic.noticeable_voxels", 0.25);
-    /// [points] With fewer tagged points, the voxel size is reduced until the surface has as many voxels as with this
-    /// many.
+    /// [points] With fewer tagged points than this, the voxels are made smaller, so that the surface has as many voxels
+    /// as with this number of points.
     double few_points = heuristic("automatic.few_points", 1000);
-    /// [voxels] Maximum on the sides of the box around few points, to limit the time. A ball has 35,000, thin parts ten
-    /// times as many; points on curves would give more, the closer they lie.
+    /// [voxels] Maximum number on the six sides of the points' bounding box, to limit the time. Points around a ball
+    /// give 35,000, around thin parts ten times as many; points on curves would give more, the closer they lie
+    /// together.
     double max_box_voxels = limit("automatic.max_box_voxels", 3e5);
-    /// [voxels] Maximum number on the surface for each point; clouds on closed surfaces have 4 to 8.
+    /// [voxels] Maximum number of voxels on the surface per point; clouds on closed surfaces have 4 to 8.
     double max_facets = limit("automatic.max_facets", 20);
     /// [voxels] Weight of curvature after tagging with an image.
     double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.5);
@@ -30,17 +31,17 @@ COVOL_HEURISTICS AutomaticHeuristics kAutomatic{};
 
 /// The flow of a run: solve/.
 struct FlowHeuristics {
-    /// [voxels a step] Minimum tolerance of flows whose result is only a start; not larger, because a surface far from
-    /// edges and points moves slowly, too.
+    /// [voxels a step] Minimum tolerance of a flow whose result is the start of another flow. A larger value would end
+    /// it too early, because a surface far from edges and points also moves slowly.
     double rough_tolerance = heuristic("flow.rough_tolerance", 5e-3);
-    /// [voxels] Time step of such flows if it is automatic; else, in the approach, the factor of the given one.
+    /// [voxels] Automatic time step of such a flow. In approach(), the given time step is multiplied by this number.
     double rough_tau = heuristic("flow.rough_tau", 2.0);
     /// [voxels] Minimum width of a domain for an automatic coarse level: in a smaller one it saves little time, and
     /// thin structures may be lost.
     int min_coarsened = heuristic("flow.min_coarsened", 64);
-    /// [steps] Maximum number of steps of the approach by the points alone.
+    /// [steps] Maximum number of steps of the first flow after tagging, in which only the points attract.
     int approach_steps = heuristic("flow.approach_steps", 40);
-    /// [passes] Maximum in which the image moves the body between contours.
+    /// [passes] Maximum number of times that the image moves the body between contours.
     int contour_passes = heuristic("flow.contour_passes", 3);
     /// [distances between marked slices] Range within which the image may move the body between contours in one pass.
     double contour_range = heuristic("flow.contour_range", 0.25);
@@ -51,40 +52,42 @@ COVOL_HEURISTICS FlowHeuristics kFlow{};
 struct DoubtsHeuristics {
     /// [radii of the largest ball inside a guess] Distance of a mark from the guess, above which the guess is
     /// unreliable there: of 60 masks of five thin structures that lacked a quarter, with 5 to 30 marks, 15 had a mark
-    /// that lay farther; 9 of these became worse, as did 3 of the others.
+    /// farther away; correction made 9 of these worse, and 3 of the other masks.
     double far_from_guess = heuristic("doubts.far_from_guess", 4.0);
-    /// [probability] That the image varies more at a mark than beside it, below which it does not show the marked
-    /// border: 0.5 for an unrelated image; 0.39 to 1 with the right marks, on eight structures of five images.
+    /// [probability] Minimum probability that the image varies more at a mark than beside it, for the image to show the
+    /// marked border: 0.5 for an unrelated image; 0.39 to 1 with the right marks, on eight structures of five images.
     double image_support = heuristic("doubts.image_support", 0.4);
-    /// [standard errors] Of that probability, added to the measured value before it is compared.
+    /// [standard errors] Number added to the measured probability before it is compared with image_support.
     double support_errors = heuristic("doubts.support_errors", 2.0);
     /// [Dice] Expected Dice below which a result is doubted: of 26 results with less than 0.8, 24 were below it, of 94
     /// with more than 0.9, two.
     double min_expected_dice = heuristic("doubts.min_expected_dice", 0.87);
-    /// [nats] Gain of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with the right marks, on the
-    /// same structures.
+    /// [nats] Minimum gain of guidance per mark: the gain is 0 to 0.06 with noise in place of the image, and 0.08 to
+    /// 1.2 with the right marks, on the structures of image_support.
     double min_gain = heuristic("doubts.min_gain", 0.05);
-    /// [probability] As above, from which on a low gain alone raises no doubt: at most 0.62 for shifted, mirrored or
-    /// randomly placed marks, 0.59 to 0.86 for the right marks on dim nuclei, whose gain is low, too.
+    /// [probability] Probability as for image_support, from which on a low gain alone raises no doubt: at most 0.62 for
+    /// shifted, mirrored or randomly placed marks, 0.59 to 0.86 for the right marks on dim nuclei, whose gain is also
+    /// low.
     double clear_support = heuristic("doubts.clear_support", 0.65);
-    /// [fraction of the slope] Of the image at the marks, relative to the steepest slope within ten voxels beside them:
-    /// 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a nucleus with poor
-    /// labels); below 0.5 for 15 of these 34 if the marks are of a body 0.6 times as large, for 25 if it is 1.5 times
-    /// as large.
+    /// [fraction of the slope] Minimum slope of the image at the marks, relative to the steepest slope within ten
+    /// voxels beside them: 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a
+    /// nucleus with poor labels); below 0.5 for 15 of these 34 structures if the marks are of a body 0.6 times as
+    /// large, and for 25 if that body is 1.5 times as large.
     double border_fraction = heuristic("doubts.border_fraction", 0.6);
-    /// [ratio] Of the estimated noise to that deviation, above which folds were mistaken for noise: up to 1.5 for noise
-    /// of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
+    /// [ratio] Estimated noise over the deviation of neighbouring points from a sheet, above which folds were mistaken
+    /// for noise: up to 1.5 for noise of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
     double folded_noise = heuristic("doubts.folded_noise", 1.75);
-    /// [marks] For each handle, if there are several, of a surface through marks; with fewer, the handles are doubted.
+    /// [marks] Minimum number per handle of a surface through marks with several handles; with fewer, these are
+    /// doubted.
     double marks_of_handle = heuristic("doubts.marks_of_handle", 100);
 };
 COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 
 /// Starts of a run: segment/start.
 struct StartsHeuristics {
-    /// [voxels] Weight of curvature for a start that lies at the edges.
+    /// [voxels] Weight of curvature for a start that was grown to the image's edges.
     double grown_delta_voxels = heuristic("starts.grown_delta_voxels", 0.1);
-    /// [longest sides] Margin of the domain around points alone, beyond which a surface between them is cut.
+    /// [longest sides] Margin of the domain around the box of points without an image. The surface is cut at its end.
     double margin_fraction = heuristic("starts.margin_fraction", 0.2);
 };
 COVOL_HEURISTICS StartsHeuristics kStarts{};

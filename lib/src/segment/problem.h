@@ -9,8 +9,8 @@ namespace covol::pipeline {
 
 /// Marks by what they are used for; world units.
 struct MarkSets {
-    std::vector<Vec3> attracting;  ///< all that attract, including those interpolated between slices of contours
-    std::vector<Vec3> trusted;     ///< those of them that are not interpolated
+    std::vector<Vec3> attracting;  ///< all marks that attract, including points interpolated between slices of contours
+    std::vector<Vec3> trusted;     ///< the attracting marks that are not interpolated
 };
 
 /// The input of one structure, as given. The objects that it refers to must outlive it.
@@ -39,9 +39,9 @@ struct Problem {
     /// the options) around it, as voxels of one lattice. The positions of voxels depend only on h and on the image or
     /// the given origin, so that runs on parts of an image or a cloud give grids with the same transform.
     [[nodiscard]] Domain domain(double h, const std::vector<Vec3>& points, double margin) const;
-    /// The same with this margin, regardless of the options.
+    /// domain() with this margin, regardless of the options.
     [[nodiscard]] Domain domain_with_margin(double h, const std::vector<Vec3>& points, double margin) const;
-    /// `fine` on the lattice of larger voxels, which is also the same for all parts.
+    /// The domain that covers `fine` with voxels of size h. Its lattice, too, is the same for all parts of an image.
     [[nodiscard]] Domain coarsened(const Domain& fine, double h) const;
     /// The limits of a solid regardless of the marks: the image's box, rotated like the image, and the region of
     /// interest.

@@ -20,7 +20,7 @@ public:
     void choose(const std::string& what, const std::string& value, const std::string& reason, const RunContext& run);
     /// Records a warning, and logs it.
     void warn(const std::string& line, const RunContext& run);
-    /// Adds those of a later step; of two values for one choice the later one is kept.
+    /// Adds the remarks of a later step. If both contain the same choice, the later value is kept.
     void add(const Remarks& later);
     void move_to(SegmentReport& report) &&;
 

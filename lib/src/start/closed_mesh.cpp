@@ -13,7 +13,7 @@ namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// The directed edges that would close each rim, by their first vertex. At each vertex as many begin as end.
+/// The directed edges that would close each rim, by their first vertex. At each vertex as many edges begin as end.
 std::map<std::uint32_t, std::vector<std::uint32_t>> missing_edges(const TriangleMesh& mesh) {
     std::vector<std::pair<Edge, int>> edges;
     edges.reserve(3 * mesh.triangles.size());

@@ -6,7 +6,7 @@ namespace covol::detail {
 /// The result of closing a mesh.
 struct ClosedMesh {
     TriangleMesh mesh;        ///< each edge occurs equally often in both directions, so that there is an inside
-    int holes = 0;            ///< number that was closed; 0 if the mesh was closed
+    int holes = 0;            ///< number of holes that were closed
     double cap_fraction = 0;  ///< area of the caps / area of the mesh
 };
 

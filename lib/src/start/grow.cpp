@@ -33,7 +33,7 @@ Spread spread_of(std::vector<float> values) {
     return spread;
 }
 
-/// A box of the domain, k fastest.
+/// A box of voxels of the domain; k varies fastest.
 class Box {
 public:
     Box(const Coord& min, const Coord& max) : min_(min), size_(max - min + Coord(1)) {}
@@ -156,13 +156,13 @@ public:
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }
 
-    /// 1 in the region of the best front.
+    /// 1 inside the best front, else 0.
     [[nodiscard]] std::vector<float> region() const {
         std::vector<float> in(image_.size(), 0.0F);
         for (std::size_t n = 0; n < best_count_; ++n) in[order_[n]] = 1;
         return in;
     }
-    /// Whether the best front reaches the box's end where that is not the domain's.
+    /// Whether the best front reaches a side of the box that is not a side of the domain.
     [[nodiscard]] bool needs_more(const Domain& domain) const {
         for (std::size_t n = 0; n < best_count_; ++n) {
             const Coord at = box_.at(order_[n]);
@@ -175,7 +175,7 @@ public:
     }
 
 private:
-    /// The mean change across the front, minus the error of a mean over that many faces that noise causes.
+    /// The mean change across the front, minus the error that noise causes in a mean over this number of faces.
     [[nodiscard]] double edge() const {
         if (faces_ <= 0) return 0;
         const auto count = double(faces_);
@@ -236,7 +236,7 @@ private:
 
     const Box& box_;
     const std::vector<float>&image_, &level_;
-    double voxel_, correlated_faces_;  // number of faces of a front that have a common error
+    double voxel_, correlated_faces_;  // number of faces of a front whose errors are correlated
     Spread inside_;
     std::vector<float> arrival_;
     std::vector<char> taken_;

@@ -13,11 +13,11 @@ struct GrownStart {
     std::string why;         ///< the reason in either case, one line for the user
 };
 
-/// If the image is the same inside a start and on its surface, a front starts there. It is slow where the image differs
-/// from the inside, so that it covers an object before it leaves it (Malladi, Sethian and Vemuri, IEEE PAMI 17, 1995;
-/// Cohen and Kimmel, IJCV 24, 1997). Of all its positions the one with the largest mean change of the image across the
-/// front is used.
-/// @param start  negative inside, like the starts of band.h
+/// Expands a start that lies inside an object: if the image is the same inside the start and on its surface, a front
+/// begins there. It is slow where the image differs from the inside, so that it fills the object before it leaves it
+/// (Malladi, Sethian and Vemuri, IEEE PAMI 17, 1995; Cohen and Kimmel, IJCV 24, 1997). The position of the front with
+/// the largest mean change of the image across it is returned.
+/// @param start  a level set, negative inside, such as those of start.h
 /// @param sigma  of the Gaussian with which the image is smoothed, world units
 [[nodiscard]] GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigma, const RunContext& run);
 

@@ -5,12 +5,13 @@
 namespace covol {
 
 /// Growing to the image's edges: grow.cpp. The front is that of Malladi, Sethian and Vemuri, Shape modeling with front
-/// propagation, IEEE Trans. Pattern Anal. Mach. Intell. 17(2), 1995; the stopping criterion is not from there.
+/// propagation, IEEE Trans. Pattern Anal. Mach. Intell. 17(2), 1995; the stopping criterion differs.
 struct GrowHeuristics {
-    /// [of the best front's edge] A start whose edge is at least as strong lies at an edge already; once the front's
-    /// edge is weaker, the front has left the best edge.
+    /// [of the best front's edge] A start with a stronger edge than this already lies at an edge. A front with a weaker
+    /// edge stops, because it has passed the best one.
     double passed = heuristic("grow.passed", 0.5);
-    /// [spreads] Minimum mean change across the front that is not caused by noise.
+    /// [spreads] Minimum mean change across the front, relative to the spread of the image inside the start, for an
+    /// edge.
     double clear = heuristic("grow.clear", 0.3);
 };
 COVOL_HEURISTICS GrowHeuristics kGrow{};

@@ -19,7 +19,7 @@
 namespace covol {
 namespace {
 
-/// The other one on the lattice of the first; null if none of it lies in the domain of the first.
+/// `other` on the lattice of `first`; null if no part of it lies in the domain of `first`.
 FloatGridPtr on_lattice_of(const LevelSet& first, const LevelSet& other, const RunContext& run) {
     const Domain domain = first.domain();
     return domain == other.domain() ? other.grid().deepCopy() : start_from_grid(domain, other.grid(), run);

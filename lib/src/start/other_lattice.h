@@ -21,7 +21,7 @@ public:
     openvdb::Vec3d operator()(int i, int j, int k) const {
         return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
     }
-    /// The shift from a voxel to that of the source, if the lattices coincide.
+    /// The difference between the indices of a voxel in the source and in the domain, if the lattices coincide.
     [[nodiscard]] std::optional<openvdb::Coord> shift() const;
     /// The source's voxels that interpolation at the voxels lo..hi reads.
     [[nodiscard]] openvdb::CoordBBox box(const openvdb::Coord& lo, const openvdb::Coord& hi) const;
@@ -31,8 +31,8 @@ private:
     std::array<openvdb::Vec3d, 3> along_;
 };
 
-/// False if all values in the box have the same sign. For boxes larger than a leaf with its next layer the test would
-/// take longer than it may save; it returns true.
+/// False if all values in the box have the same sign. Boxes larger than a leaf with its next layer are not tested,
+/// which would take longer than it may save: the result is then true.
 [[nodiscard]] bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box);
 
 /// The grid's values if the lattices coincide, otherwise trilinear ones. Both arguments are kept by reference.

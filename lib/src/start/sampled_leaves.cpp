@@ -28,7 +28,7 @@ void for_each_in(const CoordBBox& box, const Visit& visit) {
 
 }  // namespace
 
-/// A leaf and the next layer of voxels.
+/// A leaf with the first layers of the next leaves: 9 x 9 x 9 voxels.
 class SampledLeaves::WithNext {
 public:
     WithNext(const SampledLeaves& sampled, const Coord& origin) {
@@ -177,7 +177,7 @@ Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
     for (const Coord& o : beside)
         if (leaves_.find(o) == leaves_.end()) requests.push_back({o, kOneLayer});
     request(requests);
-    std::vector<Request> others;  // those that another part of the surface crosses
+    std::vector<Request> others;  // leaves that another part of the surface crosses
     for (const Coord& o : beside)
         if (const Entry& entry = leaves_.at(o); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
             others.push_back({o, kWholeLeaf});

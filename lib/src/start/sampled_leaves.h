@@ -22,14 +22,14 @@ public:
     /// @param sample  kept by reference
     explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
 
-    /// Those of the leaves with an edge between voxels, including edges to the next leaf, that the zero level set
+    /// Those of `leaves` that have an edge between voxels, including edges to the next leaf, that the zero level set
     /// crosses.
     [[nodiscard]] std::vector<Coord> crossed_by(const std::vector<Coord>& leaves);
-    /// The same, searched from leaf to leaf: from the leaves that contain a seed, or, if the surface does not cross
-    /// that leaf, from the 26 around it. Sorted.
+    /// All crossed leaves that are reached from the seeds through crossed faces. The search begins at the leaves that
+    /// contain a seed, or at the 26 leaves around such a leaf if the surface does not cross it. Sorted.
     [[nodiscard]] std::vector<Coord> crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
                                                   const RunContext& run);
-    /// Samples one leaf at a time: all values that a distance to the surface reads, and the correct sign elsewhere.
+    /// Samples one leaf at a time: all values that the computation of a distance reads, and the correct sign elsewhere.
     /// @param beside  the crossed leaves, and those around them
     [[nodiscard]] Sampler sampler(const std::vector<Coord>& beside);
 

@@ -121,7 +121,7 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
 
 using detail::to_text;
 
-/// 1 if the mask is above 0, because labels must not be interpolated.
+/// 1 if the mask is above 0, else 0: labels must not be interpolated.
 Image binarised(const Image& mask) {
     const Index3 n = mask.geometry().size;
     const std::size_t count = std::size_t{1} * n[0] * n[1] * n[2];
@@ -231,8 +231,8 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
     with_threads(run, [&] {
         const double h = domain.voxel_size;
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
-            // A row takes as long as eight values: rows follow the last axis, or the middle one in a layer across the
-            // last.
+            // A row of up to eight values takes as long as one of eight: rows follow the last axis, or the middle one
+            // in a layer across the last.
             const bool is_layer = lo.z() == hi.z();
             const int count = is_layer ? hi.y() - lo.y() + 1 : hi.z() - lo.z() + 1;
             const Vec3 step = is_layer ? Vec3{0, h, 0} : Vec3{0, 0, h};
@@ -277,9 +277,9 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
 
 FloatGridPtr detail::carried_beyond(const FloatGrid& start, const Domain& domain, const Clip& image,
                                     const RunContext& run) {
-    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, as above
+    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, half of the diagonal of a leaf with its next layer
     const double h = domain.voxel_size;
-    // A start that ends at the image's end is valid from a voxel and a half inside of it.
+    // If the start ends at the image's end, its values are valid only from 1.5 voxels inside that end inwards.
     Clip within = image;
     for (HalfSpace& plane : within) plane.offset -= 1.5 * h;
     FloatGridPtr result;

@@ -17,10 +17,11 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Half of the longest edge of the minimum spanning tree of the seeds (Prim).
+/// Half of the longest edge of the minimum spanning tree of the seeds (Prim), or, for many seeds, of the longest
+/// distance to the nearest other seed.
 double joining_radius(const std::vector<Vec3>& seeds) {
     if (seeds.size() > kCommon.sample) {
-        double widest = 0;  // dense paint: neighbours are close, patches may remain separate
+        double widest = 0;  // for dense paint; separate patches may remain separate
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));
         return std::sqrt(widest) / 2;

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kAccuracyVoxels = 0.25;  // voxels of the image
 constexpr double kWeakLine = 0.93;        // 1 - g if the image is 1.2 times as bright as the band's median
-constexpr double kLargeOverlap = 0.02;    // of the smaller structure
+constexpr double kLargeOverlap = 0.02;    // fraction of the volume of the smaller structure
 constexpr double kMinCorrelation = 0.5;   // of intensity along a surface, from frame to frame
 constexpr int kBesideBand = 5;  // voxels beside the surface's band, from which the usual slopes are determined
 
@@ -38,9 +38,9 @@ FloatGridPtr around(const FloatGrid& surface) {
     return topology;
 }
 
-/// The distance from a mark up to which the surface of minimum bending energy is accurate to a fourth of a voxel of the
-/// image: at a distance d its error is kGuide.fraction_of_sagitta d^2 / (2 R), R the radius of a ball with the body's
-/// ratio of volume to area.
+/// The distance from a mark up to which the surface of minimum bending energy is accurate to a quarter of a voxel of
+/// the image: at a distance d its error is kGuide.fraction_of_sagitta d^2 / (2 R), where R is the radius of a ball with
+/// the body's ratio of volume to area.
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
@@ -72,7 +72,7 @@ void measure_again(StructureResult& structure, const std::optional<Image>& image
                                          : detail::distances_to(mesh, structure.marks);
     });
     report.fit = detail::statistics_of(distances);
-    // Marks that two structures claim must lie off one of them, which needs no warning.
+    // A mark that two structures share lies off the surface of at least one of them, which needs no warning.
     for (const std::string& line :
          pipeline::compare_with_marks(report, surface, image ? &*image : nullptr, structure.marks, distances))
         run.info("after separation from the other structures, " + line);
@@ -207,7 +207,7 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     const double range = used.evolve.attraction_range.value_or(0);
     options.reach = range > 0 ? range : reach_of_marks(result, image);
     options.suggestions = suggestions;
-    // Intensity is rarely 0, unlike slopes, so that g falls below 1/2 even without a line.
+    // For lines, g depends on intensity, which is rarely 0, unlike slopes: g falls below 1/2 even without a line.
     if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
     FloatGridPtr g = result.edge;
     if (!g) {  // edges that did not act were not computed

@@ -19,7 +19,7 @@ constexpr int kMaxWhole = 1 << 30;
 
 using detail::refuse;
 
-/// The fields of one object, with messages that name the wrong one.
+/// The fields of one JSON object. Errors name the field that is wrong.
 class Fields {
 public:
     explicit Fields(const json& object) : object_(object) {
@@ -47,7 +47,7 @@ public:
         if (!value.is_boolean()) refuse(std::string("'") + name + "': expected true or false");
         return value.get<bool>();
     }
-    /// From 0 to `maximum`.
+    /// A whole number from 0 to `maximum`.
     [[nodiscard]] int whole(const char* name, int maximum) const {
         const json& value = at(name);
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t(maximum))

@@ -75,7 +75,7 @@ struct StudyHistory::Planning {
         structure.outlines.push_back(outline);
         structure.outlines.back().id = next++;
     }
-    /// `edit` receives a copy.
+    /// The change of a structure by `edit`, which receives a copy of it.
     template <typename Edit>
     [[nodiscard]] Change edited(StudyId structure, bool may_be_locked, const Edit& edit) const {
         const std::size_t place = place_of(structure);

@@ -23,7 +23,7 @@ struct Piece {
     Vec3 from, to;  // world
 };
 
-/// Lengths along an image's axes, which need not be orthogonal.
+/// Computes with vectors that are given as lengths along an image's axes, which need not be orthogonal.
 class Lengths {
 public:
     explicit Lengths(const ImageGeometry& image) {
@@ -52,7 +52,7 @@ public:
     Vec3 reach{1, 1, 1};  ///< extent of a ball of radius 1 along each axis
 
 private:
-    Vec3 off_{};  // cosines between the two other axes
+    Vec3 off_{};  // for each axis, the cosine of the angle between the two others
 };
 
 double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
@@ -162,7 +162,7 @@ void require_paintable(const StudyStructure& structure, const ImageGeometry& ima
     double length = 0;
     for (std::size_t n = 1; n < stroke.world.size(); ++n) length += distance(stroke.world[n - 1], stroke.world[n]);
     double visits = 0;
-    // Checked before its pieces are made, of which a very thin brush would have too many.
+    // Checked before the stroke is split into pieces: for a very thin brush there would be too many of them.
     if (length / stroke.radius > kMaxVisits / 16) refuse("a stroke is too long for such a thin brush");
     each_piece(stroke, [&](const Piece& piece) { visits += 1 + voxels_in(box_around(piece, stroke, image)); });
     if (visits > kMaxVisits) refuse("a stroke covers too many voxels: use a smaller brush, or a shorter stroke");

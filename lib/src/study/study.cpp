@@ -71,7 +71,7 @@ StudyImage parse_header(std::string_view line, const fs::path& path) {
     }
 }
 
-/// Compares up to single precision, as files may store it.
+/// Whether two images have the same size and position, up to the rounding to single precision in files.
 bool is_same(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
     const double slack = 1e-3 * b.smallest_spacing();
@@ -122,7 +122,7 @@ void each_action(const std::vector<std::string_view>& lines, const fs::path& pat
 struct Study::Journal {
     fs::path path;
     Descriptor file;
-    off_t end = 0;  ///< of the confirmed content
+    off_t end = 0;  ///< end of the lines that are known to be on disk
 
     explicit Journal(fs::path p) : path(std::move(p)), file(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK) {
         struct stat entry {};

@@ -158,7 +158,7 @@ struct StudySolver::State {
         }
     }
 
-    /// False if cancelled.
+    /// Computes and publishes the surface of a structure. @return false if cancelled
     bool solve(const Job& job, const SegmentOptions& refined) {
         StudyResult result;
         result.structure = job.structure->id;
@@ -204,7 +204,7 @@ struct StudySolver::State {
             }
             SegmentOptions first = refined;
             first.evolve.rho = 0;
-            first.without_mesh = first.without_fields = true;  // a good mesh takes as long as the surface
+            first.without_mesh = first.without_fields = true;  // meshing and relaxing would take as long as the surface
             Marks moved = marks;
             const auto before = newest(result.structure);
             if (before) {
@@ -215,7 +215,7 @@ struct StudySolver::State {
             try {
                 find(first, moved, StudyResult::Stage::First);
             } catch (const Error& error) {
-                if (error.code() == Errc::Cancelled) throw;  // the image may still help
+                if (error.code() == Errc::Cancelled) throw;  // the next attempt, which uses the image, may succeed
             }
             find(refined, marks, StudyResult::Stage::Refined);
         } catch (const Error& error) {

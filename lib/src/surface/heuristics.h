@@ -6,7 +6,8 @@ namespace covol {
 
 /// Pieces of a surface: pieces.cpp.
 struct PiecesHeuristics {
-    /// [volumes of the largest] Size below which a piece without marks is removed.
+    /// [volumes of the largest] Number of active voxels of a piece without marks, relative to the largest piece, up to
+    /// which it is removed.
     double small = heuristic("pieces.small", 0.01);
 };
 COVOL_HEURISTICS PiecesHeuristics kPieces{};

@@ -20,7 +20,7 @@ double area_of(const Curve& curve) {
     return twice / 2;
 }
 
-/// By the even-odd rule.
+/// Whether the curve encloses the point, by the even-odd rule.
 bool encloses(const Curve& curve, const PlanePoint& p) {
     bool inside = false;
     for (std::size_t n = 0; n < curve.size(); ++n) {
@@ -31,7 +31,8 @@ bool encloses(const Curve& curve, const PlanePoint& p) {
     return inside;
 }
 
-/// A hole that is not connected yet, with its shortest distance to the connected curves.
+/// A hole that is not connected yet: its squared shortest distance to the connected curves, the index of its own
+/// nearest point, and the other curve's nearest point.
 struct Waiting {
     Curve curve;
     double square = std::numeric_limits<double>::max();
@@ -50,7 +51,8 @@ struct Waiting {
     }
 };
 
-/// Connects the nearest hole first: no other hole can lie in its channel, because it would be nearer.
+/// Connects the holes to the part, the nearest first: no other hole can lie in its channel, because that hole would be
+/// nearer.
 Curve with_holes(Curve part, std::vector<Waiting> holes) {
     for (Waiting& hole : holes) hole.update_nearest(part);
     while (!holes.empty()) {
@@ -74,7 +76,7 @@ std::vector<Curve> join_holes(std::vector<Curve> curves) {
     for (Curve& curve : curves) (area_of(curve) > 0 ? parts : holes).push_back(std::move(curve));
     std::vector<std::vector<Waiting>> holes_of(parts.size());
     for (Curve& hole : holes) {
-        // The smallest part that contains it.
+        // Finds the smallest part that contains the hole.
         std::size_t best = parts.size();
         for (std::size_t n = 0; n < parts.size(); ++n)
             if (encloses(parts[n], hole.front()) && (best == parts.size() || area_of(parts[n]) < area_of(parts[best])))

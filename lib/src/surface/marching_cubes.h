@@ -22,19 +22,21 @@
 #include "grid/leaf_band.h"
 
 // Marching cubes (Lorensen and Cline 1987) over the leaves of a sparse grid, with the loops of grid/cube_cases.h. The
-// signs of each slice of a leaf are a 64-bit word, so that cut edges and cut cubes are found 64 at a time.
+// signs of the 64 voxels of a slice of a leaf are stored in one word, so that cut edges and cut cubes are found 64 at a
+// time.
 namespace covol::detail {
 
 // Minimum distance of vertices from the ends of a voxel's edge, as a fraction of the edge: prevents degenerate
 // triangles and needles.
 inline constexpr double kEdgeMargin = 0.01;
-// The same if two faces of a clip meet: their common edge becomes a chamfer of this width.
+// Distance, as a fraction of a voxel's edge, of vertices on one face of a clip from another face that meets it: the
+// edge between the faces becomes a narrow chamfer.
 inline constexpr double kChamfer = 0.5 * kEdgeMargin;
 
 /// A leaf of the grid, or 8^3 voxels of a tile that are adjacent to the surface.
 struct Block {
     Coord origin;
-    const float* values = nullptr;  ///< null: `tile` everywhere
+    const float* values = nullptr;  ///< null: all values are `tile`
     float tile = 0;
     LeafMask inside{};
     std::array<std::uint32_t, 8> next{};   ///< block at origin + 8 (dx,dy,dz), slot 4 dx + 2 dy + dz
@@ -57,15 +59,15 @@ inline std::uint64_t shift_z(std::uint64_t word, std::uint64_t next) {
 
 /// A part of a mesh.
 struct MeshPiece {
-    std::uint64_t first = 0;                              ///< number of the first position
-    std::vector<std::array<float, 3>> positions;          ///< of vertices used by these triangles or later ones
+    std::uint64_t first = 0;                              ///< number of the first vertex in `positions`
+    std::vector<std::array<float, 3>> positions;          ///< of the vertices used by these or later triangles
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< with vertex numbers of the whole mesh
     std::uint64_t done = 0;  ///< vertices below this number are not used by later triangles
 };
 
 class MarchingCubes {
 public:
-    /// @param clip  which layers of the grid represent the faces of a cut.
+    /// @param clip  positions of the faces at which the solid is cut off.
     MarchingCubes(const FloatGrid& grid, const LatticeClip& clip, double isovalue, const RunContext& run)
         : grid_(grid), clip_(clip), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
         origin_ = choose_mesh_origin(domain_.world_box(), domain_.voxel_size);
@@ -99,9 +101,9 @@ public:
         return mesh;
     }
 
-    /// The same vertices and triangles in the same order, in pieces. A triangle of a block has vertices of this block
-    /// and of those after it in the order of their origins, at most in the next layer along x: only these are held in
-    /// memory.
+    /// Computes the vertices and triangles of extract(), in the same order, in pieces. The vertices of a block's
+    /// triangles belong to the block itself or to later blocks, up to the next layer along x; only their positions are
+    /// held in memory.
     /// @param begin  called with the numbers of vertices and triangles. Positions are relative to origin().
     /// @param take   called with each piece
     template <typename Begin, typename Take>
@@ -141,7 +143,7 @@ public:
     }
 
 private:
-    /// The positions of vertices, starting from a given number.
+    /// The positions of the vertices from number `first` on.
     struct Positions {
         const std::array<float, 3>* data;
         std::uint64_t first;
@@ -153,7 +155,7 @@ private:
 
     [[nodiscard]] bool is_inside(float value) const { return value < isovalue_; }
 
-    /// Leaves, and blocks of tiles whose sign differs from a neighbour's, sorted by origin.
+    /// Collects the leaves, and blocks of tiles whose sign differs from a neighbour's, sorted by origin.
     void collect_blocks() {
         std::vector<const Tree::LeafNodeType*> leaves;
         grid_.tree().getNodes(leaves);
@@ -168,7 +170,7 @@ private:
                 block.inside[n / 64] = word;
             }
         });
-        // A proper level set needs no tiles; they keep the surface closed for any other input.
+        // Level sets with a complete narrow band need no tiles; tiles keep the surface closed for all other input.
         std::vector<Coord> needed = opposite_tiles();
         for (std::size_t checked = 0;;) {
             const std::size_t end = blocks_.size();
@@ -187,7 +189,7 @@ private:
         tbb::parallel_sort(blocks_.begin(), blocks_.end(),
                            [](const Block& a, const Block& b) { return a.origin < b.origin; });
         block_count_ = blocks_.size();
-        // Two more blocks represent all space outside and inside that is not near the surface.
+        // Two more blocks represent the space outside and the space inside that are not near the surface.
         blocks_.resize(block_count_ + 2);
         blocks_.back().inside.fill(~std::uint64_t(0));
         if (blocks_.size() > std::numeric_limits<std::uint32_t>::max())
@@ -227,8 +229,8 @@ private:
         return found;
     }
 
-    /// Appends the origins of missing tile blocks next to blocks [begin, end) with a different sign across the common
-    /// side.
+    /// Appends the origins of 8^3 blocks of tiles that touch one of the blocks [begin, end) and have a sign other than
+    /// one of its voxels there.
     void append_missing_neighbours(std::size_t begin, std::size_t end, std::vector<Coord>& needed) const {
         tbb::enumerable_thread_specific<std::vector<Coord>> found;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 64), [&](const auto& range) {
@@ -245,7 +247,7 @@ private:
         for (const auto& some : found) needed.insert(needed.end(), some.begin(), some.end());
     }
 
-    /// Whether any voxel on the face of the block towards `step` has a sign other than `inside`.
+    /// Whether any voxel of the block's face, edge or corner towards `step` has a sign other than `inside`.
     static bool rim_differs(const LeafMask& mask, const Coord& step, bool inside) {
         std::uint64_t facing = ~std::uint64_t(0);
         if (step.y() != 0) facing &= step.y() < 0 ? 0xff : std::uint64_t(0xff) << 56;
@@ -357,7 +359,7 @@ private:
                         "grid '" + grid_.getName() + "': a value next to the surface is not finite");
     }
 
-    /// Meshes have single-precision coordinates: a voxel must be much wider than their resolution.
+    /// Throws an error unless a voxel is much wider than the resolution of the mesh's single-precision coordinates.
     void check_precision(const Block& block) const {
         const Vec3 p =
             domain_.index_to_world({double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
@@ -388,18 +390,19 @@ private:
         std::array<float, 3> position{};
         const Coord voxel = block.origin.offsetBy(local[0], local[1], local[2]);
         const double from = clip_.position(axis, voxel[axis]), to = clip_.position(axis, voxel[axis] + 1);
-        const bool on_cap = from == to;  // the edge is beyond a face
+        const bool on_cap = from == to;  // both ends of the edge are moved onto a face
         for (int c = 0; c < 3; ++c)
             position[c] = to_world(c, clip_.position(c, voxel[c]) + (on_cap && c != axis ? chamfer(c, voxel[c]) : 0.0));
         if (on_cap) return position;
         const float next = to_world(axis, to);
         const float exact = to_world(axis, from + (to - from) * std::clamp(t, kEdgeMargin, 1 - kEdgeMargin));
-        // Strictly inside its edge even after rounding.
+        // The vertex remains strictly inside its edge even after rounding.
         position[axis] = std::clamp(exact, std::nextafter(position[axis], next), std::nextafter(next, position[axis]));
         return position;
     }
 
-    /// Distance of a cap's vertex from another face on which it lies, index space.
+    /// Distance, in index space, by which a vertex on one face is moved away from another face if its layer lies on
+    /// that.
     [[nodiscard]] double chamfer(int axis, int layer) const {
         if (!clip_.on_face(axis, layer)) return 0;
         const bool upper = clip_.position(axis, layer) == clip_.high[axis];
@@ -437,7 +440,7 @@ private:
                              unsigned(std::popcount(owner.cut[axis][i & 7] & before)));
     }
 
-    /// The allowed apex with the shortest diagonals.
+    /// The allowed apex with the smallest sum of squared lengths of its diagonals.
     static int best_apex(const CubeLoop& loop, const std::array<std::uint32_t, 12>& ring, const Positions& positions) {
         int best = std::countr_zero(loop.apexes);
         if (loop.size == 3) return best;

@@ -9,8 +9,8 @@ namespace covol::detail {
 
 struct MeshPiece;
 
-/// measure_surface() that also passes every piece of the mesh to `take`; all fields of `mesh` except the measures are
-/// set by then.
+/// Like measure_surface(), but also passes every piece of the mesh to `take`, with a `mesh` of which all fields except
+/// the measures are set.
 StreamedMesh measure_pieces(const FloatGrid& surface, double isovalue, const RunContext& run,
                             const std::function<void(const StreamedMesh& mesh, const MeshPiece& piece)>& take);
 

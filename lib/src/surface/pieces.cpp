@@ -24,7 +24,8 @@ using detail::DisjointSets;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The connected parts of the active voxels of one sign, connected through faces.
+/// The 6-connected pieces of the active voxels of one sign. A part is the intersection of a connected set with one
+/// leaf.
 class ActivePieces {
 public:
     struct Piece {
@@ -93,7 +94,7 @@ private:
         Leaf* leaf;
         std::uint32_t piece;
     };
-    /// Whether a voxel of `lower` has its next neighbour along the axis in `upper`, a mask of the next leaf.
+    /// Whether a voxel of `lower` has a face in common with a voxel of `upper`, a mask of the next leaf along the axis.
     static bool meet(const LeafMask& lower, const LeafMask& upper, int axis) {
         constexpr LeafMask kNone{};
         LeafMask both = beside_marked(kNone, upper, axis, 1);
@@ -124,8 +125,8 @@ public:
                 ++surface_[parents_[labels_[n][value.pos()]]];
     }
 
-    /// Changes the sign of those regions of one sign that have fewer than `minimum` points on them, except the largest
-    /// and the surrounding space. @return how many
+    /// Changes the sign of those regions of one sign that have fewer than `minimum` points within a voxel, except the
+    /// region with the most active voxels and the surrounding space. @return the number of changed regions
     std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t minimum) {
         std::vector<Label> roots;
         for (Label n = 0; n < parents_.size(); ++n)
@@ -148,7 +149,7 @@ public:
 private:
     static constexpr int kDim = 8, kVoxels = 512;
     static constexpr Label kAround = 0, kNone = std::numeric_limits<Label>::max();
-    /// A range of blocks of 8^3 along k without leaves, from begin to before end.
+    /// Consecutive blocks of 8^3 voxels along k without leaves: begin..end-1, in units of blocks.
     struct Gap {
         int begin, end;
         Label label;
@@ -173,11 +174,11 @@ private:
         parents_[std::max(x, y)] = std::min(x, y);
     }
 
-    /// Finds the regions within each leaf, numbered by their first voxels.
+    /// Finds the regions within each leaf and labels them in the order of their first voxels.
     void label_leaves() {
         new_label(false);  // kAround
         labels_.resize(leaves_.size());
-        std::vector<std::vector<bool>> inside(leaves_.size());  // for each local label
+        std::vector<std::vector<bool>> inside(leaves_.size());  // the sign of each region of each leaf
         tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
             const LeafMask negative = negative_mask(leaves_[n]->buffer().data());
             labels_[n].fill(kNone);
@@ -204,7 +205,7 @@ private:
         });
     }
 
-    /// Finds the gaps between the leaves of each row of blocks; each gap has one sign.
+    /// Finds the gaps before, between and after the leaves of each row of blocks; each gap has one sign.
     void find_gaps() {
         if (leaves_.empty()) return;
         int low[3], high[3];
@@ -274,7 +275,7 @@ private:
     void unite_equal(Label x, Label y) {
         if (is_inside_[x] == is_inside_[y]) unite(x, y);
     }
-    /// visit(voxel, voxel across) for each voxel on a leaf's lower or upper face.
+    /// Calls visit(voxel, adjacent voxel of the next leaf) for each voxel on a leaf's lower or upper face.
     template <typename Visit>
     static void for_face(int axis, bool upper, Visit visit) {
         const int stride = axis == 0 ? 64 : axis == 1 ? 8 : 1, u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
@@ -308,7 +309,7 @@ private:
         }
     }
 
-    /// The number of points within a voxel of each region.
+    /// For each region, the number of points that have a voxel of it among the 27 around their nearest voxel.
     [[nodiscard]] std::vector<std::size_t> count_points(const std::vector<Vec3>& points) const {
         std::vector<std::size_t> all(parents_.size(), 0);
         std::unordered_map<const Leaf*, std::size_t> numbers;
@@ -369,7 +370,7 @@ private:
 void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) {
     const auto limit = float(0.5 * level_set.voxelSize()[0]);
     const auto has_mark = [&](CoordBBox box) {
-        box.expand(int(kHalfWidthVoxels));  // a mark in the band around the piece preserves it
+        box.expand(int(kHalfWidthVoxels));  // a piece is kept if a mark lies in the band around it
         return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
             return box.isInside(Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
         });
@@ -393,7 +394,7 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
 std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t minimum) {
     Regions regions(level_set);
     const std::size_t pieces = regions.drop(true, points, minimum);
-    // A removed piece no longer has cavities, so the regions are computed again.
+    // The cavities of removed pieces no longer exist, so the regions are computed again.
     return pieces == 0 ? regions.drop(false, points, minimum)
                        : pieces + Regions(level_set).drop(false, points, minimum);
 }

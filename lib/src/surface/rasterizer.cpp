@@ -13,10 +13,11 @@ namespace {
 using openvdb::Coord;
 using Accessor = FloatGrid::ConstAccessor;
 
-/// A distance changes by less than sqrt(3) voxels within a cell: above this value, in voxels, its sign is certain.
+/// [voxels] Absolute distance at a cell's corner above which the whole cell has one sign, because a distance changes by
+/// at most sqrt(3) voxels within a cell.
 constexpr float kCertain = 1.8F;
 
-/// Edge of the largest cube, aligned to its size, that has a single value around a voxel without a leaf.
+/// Edge, in voxels, of the tile of the tree that contains a voxel without a leaf.
 int tile_size(Accessor& accessor, const Coord& voxel) {
     using Tree = FloatGrid::TreeType;
     using Upper = Tree::RootNodeType::ChildNodeType;
@@ -60,7 +61,7 @@ public:
     }
 
 private:
-    /// The number of positions from `at` on that lie in the tile of this size around `base`, at least 1.
+    /// The number of successive positions, `at` included, in the tile of this size that contains `base`; at least 1.
     static int steps_inside_tile(const openvdb::Vec3d& at, const Coord& base, const openvdb::Vec3d& step, int size) {
         double steps = std::numeric_limits<std::int32_t>::max();
         for (int a = 0; a < 3; ++a) {

@@ -21,8 +21,7 @@ public:
     /// @param out  i fastest
     void fill(const VoxelBox& box, std::uint8_t label, std::uint8_t* out) const;
 
-    /// Whether all voxels of the box are inside, or all outside, if the tree's tiles show it; none: each must be
-    /// checked.
+    /// True if all voxels of the box are inside, false if all are outside, none if the tree's tiles do not show either.
     [[nodiscard]] std::optional<bool> uniform(const VoxelBox& box) const;
 
 private:
@@ -33,7 +32,7 @@ private:
     const ImageGeometry geometry_;
     const Domain domain_;
     const std::optional<Uncut> whole_;
-    const Clip clip_;  // to be checked in addition to the grid
+    const Clip clip_;  // checked in addition, if the grid is not cut off itself
     const bool all_within_;
 };
 

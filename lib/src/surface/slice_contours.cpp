@@ -21,7 +21,8 @@ struct Reach {
     Vec3 low, high;
 };
 
-/// Samples of a level set in a slice, on a finer lattice than its voxels, with a rim of nodes around them.
+/// Samples of a level set in a slice of an image, at nodes that may be closer together than the image's voxels, with a
+/// rim of one node around them.
 class SliceNodes {
 public:
     /// @param reach  of the surface, in voxels of the image
@@ -75,8 +76,8 @@ private:
         }
         return static_cast<float>(sum);
     }
-    /// Closes a surface that reaches the rim, half a voxel beyond the last centre: on the rim if that is there,
-    /// otherwise halfway between it and the adjacent nodes.
+    /// Closes a surface that reaches the rim at half a voxel beyond the last voxel centres. For even `parts`, this is
+    /// on the rim itself, otherwise halfway between the rim and the adjacent nodes.
     void close_rim() {
         const auto close = [&](int x, int y) {
             float& value = values_[at(x, y)];
@@ -103,7 +104,7 @@ private:
     std::vector<float> values_;
 };
 
-/// Marching squares. Edges between nodes are numbered: 2 n from node n along x, 2 n + 1 along y.
+/// Marching squares. The edge from node n along x has the number 2 n, the edge along y 2 n + 1.
 class Squares {
 public:
     explicit Squares(const SliceNodes& nodes) : nodes_(nodes) {
@@ -143,14 +144,15 @@ private:
         return upward ? nodes_.in_voxels(x, y + t) : nodes_.in_voxels(x + t, y);
     }
     void add_cell(int x, int y) {
-        // Corners and edges are anticlockwise; edge n leads from corner n to the next.
+        // Corners and edges are numbered anticlockwise; edge n leads from corner n to the next.
         const float corner[4] = {nodes_.value(x, y), nodes_.value(x + 1, y), nodes_.value(x + 1, y + 1),
                                  nodes_.value(x, y + 1)};
         const std::size_t edge[4] = {2 * node(x, y), 2 * node(x + 1, y) + 1, 2 * node(x, y + 1), 2 * node(x, y) + 1};
         // The mean of the corners decides whether two diagonally opposite inside corners are joined.
         const bool joined = (double(corner[0]) + corner[1] + corner[2] + corner[3]) < 0;
         for (int n = 0; n < 4; ++n) {
-            // Going anticlockwise, a curve enters where the inside ends and leaves where it begins.
+            // Around the cell, anticlockwise, a curve enters at an edge from inside to outside and leaves at one from
+            // outside to inside.
             if (!(corner[n] < 0) || corner[(n + 1) % 4] < 0) continue;
             int out = n;
             if (joined) {
@@ -165,7 +167,7 @@ private:
     }
 
     const SliceNodes& nodes_;
-    std::vector<std::size_t> next_;  ///< for each edge, the one to which the curve continues
+    std::vector<std::size_t> next_;  ///< for each edge, the next edge that its curve crosses
 };
 
 Reach reach_of(const FloatGrid& surface, const ImageGeometry& geometry) {
@@ -195,7 +197,7 @@ std::vector<SliceContour> outline_slices(const FloatGrid& surface, const ImageGe
     const double h = surface.voxelSize()[0];
     std::array<int, 2> parts{};
     for (std::size_t a = 0; a < 2; ++a)
-        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // 1 if equal up to rounding
+        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // 1 if spacing and h are equal
     with_threads(run, [&] {
         tbb::parallel_for(0, geometry.size[2], [&](int k) {
             if (run.cancelled() || !(k >= reach.low[2] && k <= reach.high[2])) return;

@@ -23,7 +23,7 @@ namespace {
 
 using meshing::Triangle;
 
-/// measure() for triangles that arrive one by one.
+/// The measures of measure(), for a mesh that arrives in pieces.
 class Totals {
 public:
     explicit Totals(std::uint64_t vertices) : vertices_(vertices), pieces_(vertices) {}
@@ -35,7 +35,7 @@ public:
         parts_.resize(piece.triangles.size());
         tbb::parallel_for(std::size_t(0), parts_.size(),
                           [&](std::size_t n) { parts_[n] = add(piece, piece.triangles[n]); });
-        // In sequence, like measure().
+        // Summed in sequence, as in measure().
         for (const Part& part : parts_) {
             sum_.volume += part.volume;
             sum_.area += part.area;
@@ -76,8 +76,8 @@ private:
         return part;
     }
 
-    /// A hash of an edge: the sum of such numbers, with signs for the direction, vanishes by chance once in 2^64.
-    /// https://prng.di.unimi.it/splitmix64.c
+    /// A hash of an edge. In a closed mesh, the sum of the hashes, with a sign for the direction, is 0; in others it is
+    /// 0 with a probability of 2^-64. https://prng.di.unimi.it/splitmix64.c
     static std::uint64_t mixed(std::uint64_t low, std::uint64_t high) {
         std::uint64_t z = (low << 32 | high) + 0x9e3779b97f4a7c15;
         z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
@@ -88,11 +88,11 @@ private:
     std::uint64_t vertices_, triangles_ = 0;
     Vec3 origin_{};
     Part sum_;
-    std::vector<Part> parts_;  // for the triangles of a piece
+    std::vector<Part> parts_;  // for each triangle of a piece
     detail::DisjointSets pieces_;
 };
 
-/// Takes pieces of the mesh and writes their triangles and those of their vertices that are complete.
+/// Takes pieces of the mesh and writes their triangles and the vertices that no later triangle uses.
 class Writer {
 public:
     Writer(const std::string& temporary, const std::string& path, const StreamedMesh& mesh,
@@ -132,7 +132,7 @@ public:
 private:
     const WriteMeshOptions& options_;
     std::unique_ptr<mesh_io::MeshStream> file_;
-    // Both start at the piece's first vertex.
+    // Positions and sums of normals, both from the piece's first vertex on.
     std::vector<std::array<float, 3>> placed_;
     std::vector<Vec3> sums_;
 };

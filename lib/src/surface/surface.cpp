@@ -19,10 +19,11 @@
 namespace covol {
 namespace {
 
-/// The solid in the clip. Its wall ends at the domain's last voxels; a solid without one fills the domain.
+/// The part of a solid that lies in the clip. The solid's own surface ends at the domain's last voxels; if there is
+/// none, the solid fills the domain.
 FloatGridPtr clipped_surface(const FloatGrid& u, const Domain& domain, const Clip& clip, const RunContext& run) {
     const std::optional<detail::Uncut> whole = detail::uncut(u, detail::FaceLayer::InPlace);
-    // What is near the cut may be nearest to what the wall would be beyond it.
+    // Near the cut, the nearest point of the uncut solid's surface may lie beyond the cut, so a wider domain is used.
     const Domain wide = whole ? widened(domain, detail::kCarriedOn - 1) : domain;
     FloatGridPtr wall;
     try {

@@ -36,8 +36,8 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
     if (tagging.has_core(h)) {
         report.leaks = closes_at(tag_distance + h);
     } else {
-        // If a smaller D, down to 0.6 of it, still gives a core, the body is thin and closed; otherwise there
-        // are only walls.
+        // If there is a core for a smaller distance, down to 0.6 D, the body is thin and closed. Otherwise only walls
+        // around the points were tagged.
         report.leaks = true;
         double smaller = tag_distance;
         for (int n = 0; report.leaks && n < 3; ++n) {
@@ -79,8 +79,8 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     return voxels;
 }
 
-/// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface. Inside it has to be computed,
-/// because the opposite side of a wall, and the cores, have the same d.
+/// The initial level set in voxels. Outside, d - D is the distance to the tagged surface. Inside, the distance has to
+/// be computed, because d - D is also zero where a wall borders on a core.
 LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, const LeafArray<float>& level,
                                 const RunContext& run) {
     LeafArray<float> u = detail::signed_distance(tube.band, level, tube.inside_domain, tube.box, kWidth, run);

@@ -1,4 +1,4 @@
-// Morphological closing of a tagged body: the exterior, dilated by the tag distance.
+// Morphological closing of a tagged body: the exterior is dilated by the tag distance.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -29,8 +29,8 @@ detail::LeafMask inside_of(const FloatGrid& level_set, const detail::Coord& orig
     return mask;
 }
 
-/// Inside the body D - d, the signed distance to its closing, where d is that to the body's surface; outside of it an
-/// arbitrary positive value. Clamped to [-reach, reach]. Null if no voxel is deeper than D.
+/// Inside the body D - d, where d is the distance to the body's surface: the signed distance to the closed body.
+/// Outside an arbitrary positive value. Clamped to [-reach, reach]. Null if no voxel lies deeper than D.
 /// @param surface  points of the body's surface, index space
 FloatGridPtr grown_exterior(const FloatGrid& body, const std::vector<Vec3>& surface, const Domain& domain, float D,
                             float reach, const RunContext& run) {

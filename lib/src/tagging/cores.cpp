@@ -37,7 +37,7 @@ class Merging {
 public:
     static constexpr std::int32_t kNone = -1;
 
-    std::vector<std::int32_t> core_of;  ///< by component: its core when that merged with the exterior
+    std::vector<std::int32_t> core_of;  ///< by component: the core of which it was a part, or kNone
     std::vector<float> saddles, peaks;  ///< by core
 
     explicit Merging(const std::vector<float>& d) : core_of(d.size(), kNone), parts_(d.size()) {
@@ -115,7 +115,7 @@ public:
     }
 
 private:
-    // Labels: the next voxel uphill; ~a component; or kOutside of the domain.
+    // Labels: the next voxel uphill, ~component, or kOutside for voxels outside the domain.
     static constexpr std::int32_t kOutside = std::numeric_limits<std::int32_t>::max();
     static constexpr std::int32_t kNothing = std::numeric_limits<std::int32_t>::max();  // in beyond_
     static constexpr int kShift[3] = {6, 3, 0};
@@ -176,7 +176,7 @@ private:
     const LeafColumns columns_;
     LeafArray<float> d_;  // followed by a block for runs, and one for the outside of the domain
     LeafArray<std::int32_t> label_;
-    std::vector<LeafMask> inside_, tube_;              // of the domain
+    std::vector<LeafMask> inside_, tube_;              // voxels in the domain; those in the tube
     std::vector<std::array<std::int32_t, 6>> beyond_;  // by leaf and face: a leaf, ~piece of a run, or kNothing
     DisjointSets joined_{0};                           // components of the region beyond the tube: exterior, runs,
                                                        // parts of leaves
@@ -276,7 +276,7 @@ void CoreFinder::join_beyond() {
     });
 }
 
-/// Assigns to each voxel of the tube its highest neighbour, or itself if it is the highest; the first of equal ones.
+/// Assigns to each voxel of the tube its highest neighbour, or itself if it is the highest. Of equal ones, the first.
 void CoreFinder::climb() {
     for_leaves([&](std::size_t leaf) {
         Heights heights;
@@ -303,7 +303,7 @@ void CoreFinder::climb() {
     });
 }
 
-/// Makes the peaks components, and labels all voxels with these. @return d of all components' peaks
+/// Makes each peak a component, and labels all voxels with their component. @return d at the peak of each component
 std::vector<float> CoreFinder::number_peaks() {
     std::vector<std::int32_t> first(band_.size() + 1, 0);
     for_leaves([&](std::size_t leaf) {
@@ -332,7 +332,7 @@ std::vector<float> CoreFinder::number_peaks() {
     return peaks;
 }
 
-/// Sorted by decreasing d.
+/// The saddles between components, sorted by decreasing d.
 std::vector<Saddle> CoreFinder::saddles() {
     tbb::enumerable_thread_specific<std::vector<Saddle>> found;
     for_leaves([&](std::size_t leaf) {
@@ -355,7 +355,7 @@ std::vector<Saddle> CoreFinder::saddles() {
             if (!is_on(inside_[leaf], at)) continue;
             const std::int32_t own = ~label_.leaf(leaf)[at];
             const float d = d_.leaf(leaf)[at];
-            // Beyond the domain's end is the exterior, so that a voxel there is a gap like any other.
+            // The region beyond the domain is exterior, so that a voxel at the domain's end acts as a gap.
             if (!inner_.isInside(voxel(leaf, at))) offer(d, own, kExterior);
             for (int face = 0; face < 6; ++face) {
                 const Neighbour n = neighbour(leaf, at, face);

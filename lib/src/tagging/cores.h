@@ -8,14 +8,14 @@
 
 namespace covol::detail {
 
-/// A component of {d > D} that is not connected to the exterior, at the largest D at which it would be. Lengths in
-/// voxels.
+/// A component of {d > D}, where d is the distance to the points, that is connected to the exterior only for smaller D.
+/// Lengths are in voxels.
 struct Core {
-    double saddle = 0;  ///< that D: the radius of its largest gap
+    double saddle = 0;  ///< D below which it is connected: the radius of its largest gap
     double peak = 0;    ///< maximum of d in it
     double volume = 0, area = 0;
 
-    /// Linear growth of the core when dilated by its saddle, as for a ball of the same area per volume.
+    /// Factor by which the core's lengths grow if it is dilated by its saddle, as for a ball of that area per volume.
     [[nodiscard]] double growth() const { return 1.0 + saddle * area / (3.0 * volume); }
     [[nodiscard]] double full_volume() const { return volume * std::pow(growth(), 3); }
     [[nodiscard]] double full_area() const { return area * std::pow(growth(), 2); }
@@ -24,7 +24,7 @@ struct Core {
 /// The regions that a cloud encloses, for all tag distances.
 struct Cores {
     std::vector<Core> cores;              ///< by decreasing saddle
-    std::vector<std::int64_t> histogram;  ///< voxels of the tube by d, in buckets of 1 / buckets_per_voxel voxels
+    std::vector<std::int64_t> histogram;  ///< voxels of the tube by d, in buckets of 1 / kBucketsPerVoxel voxels
     std::int64_t tube_voxels = 0;
 
     /// Volume of {d <= distance}, both in voxels.
@@ -36,9 +36,9 @@ struct Cores {
 /// exists from the start; each other one is a core until it merges with the exterior, when its last gap opens.
 ///
 /// Each voxel belongs to the peak found by steepest ascent, computed for all voxels in parallel; only the saddles
-/// between these are processed in order of d.
-/// @param distance  d within a tube, its background beyond; @pre at least one leaf
-/// @param radius  of the tube, world units: d of the region beyond it
+/// between the regions of peaks are processed in order of d.
+/// @param distance  d within a tube around the points, its background beyond; @pre at least one leaf
+/// @param radius  of the tube, world units; d beyond it counts as this
 /// @param seeds  world; a component that contains one is exterior
 [[nodiscard]] Cores find_cores(const FloatGrid& distance, double radius, const std::vector<Vec3>& seeds);
 

@@ -8,13 +8,14 @@ namespace covol {
 
 /// The tag distance D: tag_distance.cpp.
 struct TagDistanceHeuristics {
-    /// [ratio] The same for a core with a large fraction of the cloud's area.
+    /// [ratio] Minimum of a core's peak to its saddle if its area is large compared to the cloud's; otherwise
+    /// kCommon.clear_ratio is the minimum.
     double significant_ratio = heuristic("tag_distance.significant_ratio", 1.25);
-    /// [fraction of the cloud's area] Minimum of all such cores; less are pockets of a cloud without an inside.
+    /// [fraction of the cloud's area] Minimum of all main cores together; with less, the cloud encloses only pockets.
     double structure_fraction = heuristic("tag_distance.structure_fraction", 0.25);
-    /// [ratio] Of D to the largest gap that it closes, in addition to half a cell, by which the gap is uncertain.
+    /// [ratio] Of D to the radius of the largest gap that it closes. Half a cell, the gap's uncertainty, is added.
     double margin = heuristic("tag_distance.margin", 1.05);
-    /// [voxels] Maximum in the tube on the last grid, to limit time and memory.
+    /// [voxels] Maximum of the tube on the finest grid, to limit time and memory.
     std::int64_t max_tube_voxels = limit("tag_distance.max_tube_voxels", 1'500'000);
 };
 COVOL_HEURISTICS TagDistanceHeuristics kTagDistance{};

@@ -1,4 +1,4 @@
-// The choice of the tag distance D: large enough for the gaps of the main cores, no larger.
+// The choice of the tag distance D: large enough to close the gaps of the main cores, and no larger.
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
 /// The distance at which the main cores are closed, voxels; 0 if only pockets are enclosed.
 struct MainCores {
     double saddle = 0;
-    double peak = 0;  ///< of the most important core
+    double peak = 0;  ///< of the core with the largest volume
     int cores = 0;
 };
 

@@ -28,7 +28,7 @@ struct Tagging {
     std::vector<LeafMask> open;  ///< d > D, in the domain
     Flood exterior;
     std::int64_t enclosed = 0;  ///< voxels that the flood did not reach
-    std::int64_t core = 0;      ///< those of them with d > D
+    std::int64_t core = 0;      ///< enclosed voxels with d > D
 
     /// Whether the core, treated as one ball, is a structure and not a pocket in a wall of thickness D.
     [[nodiscard]] bool has_core(double voxel_size) const;
@@ -37,10 +37,10 @@ struct Tagging {
 /// Floods {d > D} from the domain's boundary and the seeds.
 [[nodiscard]] Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seeds);
 
-/// Whether a core of `larger`, a structure and not a pocket, is still exterior in `smaller`: a gap closes in between.
+/// Whether a core that is a structure, and not a pocket, is enclosed in `larger` but exterior in `smaller`.
 [[nodiscard]] bool closes_a_core(const Tube& tube, const Tagging& smaller, const Tagging& larger);
 
-/// In voxels; negative where the flood did not arrive. Beside the tagged surface it is d - D, which locates the
+/// |d - D| in voxels, with a negative sign at voxels that the flood did not reach. Its zero locates the tagged
 /// surface.
 [[nodiscard]] LeafArray<float> signed_level(const Tube& tube, const Tagging& tagging);
 

@@ -18,7 +18,7 @@ bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '
 
 std::string name_of(const std::string& option) { return option.substr(0, option.find('=')); }
 
-/// Removes an option and its value. @return the value; empty if the option is absent
+/// Removes the option with one of these names and its value. @return the value; empty if the option is absent
 std::string take_option(Words& words, const std::set<std::string>& names) {
     for (auto word = words.begin(); word != words.end(); ++word) {
         if (!is_option(*word) || !names.contains(name_of(*word))) continue;
@@ -42,7 +42,7 @@ bool parse_whole(const std::string& text, Number& value) {
     return error == std::errc() && end == text.data() + text.size();
 }
 
-/// The job of a plan. Plans may come from untrusted sources: anything other than settings and inputs is refused.
+/// Reads the job from a plan. Plans may come from untrusted sources: only settings and inputs are accepted.
 JobOptions job_of_plan(const std::string& folder, const CLI::App& program, const CLI::App*& command) {
     const std::string path = plan_file(folder);
     const Json plan = read_plan_file(folder);

@@ -22,14 +22,14 @@
 namespace covol::tool {
 namespace {
 
-/// One line for a terminal: messages that list several problems are joined.
+/// Joins the lines of a message that lists several problems into one line, with "; " between them.
 std::string one_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, "; ");
     return safe_text(text);
 }
 
-/// `covol help segment` is `covol segment --help`. @throws UsageError
+/// Translates `covol help segment` into `covol segment --help`. @throws UsageError
 std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI::App& program) {
     words.erase(words.begin());
     if (!words.empty() && !words[0].starts_with('-')) {
@@ -42,7 +42,7 @@ std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI
 }
 
 constexpr int kReportSchema = 1;   // is incremented when a field of the report is removed or changes its meaning
-constexpr int kMaxThreads = 1024;  // TBB runs out of stacks far above this
+constexpr int kMaxThreads = 1024;  // TBB cannot allocate the stacks of far more threads
 
 }  // namespace
 
@@ -167,7 +167,7 @@ int Session::execute() {
         memory_bound_ = choose_memory_bound(memory_limit_text_);
         run_.memory_budget = memory_bound_.bytes;
         guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_flag(), [this] {
-            if (is_reporting_end_.test_and_set()) return;  // the main thread is already reporting the end
+            if (is_reporting_end_.test_and_set()) return;  // the main thread is already printing an error
             const int code = report_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
@@ -261,7 +261,7 @@ std::string Session::interrupted_text() const {
 }
 
 int Session::fail(int code, const std::string& message) {
-    while (is_reporting_end_.test_and_set()) ::pause();  // wait: the memory guard ends the process
+    while (is_reporting_end_.test_and_set()) ::pause();  // the memory guard prints an error, and ends the process
     return report_failure(code, message);
 }
 
@@ -284,7 +284,7 @@ void Session::print(const std::string& line) {
 
 void Session::warn(const std::string& message) {
     const std::string line = outputs_.shown(with_flags(message));
-    // A file that is opened twice causes the same warning twice.
+    // The same warning is printed once only: a file may be opened several times.
     for (const Json& warning : report_["warnings"])
         if (warning == line) return;
     progress_->line("covol: warning: " + one_line(line));

@@ -27,7 +27,7 @@
 
 namespace covol::tool {
 
-/// Seconds since construction.
+/// Measures the seconds since its construction.
 class Stopwatch {
 public:
     [[nodiscard]] double seconds() const {
@@ -46,17 +46,17 @@ public:
     /// Adds a subcommand; `body` runs after the whole command line has been parsed.
     CLI::App* add_command(const std::string& name, const std::string& description, std::function<void()> body);
 
-    /// The same for a Job whose members the flags are bound to: its run(session) is the body.
+    /// Adds a subcommand whose flags are bound to the members of a Job, and whose body is Job::run(session).
     template <typename Job>
     std::pair<std::shared_ptr<Job>, CLI::App*> add_job(const std::string& name, const std::string& description) {
         const auto job = std::make_shared<Job>();
         return {job, add_command(name, description, [job, this] { job->run(*this); })};
     }
 
-    /// Help of the subcommands.
+    /// The help texts of the subcommands.
     [[nodiscard]] Help& help() noexcept { return *help_; }
 
-    /// Parses, runs and writes. @returns the exit code.
+    /// Parses the command line, runs the subcommand and writes the outputs. @returns the exit code.
     int main(int argc, char** argv);
 
     // For the bodies of subcommands:
@@ -67,39 +67,40 @@ public:
     /// The report that --json writes.
     [[nodiscard]] Json& report() noexcept { return report_; }
     [[nodiscard]] const Json& report() const noexcept { return report_; }
-    /// Quoted for a shell.
+    /// The command line of this run, quoted for a shell.
     [[nodiscard]] const std::string& command_line() const noexcept { return command_line_; }
     /// Names of the options that the command line or a configuration file gave, without dashes.
     [[nodiscard]] std::vector<std::string> given() const { return given_names(*command_); }
-    /// The given settings and inputs, as data.
+    /// The command with the settings and inputs that were given.
     [[nodiscard]] JobOptions job() const { return job_of(*command_); }
-    /// For an option of the current command.
+    /// Whether the option of the current command has this role.
     [[nodiscard]] bool has_role(const std::string& option, OptionRole role) const;
-    // note() and warn() replace option names in messages of the library by flags.
-    /// Progress and remarks: not printed with --quiet.
+    // note() and warn() replace names of options in messages of the library by flags.
+    /// Prints a remark on standard error, unless --quiet is given.
     void note(const std::string& line);
-    /// Requested results (info, compare, check), on standard output; on standard error if --json - uses standard
-    /// output. Always printed.
+    /// Prints a requested result (info, compare, check), even with --quiet: on standard output, or on standard error if
+    /// --json - writes the report to standard output.
     void print(const std::string& line);
     void warn(const std::string& message);
-    /// From here on the state of runs is saved there, until the outputs are in place.
+    /// After this call, runs save their state in `checkpoints`, which are removed when the outputs are in place.
     void keep_states(std::shared_ptr<Checkpoints> checkpoints) { run_.checkpoints = std::move(checkpoints); }
-    /// The command of that name, for its options; null if there is none.
+    /// The subcommand with that name; null if there is none.
     [[nodiscard]] const CLI::App* command(const std::string& name) const;
-    /// Throws early if at least `bytes` are needed for `what`, and exceed --memory-limit or the free memory.
+    /// To be called before memory is allocated. @throws Error InvalidOptions if `what` needs `bytes`, and they exceed
+    /// --memory-limit or, without it, the usable fraction of the free memory.
     void require_memory(double bytes, const std::string& what) const;
-    /// Adds to seconds.<name> of the report; seconds.total covers the whole run.
+    /// Adds a duration to seconds.<name> of the report. The report also has seconds.total for the whole run.
     void add_seconds(const std::string& name, double seconds);
-    /// The command was preceded by `covol plan`: its cost is estimated, and no output is written.
+    /// Whether the command was preceded by `covol plan`: then its cost is estimated, and no output is written.
     [[nodiscard]] bool is_planning() const noexcept { return planning_; }
-    /// The command was preceded by `covol brick`.
+    /// The arguments of `covol brick` if the command was preceded by it, otherwise nullopt.
     [[nodiscard]] const std::optional<BrickCall>& brick() const noexcept { return brick_; }
     /// --memory-limit, bytes; nullopt if it was not given.
     [[nodiscard]] std::optional<std::uint64_t> memory_limit() const;
-    /// Of the command that runs.
+    /// Provenance for the outputs of the current command.
     [[nodiscard]] RunProvenance& provenance() noexcept { return *provenance_; }
     [[nodiscard]] const RunProvenance& provenance() const noexcept { return *provenance_; }
-    /// The run succeeded, but ends with this exit code.
+    /// Sets the exit code of a run that ends without an error.
     void set_exit_code(int code) { exit_code_ = code; }
 
 private:
@@ -110,7 +111,7 @@ private:
     void start_report();
     void finish();
     void write_report();
-    /// Reports why the run fails, unless the memory guard is already doing so.
+    /// Prints why the run fails, unless the memory guard is already doing so. @returns the exit code
     int fail(int code, const std::string& message);
     int report_failure(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
@@ -127,7 +128,7 @@ private:
     MemoryBound memory_bound_;
 
     std::optional<BrickCall> brick_;
-    std::optional<RunProvenance> provenance_;  ///< from execute() on
+    std::optional<RunProvenance> provenance_;  ///< set by execute()
     std::string command_line_;
 
     RunContext run_;

@@ -7,7 +7,8 @@
 
 namespace covol::tool {
 
-/// Deviation of the angles between an image's axes from 90 degrees, degrees; 0 if it is within a file's rounding.
+/// Maximum deviation of the angles between an image's axes from 90 degrees, in degrees; 0 if it is within the rounding
+/// of file formats.
 [[nodiscard]] inline double shear_of(const ImageGeometry& geometry) {
     constexpr double kRounding = 1e-3;
     const Matrix3& d = geometry.direction;

@@ -17,20 +17,20 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kLargeScene = 10000;  // above it, Blender's default clipping hides an object
-constexpr double kSmallScene = 0.01;   // below it, the default view shows a dot
+constexpr double kLargeScene = 10000;  // extent in units above which Blender's default clipping hides an object
+constexpr double kSmallScene = 0.01;   // extent in units below which the default view shows only a dot
 constexpr double kFlatVoxels = 3;      // ratio of spacings above which an image is mostly interpolated along one axis
-constexpr double kFarPoint = 20;       // distance to the nearest neighbour in medians; beyond it a point is an outlier
+constexpr double kFarPoint = 20;       // a point is an outlier if its nearest neighbour is farther, in medians
 
-/// Problems that a file would cause in other programs. Problems fail the check, remarks do not.
+/// Collects what a file would cause in other programs: problems, which fail the check, and remarks, which do not.
 class Findings {
 public:
     Findings(Session& session, Program program) : facts{}, session_(session), program_(program) {
         session.report()["findings"] = Json::array();
     }
-    FileFacts facts;  ///< for the rules of one program
+    FileFacts facts;  ///< properties of the file, for advice_for() one program
     [[nodiscard]] Program program() const { return program_; }
-    /// Remarks on programs in general are omitted if one program is checked, because its rules are more specific.
+    /// Whether no program was chosen. For a chosen program, its own rules replace the remarks on programs in general.
     [[nodiscard]] bool in_general() const { return program_ == Program::Any; }
     void problem(const std::string& text) {
         add("problem", text);
@@ -72,7 +72,7 @@ void check_extent(double extent, const std::string& what, Findings& findings) {
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
     const MeshMeasures m = measure(mesh);
     findings.facts.is_closed = m.closed;
-    // The rule for printing includes the remedy.
+    // For printing, a rule in program_rules.cpp reports this, with the remedy.
     if (!m.closed && findings.program() != Program::Print)
         findings.problem(what + " is not closed: printing, volumes and Boolean operations fail");
     if (!m.manifold) findings.problem(what + " is not manifold: subdivision and simulation fail");
@@ -156,7 +156,7 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool of_chunks = chunks && chunks->read < chunks->total;
-    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of a mapped file, only some slices
+    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of mapped files, some slices are read
     if (of_chunks)
         findings.remark(std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
                         " chunks were read: problems of the others are found only when these are read");
@@ -180,7 +180,8 @@ void check_mesh_file(const std::string& path, const RunContext& run, Findings& f
     const std::string unit = word_in_header(path, "covol_unit");
     if (unit != "not") findings.facts.unit = unit;  // "not stated"
     check_measures(mesh, "the mesh", findings);
-    // Objects of one file are separate solids: those with a common border touch, and do not intersect themselves.
+    // In formats that hold several meshes, each mesh is a separate solid: crossings between two of them are not
+    // self-intersections.
     const Crossings crossings = count_crossings(mesh);
     const bool apart = holds_several_meshes(path);
     const int own = crossings.within + (apart ? 0 : crossings.between);

@@ -18,7 +18,7 @@ struct CompareJob {
     int label = 0, label_b = -1;
     ImageFlags image;
 
-    /// Masks may need a spacing, if their file does not have one.
+    /// Reads a solid. Options of the image, such as --spacing, apply to label images only.
     [[nodiscard]] Solid read(const std::string& path, int wanted, const RunContext& run) const {
         if (kind_of_file(path) != FileKind::Image) {
             if (image.options.roi)
@@ -56,7 +56,7 @@ struct CompareJob {
         session.print(text.str());
     }
 
-    /// For a level set, the mesh that the other commands write.
+    /// The mesh of a level set, as other commands write it.
     static TriangleMesh mesh_of(const FloatGrid& level_set, const RunContext& run) {
         TriangleMesh mesh = extract_mesh(level_set, {}, run);
         relax_mesh(mesh, level_set, {}, run);
@@ -71,7 +71,7 @@ struct CompareJob {
         throw Error(Errc::Unsupported, "compare: " + path + ": points can be compared with a .vdb or a mesh");
     }
 
-    /// Points are not a solid: their distance from the other's surface is measured.
+    /// Measures the distances of points from the surface of a solid.
     static void measure_points(const std::string& points_path, const std::string& solid_path, Session& session) {
         const std::vector<Vec3> points = to_world(read_points(points_path));
         const FitStatistics fit = measure_fit(points, surface_of(solid_path, session.run()), session.run());

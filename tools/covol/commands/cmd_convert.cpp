@@ -44,7 +44,7 @@ public:
     }
 
 private:
-    /// For types whose values fit into a float.
+    /// Converts values through floats, for types whose values fit into a float.
     template <typename T>
     void fill_through_floats(const VoxelBox& box, T* out) const {
         const Index3 n = box.size();
@@ -95,7 +95,7 @@ struct ConvertJob {
             output, [values, geometry](const std::string& path) { write_image(path, geometry, values->data()); });
     }
 
-    /// The same voxels in another format.
+    /// Writes the voxels of an image unchanged in another format.
     void image_to_image(Session& session) const {
         if (!like.empty())
             throw UsageError(
@@ -124,7 +124,7 @@ struct ConvertJob {
         if (is_nanovdb_name(output))
             return session.outputs().add(output, [grids](const std::string& path) { write_nvdb(path, grids); });
         session.outputs().add(output, [grids, write = vdb.options](const std::string& path) {
-            write_vdb(path, grids, write);  // their provenance is kept
+            write_vdb(path, grids, write);  // the grids keep the provenance in their metadata
         });
     }
 

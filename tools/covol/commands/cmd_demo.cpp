@@ -16,7 +16,7 @@ constexpr const char* kImage = "celegans_embryo.tif";
 constexpr const char* kMarks = "celegans_marks.csv";
 constexpr std::array kFiles{kImage, kMarks, "README.md"};
 
-/// The installed samples, in a folder with a fixed position relative to the program.
+/// The folder of the installed samples, at a fixed path relative to the program.
 fs::path folder_of_samples() {
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path();
     return (program / COVOL_TO_DATA / "covol" / "demo").lexically_normal();
@@ -38,7 +38,7 @@ struct DemoJob {
     }
 
 private:
-    /// If the folder already contains the samples, its study is continued.
+    /// Copies the samples into the folder, unless it already contains them: then its study is continued.
     void copy_samples(const RunContext& run) const {
         std::error_code failed;
         fs::create_directories(folder, failed);

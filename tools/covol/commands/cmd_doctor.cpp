@@ -38,7 +38,7 @@ std::set<fs::path> loaded_libraries() {
     return found;
 }
 
-/// The number of files in each folder; files in subfolders are counted for the outermost folder of the list.
+/// The number of files in each folder. Files in subfolders are counted for the outermost folder that contains a file.
 std::map<std::string, int> count_by_folder(const std::set<fs::path>& files) {
     std::set<fs::path> folders;
     for (const fs::path& file : files) folders.insert(file.parent_path());

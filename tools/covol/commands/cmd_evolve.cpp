@@ -18,7 +18,7 @@ struct EvolveJob {
     CheckpointFlags checkpoint;
     VdbFlags vdb;
 
-    /// Fields that are not given have no weight.
+    /// The options for voxels of edge h; the weight of a field whose file is not given is set to 0.
     EvolveOptions resolve(double h, Session& session) const {
         EvolveOptions options = given.resolve(h);
         if (distance_path.empty() && options.theta > 0) {

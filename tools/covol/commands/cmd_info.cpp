@@ -47,7 +47,7 @@ void describe_vdb(const std::string& path, Session& session) {
     }
 }
 
-/// The direction of an image axis in the world: "+x", or its cosines.
+/// The direction of an image axis in the world as text: "+x", or its direction cosines.
 std::string axis_text(const ImageGeometry& g, int axis) {
     for (int w = 0; w < 3; ++w)
         if (std::abs(g.direction[w][axis]) > 1 - 1e-6)
@@ -58,7 +58,7 @@ std::string axis_text(const ImageGeometry& g, int axis) {
     return text.str();
 }
 
-/// Large mapped files: only some slices are read to find the range of values.
+/// Whether the range of values is found from some slices only, as for large mapped files.
 bool is_range_of_slices(const ImageInfo& info) { return info.bytes_to_hold == 0 && info.chunk_size[0] == 0; }
 
 /// Minimum and maximum value of one channel; an estimate for large files.
@@ -85,7 +85,7 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
 }
 
 void describe_image(const std::string& path, const ImageFlags& flags, Session& session) {
-    constexpr int kMaxChannels = 16;  // up to this number the pixels are read
+    constexpr int kMaxChannels = 16;  // up to this number of channels, pixels are read to find their ranges
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
@@ -161,7 +161,7 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
 }
 
 void describe(const std::string& path, const ImageFlags& flags, const PointFlags& points, Session& session) {
-    // A named grid is shown as the image that --image and other options would read.
+    // A named grid (FILE.vdb:NAME) is described as an image, because options such as --image would read it as one.
     const FileKind kind = split_grid_name(path).grid.empty() ? kind_of_file(path) : FileKind::Image;
     session.report()["kind"] = to_string(kind);
     switch (kind) {

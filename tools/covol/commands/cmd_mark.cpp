@@ -30,7 +30,8 @@
 namespace covol::tool {
 namespace {
 
-/// The page's policy allows only its own script and style, by their digests, and connections to this server.
+/// The beginning of the content security policy in the page. It allows only the page's own script and style, by their
+/// digests, and connections to this server.
 constexpr const char* kPolicyBegins = "<meta http-equiv=\"Content-Security-Policy\" content=\"";
 
 std::string policy_of(const std::string& page) {
@@ -38,21 +39,21 @@ std::string policy_of(const std::string& page) {
     return page.substr(begin, page.find('"', begin) - begin);
 }
 
-/// Maximum size of decoded chunks in the cache for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in
-/// chunks of 128 takes 128 MiB if two voxels are combined into one pixel.
+/// Maximum size of the decoded chunks in the cache for slices. For example, a slice through 2048 x 2048 x 2048 voxels
+/// of 8 bits in chunks of 128 needs 128 MiB if two voxels are combined into one pixel.
 constexpr std::uint64_t kMaxSliceBytes = std::uint64_t(512) << 20;
 
-/// Maximum size of decoded chunks that surfaces were computed from, before they are released.
+/// Maximum size of the decoded chunks that are kept for computing surfaces; see BoundedImage.
 constexpr std::uint64_t kMaxJobBytes = std::uint64_t(768) << 20;
 
-/// Without the slash that a path may end with: "scan.nii.gz/" becomes "scan.nii.gz".
+/// Removes the slash at the end of a path: "scan.nii.gz/" becomes "scan.nii.gz".
 std::filesystem::path without_slash(const std::string& path) {
     const std::filesystem::path given(path);
     return given.has_filename() ? given : given.parent_path();
 }
 
-/// The same port for the same study, as long as it is free: browsers store views, and actions that have not been sent,
-/// by address.
+/// A port that depends only on the path of the study. Browsers store views, and actions that have not been sent, for an
+/// address, and find them again if a study has the same port in each run.
 std::uint16_t usual_port(const std::string& study) {
     constexpr std::uint32_t kFirst = 20000, kCount = 12000;  // below the range of ephemeral ports
     std::error_code ignored;
@@ -75,7 +76,7 @@ std::unique_ptr<serve::WebServer> start_server(serve::Options options, const ser
     }
 }
 
-/// Stops a server also after an error: its handlers use objects that are destroyed next.
+/// Stops a server at the end of the scope, also after an error, before the objects that its handlers use are destroyed.
 struct StopAtEnd {
     serve::WebServer& server;
     ~StopAtEnd() { server.stop(); }
@@ -109,20 +110,20 @@ struct MarkJob {
         options.authorities = authorities;
         options.frame_origins = frame_origins;
         options.page_policy = policy_of(view.page);
-        // When a page reconnects, it sends pending actions as fast as they are stored, in at most a millisecond each.
         options.max_body_bytes = kMaxFileBytes;
+        // A page that reconnects sends its pending actions without pauses. Storing one takes at most a millisecond.
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
         const ImageLevels levels = open_image_levels(pixels, image.options, kMaxSliceBytes, session.run());
-        // A compressed stream is slow to open, and is therefore opened only once.
+        // Only images in chunks are opened again for computations: a compressed stream is slow to open.
         const bool is_bounded = levels.is_in_chunks();
         BoundedImage for_jobs(is_bounded ? open() : pixels, open,
                               is_bounded ? kMaxJobBytes : std::numeric_limits<std::uint64_t>::max());
         auto seen =
             std::make_unique<PageImage>(levels, view.title, is_anatomical(image_path, image.options, session.run()),
                                         channels(info, session), quiet(session.run()));
-        // Destroyed after the session, whose solver sends to it until its thread has ended.
+        // Declared before `mark`, and so destroyed after it: its solver uses the server until its thread has ended.
         std::unique_ptr<serve::WebServer> server;
         MarkSession mark(
             std::move(opened), std::move(seen), [&] { return for_jobs.get(); }, std::move(view), session.run());
@@ -152,12 +153,12 @@ struct MarkJob {
         if (!link || !link->open()) std::cout << "open " << server->url() << std::endl;
         session.note("the study is " + folder + "; every action is saved immediately. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        server->stop();  // its requests are cancelled by the interrupt
+        server->stop();  // the interrupt has cancelled its requests
         accept_interrupt();
     }
 
 private:
-    /// Other channels are read when a page requests them.
+    /// The channels of the image. Channels other than the marked one are read when a page requests them.
     [[nodiscard]] PageChannels channels(const ImageInfo& info, Session& session) const {
         PageChannels all;
         if (info.channels < 2) return all;
@@ -197,7 +198,7 @@ private:
             const StudyId id = structure_of(study, "--points", file);
             auto action = std::get<StudyActions::AddMarks>(marks);
             action.structure = id;
-            // Running the same command line again does not add them twice.
+            // The key depends on the content of the file, so repeating the command line does not add the marks twice.
             const std::string key = "points-" + std::to_string(id) + "-" + digest_of(file.value);
             if (!study.apply({key, action}).is_new)
                 session.note(file.value + ": its marks were added to this structure before, and are not added again");
@@ -223,7 +224,7 @@ private:
         }
     }
 
-    /// The structure of that name, which is added if there is none; without a name, the only structure.
+    /// The structure with the name of `file`, which is added if it does not exist; without a name, the only structure.
     static StudyId structure_of(Study& study, const std::string& flag, const Named& file) {
         const StudyState& all = study.state();
         if (file.name.empty() && all.size() > 1)

@@ -39,7 +39,7 @@ struct MeshJob {
         record("smoothing", done.smoothing);
     }
 
-    /// Unmodified marching cubes, streamed from the tree to the file.
+    /// Writes the unmodified mesh of marching cubes while the tree is traversed, without holding the whole mesh.
     void stream(const FloatGridPtr& level_set, double h, Session& session) const {
         session.outputs().add(output, [this, level_set, h, &session](const std::string& path) {
             const StreamedMesh made =

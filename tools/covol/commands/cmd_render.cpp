@@ -64,7 +64,7 @@ struct RenderJob {
     }
 
 private:
-    /// Frames are written one by one: many large ones would not fit into memory.
+    /// Writes each frame as soon as it is rendered, because many large frames would not fit into memory.
     void write_frames(const RenderScene& scene, RenderOptions chosen, Session& session) const {
         chosen.whole_turn = true;
         const double first = chosen.view.azimuth;

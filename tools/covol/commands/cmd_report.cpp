@@ -17,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // the automatic attraction range of marks
+constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // of the evidence of marks; as their automatic attraction range
 
 /// One level set of the file, and the marks and evidence that it is compared with.
 struct Shown {
@@ -87,7 +87,7 @@ private:
         return facts;
     }
 
-    /// Adds the run's report; fields that covol does not write are omitted.
+    /// Adds the fields of the report that --run-report names. Other fields than those that covol writes are ignored.
     [[nodiscard]] Json with_run(Json facts) const {
         std::ifstream file = open_regular_file(run_report);
         if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");

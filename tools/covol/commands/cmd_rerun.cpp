@@ -26,7 +26,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-constexpr int kUnlimitedBrickVoxels = 1'000'000'000;  // voxels; more than any band that a run can hold
+constexpr int kUnlimitedBrickVoxels = 1'000'000'000;  // more voxels than any band that fits into memory
 
 /// What a file states about the run that made it. The file may come from an untrusted source.
 struct Provenance {
@@ -39,7 +39,7 @@ struct Provenance {
     throw Error(Errc::Unsupported, path + ": " + why);
 }
 
-/// The value as a list of arguments; it is a text, a number, a Boolean, or a list of these.
+/// Converts a text, a number, a Boolean, or a list of these, to a list of arguments.
 Words values_of(const std::string& path, const std::string& name, const Json& value) {
     const auto is_one = [](const Json& one) { return one.is_string() || one.is_number() || one.is_boolean(); };
     const bool is_list = value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one);
@@ -51,7 +51,8 @@ Words values_of(const std::string& path, const std::string& name, const Json& va
     return words;
 }
 
-/// A name without a folder. It cannot be mistaken for an option: it always follows a folder or `--name=`.
+/// Whether it is a file name without a folder. Names that look like options are accepted, because in the command line a
+/// name always follows a folder or `--name=`.
 bool is_file_name(const std::string& name) {
     return !name.empty() && name != "." && name != ".." &&
            name.find_first_of(std::string("/\0", 2)) == std::string::npos;
@@ -92,7 +93,7 @@ Provenance read_provenance(const std::string& path) {
     return all;
 }
 
-/// The current locations of a run's inputs.
+/// Finds the inputs of a run in the given folders, by name and digest.
 class Inputs {
 public:
     Inputs(std::string source, const Provenance& run, std::vector<std::string> folders)
@@ -100,7 +101,7 @@ public:
         for (const auto& [name, digest] : run.inputs) found_.emplace_back(name, find(name, digest));
     }
 
-    /// The value of an option with the current path of its file. @throws Error if it is none of the inputs
+    /// The value of an option, with the current path instead of the file name. @throws Error if the file is no input
     [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
         if (value == "-") refuse(source_, "an input of that run came through a pipe");
         const std::size_t begin = path_within(value).first;
@@ -124,12 +125,12 @@ public:
     }
 
 private:
-    /// The name of a grid, the path of a dataset, or the slash of a folder.
+    /// Whether the text after a file name is empty, or the name of a grid, the path of a dataset, or a slash.
     static bool is_within_file(const std::string& rest) {
         return rest.empty() || rest == "/" || (rest.front() == ':' && rest.find("..") == std::string::npos);
     }
 
-    /// A position, or the name or shape of a start.
+    /// Whether the value is a position, or a start that is not read from a file.
     static bool names_no_file(const std::string& value) {
         try {
             return parse_start("", value).path.empty();
@@ -143,7 +144,7 @@ private:
         }
     }
 
-    /// NAME=marks_{frame}.csv if inputs with such names are in one folder; otherwise empty.
+    /// A value such as NAME=marks_{frame}.csv with the folder of the inputs that match it; empty if no input matches.
     [[nodiscard]] std::string placed_frames(const std::string& value, std::size_t begin) const {
         const auto parts = around_frame(value.substr(begin));
         std::string folder;
@@ -161,7 +162,7 @@ private:
     [[nodiscard]] std::string find(const std::string& name, const std::string& digest) const {
         std::string seen;
         for (const std::string& folder : folders_) {
-            // After a slash, no part of a folder's name is read as the name of a structure (NAME=FILE).
+            // The path is absolute, so that a '=' in it is not read as NAME=FILE: names of structures contain no slash.
             const fs::path path = fs::absolute(folder) / name;
             std::error_code status;
             if (!fs::is_regular_file(path, status) && !fs::is_directory(path, status)) continue;
@@ -182,7 +183,7 @@ private:
 };
 
 /// The job with the current locations of its inputs. Its .vdb outputs are placed in `folder`; the others are omitted,
-/// together with the settings that are refused without a mesh.
+/// together with the settings that are invalid without a mesh.
 /// @throws Error for options that a file may not set
 JobOptions job_here(const std::string& path, const JobOptions& given, const CLI::App& command, const Inputs& inputs,
                     const fs::path& folder) {
@@ -196,7 +197,7 @@ JobOptions job_here(const std::string& path, const JobOptions& given, const CLI:
             if (role == OptionRole::Input) placed.push_back(inputs.placed(name, value));
             if (role == OptionRole::Setting) placed.push_back(value);
             if (role != OptionRole::Output || fs::path(value).extension() != ".vdb") continue;
-            // Provenance stores file names only; a file from an untrusted source may contain a path here.
+            // Only the file name is used: covol stores no folders, but a file from an untrusted source may contain one.
             const std::string file = fs::path(value).filename().string();
             if (!is_file_name(file)) refuse(path, "'" + name + "': expected a file's name, got " + value);
             placed.push_back((folder / file).string());
@@ -291,7 +292,7 @@ private:
         if (session.run().threads > 0) words.push_back("--threads=" + std::to_string(session.run().threads));
         if (const auto limit = session.memory_limit()) {
             words.push_back("--memory-limit=" + std::to_string(*limit));
-            // a run that switched to bricks would not give bitwise identical results
+            // the run must not switch to bricks, because the result would not be bitwise identical
             const bool given = std::any_of(job.values.begin(), job.values.end(),
                                            [](const auto& option) { return option.first == "brick-voxels"; });
             if (!given && command.get_option_no_throw("--brick-voxels") != nullptr)
@@ -300,7 +301,7 @@ private:
         return words;
     }
 
-    /// The file of that name; if the run has one .vdb output that has been renamed since, that one.
+    /// The output with the name of the original file, or else the only .vdb output, if the original file was renamed.
     [[nodiscard]] std::string result_in(const KeptFolder& scratch) const {
         std::vector<fs::path> made;
         for (const fs::directory_entry& entry : fs::directory_iterator(scratch.path()))

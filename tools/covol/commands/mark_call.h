@@ -9,16 +9,16 @@ namespace covol::tool {
 
 /// Arguments of `covol mark`.
 struct MarkCall {
-    std::string image;                ///< the study is beside it
-    std::vector<std::string> points;  ///< [NAME=]FILE
+    std::string image;                ///< path; the study is in the same folder
+    std::vector<std::string> points;  ///< files of marks, each as [NAME=]FILE
     bool without_browser = false;
     int port = 0;
 };
 
-/// Serves the page until Ctrl-C. @throws Error as `covol mark`
+/// Runs `covol mark`: serves the page until Ctrl-C. @throws Error
 void run_mark(Session& session, const MarkCall& call);
 
-/// --no-browser and --port.
+/// Adds --no-browser and --port.
 void bind_page(CLI::App& command, bool& without_browser, int& port);
 
 }  // namespace covol::tool

@@ -90,7 +90,7 @@ ImageGeometry ImageFlags::read_geometry(const std::string& path, const RunContex
 }
 
 WorldBox sampled_box(const WorldBox& box, double h) {
-    constexpr double kReach = 9;  // 7 voxels of a leaf, one for rounding the box to voxels, one as reserve
+    constexpr double kReach = 9;  // up to 7 voxels to complete a leaf, 1 for rounding the box to voxels, and 1 more
     WorldBox grown = box;
     for (int a = 0; a < 3; ++a) {
         grown.min[a] -= kReach * h;
@@ -112,7 +112,7 @@ CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
 
 namespace {
 
-/// Reads all of standard input, once. The writing program may be slow.
+/// The content of standard input, which is read by the first call. Waits for the writing program; can be cancelled.
 const std::string& standard_input(const RunContext& run) {
     static std::string text;
     static bool done = false;

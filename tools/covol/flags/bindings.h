@@ -30,7 +30,7 @@ template <typename Number>
     return text.str();
 }
 
-/// Whether a job offers the option; SingleStep offers all options of its struct.
+/// Whether this kind of job offers the option; SingleStep offers all options.
 [[nodiscard]] bool is_offered(const OptionInfo& option, Offered job);
 
 // Adds an option of each kind. Values out of range throw an Error when they are parsed.
@@ -55,7 +55,8 @@ CLI::Option* add_number(CLI::App& command, const OptionInfo& option, const std::
                                                       : "NUMBER");
 }
 
-/// Adds an option of the field's type; null for types without one. Lengths are stored in `given` until h is known.
+/// Adds an option for a field, by its type; null if the type has no kind of option. Lengths are stored in `given` until
+/// the voxel size is known.
 template <typename Options, typename Value>
 CLI::Option* add_option(CLI::App& command, const OptionInfo& option, Value& target, Given<Options>& given) {
     using T = PlainOf<Value>;
@@ -86,8 +87,8 @@ CLI::Option* add_option(CLI::App& command, const OptionInfo& option, Value& targ
     }
 }
 
-/// Adds an option for each row of the table that `job` offers, of one group if it is given, except for those that are
-/// bound separately. `given` must not be moved until the command line has been parsed.
+/// Adds an option for each row of the table that `job` offers, except for those named in `by_hand`, which the caller
+/// adds. With `only`, restricted to this group. `given` must not be moved until the command line has been parsed.
 template <typename Options>
 void bind_options(CLI::App& command, Given<Options>& given, Offered job,
                   std::initializer_list<std::string_view> by_hand = {}, Group only = Group::None) {
@@ -98,7 +99,7 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
         in_group(command, option.place.group);
         CLI::Option* made = add_option(command, option, value, given);
         if (made == nullptr) return;
-        // The help shows the text in brackets as the default; automatic choices are not values, so reports omit them.
+        // The help shows the text in brackets as the default. It is not set as such, because reports would contain it.
         const bool is_automatic = *option.automatic != 0;
         made->description(with_flags(option.text) +
                           (is_automatic ? " [" + with_flags(option.automatic) + "]" : std::string()));
@@ -107,50 +108,50 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
     });
 }
 
-/// Properties of the image that the user corrects.
+/// Options of how an image is read, such as corrections of its properties.
 struct ImageFlags : Given<ReadImageOptions> {
-    /// @param by_hand  options that are not bound: "roi" crops the image, "frame" selects one time point; commands may
-    /// have their own
+    /// @param by_hand  options that are not added, such as "roi", which crops the image, and "frame", which selects one
+    /// time point, if the command has its own
     void bind(CLI::App& command, std::initializer_list<std::string_view> by_hand = {}) {
         bind_options(command, *this, Offered::SingleStep, by_hand);
     }
     /// The image, or the part of it that --roi selects.
     [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
-    /// The lattice of read()'s image.
+    /// The lattice of the image that read() returns.
     [[nodiscard]] ImageGeometry read_geometry(const std::string& path, const RunContext& run) const;
 };
 
-/// `box`, extended by what voxels of edge h may sample: leaves extend beyond a domain.
+/// `box`, extended to everything that a domain with voxels of edge h may sample: its leaves extend beyond the box.
 [[nodiscard]] WorldBox sampled_box(const WorldBox& box, double h);
 
 struct PointFlags : Given<ReadPointsOptions> {
     std::vector<std::string> paths;
-    /// @param flag  "--points", or the name of a positional
+    /// @param flag  "--points", or the name of a positional argument
     CLI::Option* bind(CLI::App& command, const std::string& flag);
-    /// Options for reading files, without the files.
+    /// Adds the options for reading files, but not the files.
     void bind_options(CLI::App& command) { tool::bind_options(command, *this, Offered::SingleStep); }
 };
 
 /// How files of marks are read; "-" is standard input.
 [[nodiscard]] ReadMarksOptions reading_of(const PointFlags& flags, const RunContext& run);
-/// World units.
+/// Reads all points, in world units.
 [[nodiscard]] std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional<ImageGeometry>& geometry,
                                                   const RunContext& run);
 
-/// The voxel size h; --voxel-size may be relative to the automatic one ("2vx"). Reports the value in `session`.
+/// The voxel size h: as given, as a multiple of the automatic one ("2vx"), or automatic. The last two are reported.
 /// @param tagged  as for choose_voxel_size()
 [[nodiscard]] double resolve_voxel_size(const Length& requested, const Image* image, const std::vector<Vec3>& points,
                                         bool tagged, Session& session);
 
 struct MeshFlags : Given<WriteMeshOptions> {
-    bool plain = false;  ///< uses stream_mesh()
+    bool plain = false;  ///< --plain: the mesh is written by stream_mesh()
     void bind(CLI::App& command);
     void bind_plain(CLI::App& command);
-    /// @param path  of the mesh, or empty. @throws UsageError if its format cannot be streamed.
+    /// @param path  of the mesh, or empty. @throws UsageError with --plain if the format cannot be streamed.
     void check_plain(const std::string& path) const;
-    /// Whether an option, by its name, is refused by a run that writes no mesh.
+    /// Whether runs that write no mesh refuse the option of this name.
     [[nodiscard]] static bool needs_mesh(std::string_view option) { return option == "up" || option == "unit-scale"; }
-    /// @throws UsageError if such an option is given, but no mesh is written.
+    /// @throws UsageError if an option for which needs_mesh() is true is given, but no mesh is written.
     void check_used(bool writes) const;
     [[nodiscard]] WriteMeshOptions write_options(const Session& session) const;
 };

@@ -7,7 +7,7 @@
 
 namespace covol::tool {
 
-/// How a job is split, by `covol brick` and because of --memory-limit.
+/// How a job is split into bricks, by `covol brick` or because of --memory-limit.
 struct BrickFlags : Given<BrickOptions> {
     std::optional<std::int64_t> max_voxels;
 
@@ -16,9 +16,9 @@ struct BrickFlags : Given<BrickOptions> {
     [[nodiscard]] BrickOptions resolve(std::optional<std::uint64_t> memory) const;
 };
 
-/// Memory for solving a band of that many voxels, including the program itself, bytes.
+/// Memory for solving a band with this number of voxels, including the program itself, bytes.
 [[nodiscard]] double memory_of_band(double active_voxels);
-/// The same for joining bricks, without and with the mesh.
+/// Memory for joining the bricks of such a band, without and with the whole mesh, bytes.
 [[nodiscard]] double memory_of_joined(double active_voxels);
 [[nodiscard]] double memory_of_joined_mesh(double active_voxels);
 

@@ -12,7 +12,7 @@ struct CheckpointFlags {
 
     void bind(CLI::App& command);
     [[nodiscard]] bool given() const { return !folder.empty() || !resumed.empty(); }
-    /// From here on the session's runs save their states. @throws UsageError; what Checkpoints() throws.
+    /// After this call, the runs of the session save their states. @throws UsageError; errors of Checkpoints().
     void begin(Session& session) const;
 };
 

@@ -12,12 +12,12 @@ namespace covol::tool {
 
 /// Cleaning of a cloud before it is used.
 struct CloudFlags : Given<CloudCleanupOptions> {
-    std::string outlier_factor;  ///< a number; empty: outliers are kept
+    std::string outlier_factor;  ///< text of the option, a number; empty: outliers are kept
     Given<InputOptions> inputs;
 
-    /// @param with_inputs  includes --most-points
+    /// @param with_inputs  whether to add --most-points
     void bind(CLI::App& command, bool with_inputs);
-    /// @throws Error InvalidOptions for values that are invalid whatever the voxel size is.
+    /// @throws Error InvalidOptions for values that are invalid for every voxel size.
     void check() const;
     /// @throws UsageError if an option is given, but there is no cloud.
     void check_used(bool has_cloud) const;

@@ -7,11 +7,11 @@
 
 namespace covol::tool {
 
-/// Ordered marks on slices.
+/// Contours: marks in order, on slices.
 struct ContourFlags : Given<ContourOptions> {
     std::vector<std::string> paths;
 
-    /// @param names  files may be NAME=FILE, for one of several structures
+    /// @param names  whether a file may be given as NAME=FILE, for one of several structures
     void bind(CLI::App& command, bool names);
 };
 

@@ -15,15 +15,15 @@ namespace covol::tool {
 /// Number of suggested slices in a report page or a file of suggestions if the command line does not give it.
 inline constexpr int kPageSuggestions = 3;
 
-/// Support of the surface by marks and image: --evidence and --suggest; also shown by a report page.
+/// --evidence, --suggest and --suggestions: the support of the surface by marks and image. Report pages show it, too.
 struct EvidenceFlags {
-    std::string path;        ///< a table of the slices, .csv
-    std::string marks_path;  ///< the suggestions, for write_program_marks()
+    std::string path;        ///< table of the slices, .csv
+    std::string marks_path;  ///< file of suggestions, see write_program_marks()
     std::optional<int> suggestions;
     bool for_page = false;
 
     void bind(CLI::App& command);
-    /// @param tagged  maps a path to the name for this run
+    /// @param tagged  returns the path of an output for this run, such as with the number of the frame
     void check(Outputs& outputs, const std::function<std::string(const std::string&)>& tagged) const;
     [[nodiscard]] bool wanted() const {
         return !path.empty() || !marks_path.empty() || suggestions.value_or(0) > 0 || for_page;
@@ -33,13 +33,13 @@ struct EvidenceFlags {
                                  const RunContext& run) const;
 };
 
-/// Without the values at the vertices.
+/// All fields except the values at the vertices.
 [[nodiscard]] Json to_json(const Evidence& evidence);
 
-/// distance_to_marks and edge_strength, those that are known; nothing without evidence.
+/// The attributes distance_to_marks and edge_strength, if they are known; empty without evidence.
 [[nodiscard]] std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& evidence);
 
-/// Prints the unsupported fraction, and the suggestions; each line begins with `who`.
+/// Prints the unsupported fraction of the surface, and the suggestions; each line begins with `who`.
 void print_evidence(Session& session, const Evidence& evidence, const std::string& who = {});
 
 /// One surface in the table of slices.

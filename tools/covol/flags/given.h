@@ -29,9 +29,9 @@ using PlainOf = typename Plain<T>::type;
 /// Options as given by the user: lengths in voxels are resolved once the voxel size is known.
 template <typename Options>
 struct Given {
-    Options options;                                     ///< all but the given lengths
+    Options options;                                     ///< all options except lengths that were given
     std::map<std::string, Length, std::less<>> lengths;  ///< the given lengths; for a volume, the edge of a cube
-    std::set<std::string, std::less<>> names;            ///< of all options that were given
+    std::set<std::string, std::less<>> names;            ///< names of all options that were given
 
     [[nodiscard]] bool has(std::string_view name) const { return names.contains(name); }
     [[nodiscard]] Length length(std::string_view name) const {

@@ -8,9 +8,9 @@
 
 namespace covol::tool {
 
-/// Another tool's result to be corrected by marks: --guess and related options.
+/// --guess and related options: a mask, mesh or level set to be corrected by marks.
 struct GuessFlags {
-    std::vector<std::string> paths;  ///< with NAME= for one structure
+    std::vector<std::string> paths;  ///< each as FILE, or NAME=FILE for one structure
     Given<InputOptions> inputs;
 
     void bind(CLI::App& command);

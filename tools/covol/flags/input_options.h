@@ -5,10 +5,10 @@
 
 namespace covol::tool {
 
-/// Options of the programs in addition to those of the library.
+/// Options of the program and of the Python module that the library does not have.
 struct InputOptions {
-    std::size_t max_points = 2500000;  ///< for a cloud without an image; 0: all
-    int guess_label = 0;               ///< label to correct in a mask with several; 0: there is only one
+    std::size_t max_points = 2500000;  ///< maximum number of points of a cloud without an image; 0: all
+    int guess_label = 0;               ///< label to correct in a mask with several labels; 0: the only label
 };
 
 }  // namespace covol::tool

@@ -13,7 +13,7 @@ struct PaintedFlags : Given<PaintedOptions> {
     std::vector<std::string> paths;
 
     void bind(CLI::App& command);
-    /// @throws UsageError for NAME=FILE with several labels; Error
+    /// @throws UsageError if a file that is given as NAME=FILE has several labels; Error
     [[nodiscard]] std::vector<std::shared_ptr<const PaintedImage>> read(const RunContext& run) const;
 };
 

@@ -8,7 +8,7 @@ namespace covol::tool {
 
 /// Positions that are known to be inside or outside: --inside and --outside.
 struct SeedFlags {
-    std::vector<std::string> inside, outside;  ///< files, or x,y,z in the world; with NAME= for one structure
+    std::vector<std::string> inside, outside;  ///< files or world positions x,y,z; NAME=... for one structure
 
     void bind(CLI::App& command, bool names);
 };

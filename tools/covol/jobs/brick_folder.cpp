@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMaxFactsBytes = 1 << 20;  // for the facts that a sweep stores about a brick
+constexpr std::uintmax_t kMaxFactsBytes = 1 << 20;  // maximum size of a file of BrickFacts
 constexpr std::int64_t kMaxVoxels = std::int64_t(1) << 40;
 
-/// A whole number of JSON in a given range. @throws std::out_of_range, as Json does for missing fields
+/// An integer of a JSON object, in the given range. @throws std::out_of_range, as Json does for missing fields
 template <typename Number = int>
 Number whole(const Json& json, const char* name, std::int64_t low, std::int64_t high) {
     const Json& value = json.at(name);
@@ -49,7 +49,7 @@ const Json& three(const Json& json, const char* name) {
 }
 
 Index3 index_of(const Json& json, const char* name) {
-    constexpr std::int64_t kMaxIndex = 1 << 24;  // lattices extend half as far
+    constexpr std::int64_t kMaxIndex = 1 << 24;  // lattices extend to half of this
     Index3 index{};
     for (int a = 0; a < 3; ++a)
         index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kMaxIndex, kMaxIndex);
@@ -107,7 +107,7 @@ Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
     return brick;
 }
 
-/// A valid lattice of grids, and voxels on it. @throws Error
+/// Reads a domain, and validates it. @throws std::out_of_range, Error
 Domain domain_of_plan(const Json& json) {
     const Domain domain{real(json, "voxel_size"), place_of(json, "origin"), index_of(json, "min"),
                         index_of(json, "max")};
@@ -120,7 +120,7 @@ Domain domain_of_plan(const Json& json) {
     return domain;
 }
 
-/// 0 for a folder, such as a Zarr store.
+/// The size of a file; 0 for a folder, such as a Zarr store.
 std::uintmax_t bytes_of(const std::string& path, std::error_code& status) {
     return fs::is_directory(path, status) ? 0 : fs::file_size(path, status);
 }
@@ -155,7 +155,8 @@ BrickFacts read_facts(const std::string& path) {
     }
 }
 
-/// Symbolic links in a plan from an untrusted source must not lead to other folders.
+/// Creates the folder of a file. A symbolic link is refused: a plan from an untrusted source may contain links to other
+/// folders.
 void make_folder_of(const std::string& file) {
     const fs::path folder = fs::path(file).parent_path();
     std::error_code status;

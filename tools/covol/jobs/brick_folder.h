@@ -10,9 +10,9 @@
 
 namespace covol::tool {
 
-/// The folder of a job in bricks: plan.json, coarse.vdb, and for each sweep N and brick B sweep-N/brick-B.vdb with the
-/// state and sweep-N/brick-B.json, whose existence marks it as done. Files are complete or absent; those that are done
-/// are never written again.
+/// The folder of a job in bricks. It contains plan.json, coarse.vdb, and for each sweep N and brick B its state in
+/// sweep-N/brick-B.vdb, and sweep-N/brick-B.json, which exists when brick B has been solved. Files are written
+/// completely or not at all, and are never replaced.
 class BrickFolder {
 public:
     explicit BrickFolder(std::string path) : path_(std::move(path)) {}
@@ -25,23 +25,23 @@ public:
     [[nodiscard]] BrickPlan read_plan() const;
 
     [[nodiscard]] bool is_done(int sweep, std::size_t brick) const;
-    /// The state after a sweep, or null.
+    /// The state of a brick after a sweep, or null.
     [[nodiscard]] FloatGridPtr state(int sweep, std::size_t brick) const;
     void write_state(int sweep, std::size_t brick, const FloatGridPtr& state, Json facts) const;
-    /// The state is the same as after the previous sweep.
+    /// Records that the state of the brick is the same as after the previous sweep.
     void write_same(int sweep, std::size_t brick, Json facts) const;
     /// Whether a completed sweep changed the brick's state.
     [[nodiscard]] bool moved(int sweep, std::size_t brick) const { return sweep_of_state(sweep, brick) == sweep; }
-    /// The cost of the sweeps up to this one.
+    /// The cost of all sweeps up to a given one.
     struct Spent {
         int steps = 0;  ///< maximum over bricks
         double seconds = 0;
         std::size_t unsteady = 0;  ///< bricks whose flow was not steady at its last step
     };
     [[nodiscard]] Spent spent(int sweep, std::size_t bricks) const;
-    /// The last sweep that is done for all bricks; 0: none.
+    /// The number of the last sweep that is done for all bricks; 0: none.
     [[nodiscard]] int last_sweep(std::size_t bricks) const;
-    /// The states of a sweep, as a function of the brick. The folder must outlive it.
+    /// A function that returns the state of a brick after `sweep`. This object must outlive it.
     [[nodiscard]] BrickStates states(int sweep) const;
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
 

@@ -17,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kSmallJob = 64;  // voxels across: smaller jobs are never split
+constexpr double kSmallJob = 64;  // edge length in voxels: smaller jobs are never split
 
 std::unique_ptr<BrickJob> make_job(const std::optional<Image>& image, const StructureInput& structure,
                                    const RunContext& run) {
@@ -45,7 +45,7 @@ public:
         return moved;
     }
 
-    /// All bricks, until neighbours agree.
+    /// Solves all bricks in repeated sweeps until neighbours agree, or until the maximum number of sweeps.
     void run_all() const {
         std::vector<std::size_t> all(plan_.bricks.size());
         std::iota(all.begin(), all.end(), std::size_t(0));
@@ -61,7 +61,7 @@ public:
     }
 
 private:
-    /// @return whether it was solved; false if the state is the same as after the previous sweep
+    /// Solves one brick in one sweep. @return false if its state is the same as after the previous sweep
     [[nodiscard]] bool solve(int sweep, std::size_t brick) const {
         if (folder_.is_done(sweep, brick)) return folder_.moved(sweep, brick);
         const BrickStates states = folder_.states(sweep - 1);
@@ -102,7 +102,7 @@ private:
     const RunContext& run_;
 };
 
-/// Without progress and remarks of single bricks; warnings are passed on.
+/// A context without progress and remarks, for single bricks; warnings are passed on.
 RunContext quiet(const RunContext& run) {
     RunContext inner = run;
     inner.progress = {};
@@ -112,7 +112,7 @@ RunContext quiet(const RunContext& run) {
     return inner;
 }
 
-/// Larger gaps between neighbouring bricks cause a warning; smaller ones are averaged.
+/// Larger gaps between the surfaces of neighbouring bricks cause a warning. At gaps, the bricks are averaged.
 constexpr double kWarnOfGap = 0.5;  // voxels
 
 void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
@@ -128,7 +128,7 @@ void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, S
         session.note(text.str() + "; their mean is taken");
 }
 
-/// "about 12 million voxels"
+/// The rounded number as text: "about 12 million voxels".
 std::string about_voxels(std::int64_t count) {
     constexpr std::int64_t kMillion = 1'000'000, kThousand = 1'000;
     const auto rounded = [&](std::int64_t unit) { return std::to_string((count + unit / 2) / unit); };
@@ -136,7 +136,8 @@ std::string about_voxels(std::int64_t count) {
     return "about " + (count < kThousand ? std::to_string(count) : rounded(kThousand) + "000") + " voxels";
 }
 
-/// Whether the mesh has to be streamed. @throws Error if the joined surface exceeds --memory-limit even then
+/// Whether the mesh has to be streamed, because of --plain or to save memory.
+/// @throws Error if the memory does not suffice even then
 bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
     if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;
@@ -188,7 +189,7 @@ void print_plan(const BrickPlan& plan, Session& session) {
                   ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
 }
 
-/// Outputs that were named when the job was planned, which does not write them.
+/// Names of the given outputs except -o. Planning does not write them.
 std::string outputs_of_join(const Session& session) {
     std::string names;
     for (const std::string& name : session.given())
@@ -261,7 +262,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         plan = solver->plan(job.bricks.resolve(limit));
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return in_one();  // reports what is wrong with the job, if anything
+        return in_one();  // throws the error again if the job is invalid
     }
     if (memory_of_band(double(plan.active_voxels())) < double(*limit)) {
         solver.reset();
@@ -272,7 +273,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         throw Error(Errc::InvalidOptions,
                     "--checkpoint: the band is larger than --memory-limit allows at once, and bricks store their own "
                     "states: see covol brick");
-    (void)streams_mesh(job, plan, session);  // to fail before the computation rather than after it
+    (void)streams_mesh(job, plan, session);  // throws now rather than after the computation
     run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
     const ScratchFolder scratch(std::filesystem::path(job.any_output()).parent_path());

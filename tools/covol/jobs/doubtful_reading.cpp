@@ -6,7 +6,7 @@
 namespace covol::tool {
 namespace {
 
-/// Magnitude of the gradient by central differences; nullopt near the border of the loaded part of the image.
+/// Magnitude of the gradient by central differences; nullopt at the border of the loaded part of the image or beyond.
 std::optional<double> edge_at(const Image& image, const Vec3& index) {
     Index3 voxel{};
     for (int a = 0; a < 3; ++a) {

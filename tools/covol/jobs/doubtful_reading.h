@@ -6,10 +6,10 @@
 
 namespace covol::tool {
 
-/// The ratio of the mean edge strengths at the marks if their coordinates are read as voxels, and as lengths; nullopt
-/// if the edges are not clearly stronger with voxels, if the marks would not all be inside the image, or if both
-/// readings are equivalent.
-/// @param marks  the numbers of the file, read as world positions, inside the image
+/// Tests whether coordinates that were read as lengths are voxel indices. Returns the mean edge strength at the marks
+/// if read as indices, divided by that if read as lengths. Nullopt if it is not clearly larger, if not all marks would
+/// be inside the image, if both readings agree to less than a voxel, with few marks, or if the spacing is not known.
+/// @param marks  the numbers of the file, inside the image if read as world positions
 /// @throws Error InvalidInput (a damaged chunk).
 [[nodiscard]] std::optional<double> edges_if_voxels(const std::vector<Vec3>& marks, const Image& image);
 

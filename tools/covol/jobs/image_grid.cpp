@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kLeaf = 8;
 
-/// Inside the image, which extends half a voxel beyond the centres of the outer voxels.
+/// Whether the position is inside the image, which extends half a voxel beyond the centres of the outer voxels.
 bool is_inside(const ImageGeometry& geometry, const Vec3& world) {
     const Vec3 index = geometry.world_to_index(world);
     for (int a = 0; a < 3; ++a)
@@ -38,7 +38,7 @@ double bytes_of_grid(const ImageGeometry& geometry, double h) {
     const Domain domain = make_domain(geometry.world_box(), h);
     double leaves = 1;
     for (int a = 0; a < 3; ++a) leaves *= (domain.max[a] >> 3) - (domain.min[a] >> 3) + 1.0;
-    // Includes the list of leaves, and the nodes above them.
+    // 128 bytes for each leaf in the list of leaves and in the upper nodes of the tree.
     constexpr double kBytesOfLeaf = kLeaf * kLeaf * kLeaf * sizeof(float) + 128;
     return leaves * kBytesOfLeaf;
 }

@@ -15,7 +15,7 @@ bool parse_int(std::string_view text, int& value) {
     return error == std::errc() && end == text.data() + text.size() && value >= 0;
 }
 
-/// The {frame...} in a path: its position and number of digits.
+/// The placeholder {frame}, {frame:03} or {frame:03d} in a path: its position, and the minimum number of digits.
 struct Placeholder {
     std::size_t begin = std::string::npos, length = 0;
     int digits = 0;
@@ -48,7 +48,7 @@ std::string padded(int number, int digits) {
 
 namespace {
 
-/// A path split before its ending: ".nii.gz" for "out.nii.gz".
+/// A path that is split before its ending: "out" and ".nii.gz" for "out.nii.gz".
 struct SplitPath {
     std::string before, ending;
 };

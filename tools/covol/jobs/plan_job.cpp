@@ -21,16 +21,16 @@ namespace {
 
 // Measured: docs/benchmarks.md, Plans.
 constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, including mesh and files
-constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
-constexpr double kBaseBytes = 6.5e7;     ///< the program itself
+constexpr double kTubeBytes = 12;        ///< memory for each voxel of the tube in which the distance is stored
+constexpr double kBaseBytes = 6.5e7;     ///< memory of the program itself
 constexpr double kGuessBandBytes = 335;  ///< instead of kBandBytes if a guess is fitted to the image
-constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and the maximum for all
-constexpr double kFlowTime = 1.3;                                ///< factor for a flow with an image
-constexpr double kGuessTime = 2.8;    ///< the same for a guess with an image, which learns its appearance at the marks
-constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
+constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and in total
+constexpr double kFlowTime = 1.3;                                ///< time of a flow with an image / without one
+constexpr double kGuessTime = 2.8;    ///< the same for a guess; includes estimating the appearance at the marks
+constexpr double kPilotVoxels = 128;  ///< along the marks' bounding box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< distance from the surface within which the image is sampled
-constexpr double kGuessVoxels = 25;   ///< the same for a guess, which smooths this part of the image
-constexpr double kGuessBytes = 8;     ///< for each voxel of that part: two copies
+constexpr double kGuessVoxels = 25;   ///< the same for a guess; this part of the image is smoothed
+constexpr double kGuessBytes = 8;     ///< memory for each voxel of that part, for two copies
 constexpr std::int64_t kMappedBytes = 1 << 16;  ///< pages of a mapped file that the system loads at once
 
 /// Result of a run with the marks alone on a coarse lattice.
@@ -43,9 +43,9 @@ struct Pilot {
 struct StructurePlan {
     std::string name;
     double active_voxels = 0, tube_voxels = 0, seconds = 0;
-    double bytes_while_solved = 0;   ///< in addition to those of its band
-    double smoothed_voxels = 0;      ///< of the image
-    std::set<std::uint64_t> blocks;  ///< blocks that are read
+    double bytes_while_solved = 0;   ///< in addition to kBandBytes for each voxel of the band
+    double smoothed_voxels = 0;      ///< voxels of the image that are smoothed
+    std::set<std::uint64_t> blocks;  ///< blocks of the image that are read
 };
 
 Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<ImageGeometry>& geometry, double h,
@@ -60,7 +60,7 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     Stopwatch watch;
     SegmentResult result = reconstruct(input.points, options, quiet);
     Start start = result.report.resolved.start;
-    if (geometry && is_any<CloudStart>(start)) {  // only points without an image have this start
+    if (geometry && is_any<CloudStart>(start)) {  // this start is possible for points without an image only
         options.start = start = TagStart{};
         watch = {};
         result = reconstruct(input.points, options, quiet);
@@ -76,7 +76,8 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     return pilot;
 }
 
-/// The part of a large image that is read at once: a chunk, or consecutive pages of a mapped file. 0: the whole image.
+/// The size in voxels of the part of an image that is read at once: a chunk, or consecutive pages of a mapped file. 0:
+/// the whole image.
 Index3 block_of(const ImageInfo& image) {
     if (image.bytes_to_hold > 0 || image.chunk_size[0] > 0) return image.chunk_size;
     const auto voxels = std::int32_t(kMappedBytes / std::int64_t(bytes_of(image.type)));
@@ -94,7 +95,7 @@ public:
     }
     [[nodiscard]] double count() const { return voxels_of(counts_); }
 
-    /// Adds the blocks with voxels from `low` to `high`, in indices.
+    /// Adds the blocks that contain voxels with indices from `low` to `high`.
     void add(const Vec3& low, const Vec3& high) {
         Index3 first, last;
         for (int a = 0; a < 3; ++a) {
@@ -178,7 +179,7 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     const double coarse = std::max(h, longest_side(bounding_box(given)) / kPilotVoxels);
     const Pilot coarser = run_pilot(job, marks, geometry, 2 * coarse, quiet);
     const Pilot pilot = run_pilot(job, marks, geometry, coarse, quiet);
-    // seconds = fixed + growing / h^2
+    // Model of the time: seconds = fixed + growing / h^2.
     const double c = pilot.voxel_size, d = std::max(coarser.voxel_size, 1.01 * c);
     const double growing = std::max(0.0, (pilot.seconds - coarser.seconds) / (1 / (c * c) - 1 / (d * d)));
     const double fixed = std::max(0.0, pilot.seconds - growing / (c * c));

@@ -13,9 +13,9 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kFarClip = 1000;   // Blender's default view clips objects beyond it; its unit is metres
-constexpr double kNearClip = 0.01;  // and objects nearer than this
-constexpr double kNozzle = 0.4;     // mm, common nozzle of printers: thinner walls are not printed
+constexpr double kFarClip = 1000;   // metres; Blender's default view clips parts of objects that are farther away
+constexpr double kNearClip = 0.01;  // metres; it also clips parts that are nearer
+constexpr double kNozzle = 0.4;     // mm, common diameter of printer nozzles: thinner walls are not printed
 constexpr double kPrintBed = 300;   // mm
 constexpr double kSmallPart = 1;    // mm
 
@@ -60,8 +60,8 @@ struct Rule {
 constexpr bool kProblem = true, kRemark = false;
 
 // One row for each problem: program, whether it fails the check, condition, effect, remedy. The rules for Blender were
-// tested in Debian's 3.4 (tests/cli/blender_test.py); the others follow from what is known of the programs' readers,
-// and were not tested.
+// tested with Blender 3.4 of Debian (tests/cli/blender_test.py); the others follow from what is known about how the
+// programs read files, and were not tested.
 const std::vector<Rule>& rules() {
     static const std::vector<Rule> table{
         {Program::Blender, kProblem, [](Facts f) { return is_vdb(f) && f.has_level_set && !f.has_density; },

@@ -12,8 +12,8 @@ enum class Program { Any, Blender, Houdini, Slicer, Fiji, Print };
 /// Properties of a file that the rules depend on.
 struct FileFacts {
     FileKind kind = FileKind::Image;
-    std::string ending;  ///< of the name, in lower case, with its dot; as of long_ending()
-    std::string unit;    ///< of length; empty: the file does not state one
+    std::string ending;  ///< long_ending() of the name: in lower case, with its dot
+    std::string unit;    ///< unit of length; empty: the file does not state one
     double extent = 0;   ///< longest side of its box, world units
     // .vdb
     bool has_level_set = false, has_density = false, has_blosc = false;
@@ -21,23 +21,23 @@ struct FileFacts {
     // meshes
     bool is_closed = true;
     int crossings = 0;  ///< self-intersections
-    double wall = -1;   ///< minimum, in the file's unit; < 0: not measured
+    double wall = -1;   ///< minimum wall thickness, in the file's unit; < 0: not measured
     // images
     std::string format;  ///< as printed by covol info
     bool is_rotated = false, has_spacing = true, is_big_tiff = false, has_segments = false;
-    bool has_display_range = true;  ///< false for a TIFF of labels of ImageJ without min and max
+    bool has_display_range = true;  ///< false for a TIFF of ImageJ with labels and without min and max
 };
 
 struct Advice {
-    bool is_problem = false;  ///< it cannot be opened there, or is read wrongly; otherwise a remark
+    bool is_problem = false;  ///< the program cannot open the file, or reads it wrongly; false: a remark
     std::string text, remedy;
 };
 
 /// The program's rules that apply to the file, in the table's order.
 [[nodiscard]] std::vector<Advice> advice_for(Program program, const FileFacts& facts);
 
-/// The text after `key`, up to the next blank, in the first 64 KiB of a file; empty if `key` does not occur. For
-/// headers of meshes and images, which are text at the beginning of files that have been read in full before.
+/// The text after `key`, up to the next blank, in the first 64 KiB of a file; empty if `key` does not occur. For text
+/// headers of meshes and images whose files have been read, and so validated, before.
 [[nodiscard]] std::string word_in_header(const std::string& path, const std::string& key);
 [[nodiscard]] bool header_holds(const std::string& path, const std::string& text);
 

@@ -19,10 +19,11 @@
 
 namespace covol::tool {
 
-/// Files whose marks name their structures. They are needed twice, for the names and for the marks, but read once.
+/// Reads files whose marks name their structures. They are needed twice, for the names of the structures and for the
+/// marks, but read once.
 class SharedMarks {
 public:
-    /// @throws as read_structures_of_points()
+    /// @throws Error as for read_structures_of_points()
     const std::vector<StructurePoints>& read(const std::string& file, const std::string& column,
                                              const ReadPointsOptions& options);
 
@@ -30,20 +31,20 @@ private:
     std::map<std::string, std::vector<StructurePoints>> read_;
 };
 
-/// Shared by `segment` and `reconstruct`, which differ only in the image.
+/// The commands `segment` and `reconstruct`, which differ only in the image.
 struct SegmentJob {
     std::vector<std::string> images;  ///< none: points only; several: the frames of a time-lapse
     ImageFlags image;
     PointFlags points;
     ContourFlags contours;
-    std::string structure_column;  ///< column with each mark's structure, in files of several; empty: files are of one
+    std::string structure_column;  ///< column with the structure of each mark; empty: a file has one structure
     std::shared_ptr<SharedMarks> shared = std::make_shared<SharedMarks>();
     PaintedFlags painted;
     SeedFlags seeds;
     GuessFlags guess;
     CloudFlags cloud;
     Given<SegmentOptions> given;
-    std::string start_path;  ///< of the file that the start is read from; empty: no file is needed
+    std::string start_path;  ///< file that the start is read from; empty: no file is needed
     std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside seeds of one structure among several
     MeshFlags mesh;
     EvidenceFlags evidence;
@@ -57,14 +58,14 @@ struct SegmentJob {
     VdbFlags vdb;
 
     void bind(CLI::App& command, bool with_image);
-    /// Calls run_timelapse() for time-lapses, otherwise run_structures(); run_plan() after `covol plan`, and
-    /// run_bricks() after `covol brick`.
+    /// Calls run_plan() after `covol plan`, run_bricks() after `covol brick`, run_timelapse() for time-lapses, and
+    /// otherwise run_structures().
     void run(Session& session) const;
 
-    // Used by these functions:
-    /// --exterior-seed, whose positions may belong to one structure.
+    // Used by run() and the functions that it calls:
+    /// Adds --exterior-seed, whose positions may be for one structure only.
     void bind_named_seeds(CLI::App& command);
-    /// Uses the study's image if the command line has none. @throws UsageError: there is none
+    /// Uses the study's image if the command line names no image. @throws UsageError if there is no study, either
     void find_image();
     /// Uses the study's options that the command line does not give.
     void take_study_options();
@@ -80,15 +81,16 @@ struct SegmentJob {
                                             const std::optional<ImageGeometry>& geometry, Session& session) const;
     /// Whether an output, or the processing of the surface, needs its relaxed mesh.
     [[nodiscard]] bool needs_mesh() const;
-    /// Detects options that are invalid for every h before any file is read.
+    /// Checks, before any file is read, for options that are invalid for every voxel size. @throws UsageError, Error
     void check_options() const;
-    /// The same for a job in bricks: it may have settings of a mesh that another of its commands writes.
+    /// Like check_options(), for a job in bricks: options of a mesh are accepted without a mesh, because another step
+    /// of the job may write it.
     void check_settings() const;
-    /// The given flags that had no effect; empty if all had one.
+    /// A warning that names the given flags that had no effect; empty if all had an effect.
     [[nodiscard]] std::string unused(const SegmentReport& report) const;
     /// Reads the image, and adds it to the report.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
-    /// Reports how much of the image was read, after the segmentation.
+    /// Adds to the report how much of the image was read; called after the segmentation.
     static void report_chunks(const Image& image, Session& session);
 };
 

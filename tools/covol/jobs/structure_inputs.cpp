@@ -16,15 +16,15 @@
 namespace covol::tool {
 namespace {
 
-/// The structure of a text NAME=...
+/// The structure with this name. @throws UsageError
 Marks& owner_of(std::vector<Marks>& structures, const std::string& flag, const std::string& name) {
     Marks* const found = find_structure(structures, name);
     if (found == nullptr) throw UsageError(flag + ": no structure is called '" + name + "'");
     return *found;
 }
 
-/// What names the structures of a file's marks: a given column, or the ROIs of a DICOM structure set that was given
-/// without a name; empty if all marks belong to one structure.
+/// The column that names the structure of each mark in a file: the given one, or "roi" for a DICOM structure set that
+/// was given without NAME=; empty if all marks of the file belong to one structure.
 std::string column_of(const SegmentJob& job, const std::string& text) {
     if (!job.structure_column.empty()) return job.structure_column;
     const bool names_itself = !job.images.empty() && split_name(text).name.empty() && long_ending(text) == ".dcm";
@@ -33,7 +33,7 @@ std::string column_of(const SegmentJob& job, const std::string& text) {
 
 using TakePoints = std::function<void(Marks& owner, const std::string& file, const KindedPoints& points)>;
 
-/// Files whose marks name their structures: passes on the marks of each structure.
+/// For files whose marks name their structures, calls `take` with the marks of each structure.
 void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
                   const TakePoints& take) {
     for (const std::string& text : texts) {
@@ -46,7 +46,7 @@ void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, 
     }
 }
 
-/// Adds the structures of files: those that name their structures, and those with marks of one structure.
+/// Adds the structures of all files. Files with marks of one structure are added to its list of files.
 void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std::vector<Marks>& structures,
                std::vector<std::string> MarkFiles::*kind) {
     for (const std::string& text : texts) {
@@ -90,13 +90,13 @@ void assign_seeds(std::vector<Marks>& structures, const std::string& flag, const
     }
 }
 
-/// Marks in voxels may be inside the image by chance if they are read as lengths; this is detected by the image's
-/// edges.
+/// Warns if marks that were read as lengths are probably in voxels. They may be inside the image by chance, but the
+/// edges of the image at the marks are stronger if they are read as voxels.
 void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const ReadPointsOptions& reading,
                     const RunContext& run) {
     if (!image || reading.space != PointSpace::Unstated || marks.points.empty()) return;
     const bool in_lengths = std::all_of(marks.rules.begin(), marks.rules.end(), [](const std::string& rule) {
-        return rule.ends_with("x, y, z in world units");  // and the file states no unit
+        return rule.ends_with("x, y, z in world units");  // the rule if the file states no unit
     });
     if (!in_lengths) return;
     const std::optional<double> ratio = edges_if_voxels(marks.points, *image);

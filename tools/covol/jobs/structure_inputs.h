@@ -17,13 +17,13 @@ namespace covol::tool {
 [[nodiscard]] std::vector<Marks> structures_of(const SegmentJob& job,
                                                const std::vector<std::shared_ptr<const PaintedImage>>& painted = {});
 
-/// Whether the marks of some file name their structures: --structure-column, and DICOM structure sets.
+/// Whether the marks of any file name their structures, with --structure-column or in a DICOM structure set.
 [[nodiscard]] bool names_structures(const SegmentJob& job);
 
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<Marks>& structures);
 
-/// Reads the file of --init; with several structures each gets its own grid of a .vdb.
-/// @throws UsageError if several structures have one shape; Error.
+/// Reads the start of --init from its file. With several structures, each gets its own grid of a .vdb.
+/// @throws UsageError if several structures would start from one shape; Error.
 void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const RunContext& run);
 
 /// Reads the structures' files, and chooses their common voxel size.
@@ -32,7 +32,7 @@ void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const Run
                                                 const std::optional<Image>& image, Session& session,
                                                 const RunContext& run);
 
-/// The inputs of segment() and reconstruct() for the only structure.
+/// The inputs of segment() or reconstruct() for a single structure.
 [[nodiscard]] StructureInput prepare_structure(const SegmentJob& job, std::vector<Marks> structures,
                                                const std::optional<Image>& image, Session& session,
                                                const RunContext& run);

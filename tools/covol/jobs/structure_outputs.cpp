@@ -32,7 +32,7 @@ FloatGridPtr named(FloatGridPtr grid, const std::string& name) {
     return grid;
 }
 
-/// u, distance and edge of each structure; with several structures named "u_ve" and so on.
+/// The grids "u", "distance" and "edge" of each structure; with several structures, named "u_ve" and so on for "ve".
 std::vector<FloatGridPtr> fields_of(const StructuresOutput& output) {
     std::vector<FloatGridPtr> grids;
     for (const StructureOutput& s : output.structures) {
@@ -96,7 +96,7 @@ std::vector<NamedLabel> label_names(const StructuresOutput& output) {
     return labels;
 }
 
-/// A given mask with corrections: its own values, stored as bytes if they fit.
+/// A given mask that was corrected by marks. It keeps its values, which are stored as bytes if they fit.
 class CorrectedLabels : public PixelSource {
 public:
     CorrectedLabels(std::shared_ptr<const StructuresOutput> output, bool has_names)
@@ -142,7 +142,7 @@ private:
                 for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = static_cast<T>(row[i]);
             }
     }
-    /// The extent of the structure's own voxels.
+    /// The box of the voxels with the label of the structure.
     [[nodiscard]] VoxelBox extent() const {
         const Index3 size = geometry().size;
         VoxelBox box{size, {-1, -1, -1}};
@@ -191,7 +191,7 @@ void hand_over_contours(const std::shared_ptr<const StructuresOutput>& output, c
     });
 }
 
-/// The subject of the run: the image's name, or the output's.
+/// The title of the page: the file name of the image, or of the output if there is no image.
 std::string title_of(const SegmentJob& job) {
     const std::filesystem::path path(job.images.empty() ? job.output : job.images.front());
     return (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -205,7 +205,7 @@ Json input_of(const StructureOutput& s) {
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
         json["contours"] = {{"paths", s.files.contours}, {"rules", s.contour_rules}};
-        if (const auto& contours = s.result.report.resolved.contours)  // otherwise a network: its lines are marks
+        if (const auto& contours = s.result.report.resolved.contours)  // nullopt: a network, whose lines are marks
             json["contours"].update({{"closed", contours->closed},
                                      {"open", contours->open},
                                      {"slices", contours->slices},
@@ -270,7 +270,7 @@ std::string density_name(const StructuresOutput& output, const StructureOutput& 
 
 void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs) {
-    // Without --mask it has no effect and is no error: covol rerun repeats the settings of a run without its outputs.
+    // --mask-label without --mask is accepted, because covol rerun repeats the settings of a run without its outputs.
     if (job.mask_label && structures.size() != 1)
         throw UsageError("--mask-label: expected one structure, got " + std::to_string(structures.size()) +
                          ", which are numbered 1, 2, ...");

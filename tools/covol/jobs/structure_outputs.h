@@ -20,7 +20,7 @@ namespace covol::tool {
 struct StructureOutput : StructureResult {
     std::optional<Evidence> evidence;
     std::optional<IntensityStatistics> intensity;  ///< inside the surface
-    std::optional<CorrectedMask> corrected;        ///< for a guess that is a mask in the image's geometry
+    std::optional<CorrectedMask> corrected;        ///< if the guess is a mask with the geometry of the image
     [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
 };
 
@@ -28,9 +28,9 @@ struct StructureOutput : StructureResult {
 struct StructuresOutput {
     ImageGeometry geometry;
     std::string image_path;      ///< empty: without an image
-    std::optional<int> frame;    ///< of that file, if one was chosen
-    std::optional<Image> image;  ///< for the report page
-    bool is_anatomical = false;  ///< of that image
+    std::optional<int> frame;    ///< time point in the file of the image, if one was chosen
+    std::optional<Image> image;  ///< only if a report page is written
+    bool is_anatomical = false;  ///< see is_anatomical()
     std::vector<StructureOutput> structures;
     std::vector<StructureOverlap> overlaps;
     [[nodiscard]] std::vector<std::string> names() const;
@@ -40,28 +40,29 @@ struct StructuresOutput {
 /// The structures' surfaces.
 [[nodiscard]] std::vector<Structure> solids(const StructuresOutput& output);
 
-/// --density and -o have the same name: one file contains both kinds of grids.
+/// Whether --density and -o name the same file, which then contains both kinds of grids.
 [[nodiscard]] bool is_density_in_output(const SegmentJob& job);
 [[nodiscard]] std::string density_name(const StructuresOutput& output, const StructureOutput& structure);
 
-/// Takes each requested output with its tagged name.
+/// Called with the tagged name of each requested output, and the function that writes it.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
 void queue_outputs(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                    Session& session, const Sink& sink);
-/// Checks these names. @throws Error as Outputs::check().
+/// Checks the names of the outputs. @throws Error as for Outputs::check().
 void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs);
 
-/// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.
+/// {"structures": [...], "overlaps": [...]}, or the fields of a single structure without a name.
 [[nodiscard]] Json to_json(const StructuresOutput& output);
 
-/// The table's columns for the result of a structure, and their values.
+/// The columns of the table of results; add_result() adds the values of a structure.
 /// @param unit  of lengths, appended to column names in brackets: "volume (mm^3)"; empty: not known
 [[nodiscard]] std::vector<std::string> result_columns(const std::string& unit);
 void add_result(Table& table, const std::string& name, int label, const SegmentResult& result,
                 const std::optional<IntensityStatistics>& intensity, const RunContext& run);
 
-/// For an image in chunks, nullopt if more than `max_read` voxels would have to be read.
+/// Statistics of the image inside the surface. Nullopt if more than `max_read` voxels of an image in chunks would have
+/// to be read.
 [[nodiscard]] std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface,
                                                                   double max_read, const RunContext& run);
 

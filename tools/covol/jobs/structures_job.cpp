@@ -16,9 +16,9 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // structures; more are listed in a table
+constexpr std::size_t kMaxInLines = 4;  // maximum number of structures that are printed as lines, not as a table
 
-/// Compares lattices up to rounding in files.
+/// Whether the lattices are equal up to the rounding of file formats.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
     const double slack = 1e-3 * b.smallest_spacing();
@@ -39,7 +39,7 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
     session.add_seconds("surface", seconds.surface);
 }
 
-/// Writes the state of a failed run to --keep-failed at once, independently of other outputs.
+/// Writes the state of a failed run to the file of --keep-failed immediately, although other outputs are not written.
 void keep_failed(const SegmentJob& job, const StructureFacts& s, const SegmentFailed& failed, Session& session) {
     const std::string path = s.name.empty() ? job.failed_path : with_suffix(job.failed_path, "_" + s.grid);
     std::vector<FloatGridPtr> grids;
@@ -123,8 +123,8 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
             s.label = *job.mask_label;
         session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
-        // For an image in chunks, only the parts near marks and surface have been read; the interior is not read for
-        // this.
+        // 0: for an image in chunks, no voxels are read for the statistics; the segmentation has read only those near
+        // marks and surface.
         if (image) s.intensity = intensity_within(*image, *s.result.surface, 0, run);
         if (image && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
     }

@@ -107,8 +107,8 @@ private:
         job_.check_options();
     }
 
-    /// The structures with this frame's marks: from a file for each frame if the name contains {frame}; other files are
-    /// used for the first frame only.
+    /// The structures with the files of marks of this frame. A name with {frame} stands for one file for each frame;
+    /// other files are used for the first frame only.
     [[nodiscard]] std::vector<Marks> marks_at(const Frame& frame) const {
         std::vector<Marks> structures = structures_;
         for (Marks& marks : structures) {
@@ -197,7 +197,7 @@ private:
     Json reports_ = Json::array();
     UsdScene scene_;
     Table rows_;
-    std::string unit_;  ///< of the frames
+    std::string unit_;  ///< unit of length of the frames
     int failed_ = 0;
     Errc first_error_ = Errc::InvalidInput;
     std::string first_message_;

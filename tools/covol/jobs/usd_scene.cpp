@@ -13,17 +13,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One frame of the image is one frame of the animation; USD players scale this by framesPerSecond only.
+/// Frame rate of the animation. Each frame of the image is one frame of the animation.
 constexpr int kFramesPerSecond = 24;
 
-/// An asset path in @@@...@@@, in which a single @ needs no escape.
+/// The path of a file relative to `folder` as an asset path: @@@...@@@, in which a single @ needs no escape.
 std::string asset(const std::string& file, const fs::path& folder) {
     const fs::path near = fs::absolute(file).lexically_normal().lexically_relative(folder);
     const std::string name = near.empty() ? fs::absolute(file).string() : near.generic_string();
     return "@@@" + std::string(name.starts_with("..") || name.starts_with("/") ? "" : "./") + name + "@@@";
 }
 
-/// The content of a quoted string.
+/// The text for use in a quoted string: quotes and backslashes become '_'.
 std::string in_quotes(const std::string& text) {
     std::string safe = safe_text(text);
     std::replace_if(
@@ -31,7 +31,7 @@ std::string in_quotes(const std::string& text) {
     return safe;
 }
 
-/// A valid name for a prim.
+/// A valid name of a prim: invalid characters become '_'.
 std::string identifier(const std::string& text) {
     std::string name = text;
     std::replace_if(
@@ -106,7 +106,7 @@ void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session)
     if (job.scene_path.empty() || scene.fields.empty()) return;
     const std::map<std::string, std::string> facts = session.provenance().metadata();
     const auto unit = facts.find("covol_unit");
-    // The final path of the scene, not the temporary one: files are referenced relative to it.
+    // The text is made for the final path of the scene, not for the temporary one: references are relative to it.
     session.outputs().add(job.scene_path,
                           [text = to_usda(scene, job.scene_path, unit == facts.end() ? "" : unit->second),
                            &session](const std::string& path) { write_text(path, text, session.run()); });

@@ -11,7 +11,7 @@ namespace covol::tool {
 /// A grid of the scene, and the file that contains it, for each frame.
 struct UsdField {
     bool is_fog = false;
-    std::map<int, std::string> files;  ///< paths as given by the user; for a single image one, at frame 0
+    std::map<int, std::string> files;  ///< paths as given by the user, by frame; a single image has frame 0
 };
 
 struct UsdScene {
@@ -22,13 +22,13 @@ struct UsdScene {
 /// Adds the .vdb files of one image, whose names are made by `tagged`.
 void add_to_scene(UsdScene& scene, const SegmentJob& job, const StructuresOutput& output, const NameTag& tagged);
 
-/// The text; files are referenced relative to the folder of `path`. @param unit  of length; unknown units count as
-/// metres
+/// The text of the scene, which refers to files relative to the folder of `path`.
+/// @param unit  unit of length; unknown units are taken for metres
 [[nodiscard]] std::string to_usda(const UsdScene& scene, const std::string& path, const std::string& unit);
 
 /// @throws UsageError if --usda is given without a .vdb output that it could refer to; Error as Outputs::check().
 void check_scene(const SegmentJob& job, Outputs& outputs);
-/// Queues it if it was requested.
+/// Queues the scene for writing if it was requested and has fields.
 void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session);
 
 }  // namespace covol::tool

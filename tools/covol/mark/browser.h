@@ -7,8 +7,8 @@ namespace covol::tool {
 /// The program in PATH that opens links, xdg-open or open; empty if there is none.
 [[nodiscard]] std::string find_opener();
 
-/// Opens a link in the user's browser. The link is a secret, which other users of the machine could read from a command
-/// line: therefore the browser gets a file that redirects to it and that only this user can read.
+/// Opens a link in the user's browser. The link is a secret, and other users of the machine can read command lines.
+/// Therefore the browser opens a file that redirects to the link, and that only this user can read.
 class BrowserLink {
 public:
     /// @throws Error Io: the file cannot be created
@@ -16,7 +16,7 @@ public:
     ~BrowserLink();  ///< removes the file
     BrowserLink(const BrowserLink&) = delete;
     BrowserLink& operator=(const BrowserLink&) = delete;
-    /// False if there is no program that opens links, or if it failed.
+    /// @return false if there is no program that opens links, or if it failed
     [[nodiscard]] bool open() const;
 
 private:

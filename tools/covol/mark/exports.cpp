@@ -20,7 +20,7 @@
 namespace covol::tool {
 namespace {
 
-/// A valid file name, for any name of a structure.
+/// A valid file name, made from the name of a structure.
 std::string file_name(const std::string& name, const std::string& ending) {
     std::string safe;
     for (const char c : name) safe += (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-') ? c : '_';

@@ -23,7 +23,7 @@ constexpr std::array kMarksEndings{".csv", ".tsv", ".txt",  ".xyz",  ".pts",  ".
                                    ".roi", ".zip", ".json", ".fcsv", ".annot"};
 constexpr std::array kGuessEndings{".nii",  ".nii.gz", ".nrrd", ".seg.nrrd", ".mha", ".tif",
                                    ".tiff", ".vdb",    ".stl",  ".ply",      ".obj", ".off"};
-constexpr const char* kFolder = "files";  // of the study
+constexpr const char* kFolder = "files";  // name of the folder of imported files, in that of the study
 constexpr std::uintmax_t kMaxFolderBytes = std::uintmax_t(4) << 30;
 constexpr std::size_t kMaxImported = 100'000;
 
@@ -44,7 +44,7 @@ std::uintmax_t bytes_in(const std::filesystem::path& folder) {
     return bytes;
 }
 
-/// nullopt if the line is on no slice of the image, or has too few corners.
+/// The outline for a line on a slice of the image; nullopt if the line is on no slice, or has too few corners.
 std::optional<StudyOutline> outline_of(const std::vector<Vec3>& world, const MarkLine& line,
                                        const ImageGeometry& image) {
     constexpr double kSlack = 0.01;  // voxels: rounding in text files
@@ -129,7 +129,7 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
     std::vector<bool> is_in_outline(world.size(), false);
     for (const MarkLine& line : cloud.lines) {
         std::optional<StudyOutline> outline = outline_of(world, line, image);
-        if (!outline) continue;  // its marks are added one by one
+        if (!outline) continue;  // its points are added as single marks
         action.outlines.push_back(*std::move(outline));
         std::fill(is_in_outline.begin() + std::ptrdiff_t(line.begin), is_in_outline.begin() + std::ptrdiff_t(line.end),
                   true);

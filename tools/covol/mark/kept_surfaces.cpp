@@ -19,12 +19,12 @@ namespace covol::tool {
 namespace {
 
 constexpr int kVersion = 1;
-constexpr const char* kSurfaces = "surfaces";  // of the study
+constexpr const char* kSurfaces = "surfaces";  // name of the folder of surfaces, in that of the study
 constexpr std::size_t kMaxHeadBytes = std::size_t(1) << 20;
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t(1) << 30;
 static_assert(std::endian::native == std::endian::little);
 
-/// The parts of a structure and of the options that its surface depends on; not names, colours and locks.
+/// Digest of everything that the surface of a structure depends on; it does not include names, colours and locks.
 std::string made_from(const StudyStructure& structure, const StudyOptions& options, const std::string& of) {
     Json json{{"of", of}, {"marks", Json::array()}, {"outlines", Json::array()}, {"strokes", Json::array()}};
     for (const StudyMark& m : structure.marks) json["marks"].push_back({int(m.kind), m.world});
@@ -38,7 +38,7 @@ std::string made_from(const StudyStructure& structure, const StudyOptions& optio
 
 bool is_finite(const Json& json) { return json.is_number() && std::isfinite(json.get<double>()); }
 
-/// The figures of a file; throws if they are invalid.
+/// The validated KeptSurfaces::Kept::figures of a file. @throws Error InvalidInput
 Json checked_figures(const Json& from) {
     const auto require = [](bool is_good) {
         if (!is_good) throw Error(Errc::InvalidInput, "kept surface: damaged");

@@ -9,11 +9,11 @@
 
 namespace covol::tool {
 
-/// Surfaces of a study that are stored in its folder: when the study is opened again they are shown until they have
-/// been recomputed.
+/// Surfaces of a study that are stored in its folder. When the study is opened again, they are displayed until new
+/// surfaces have been computed.
 class KeptSurfaces {
 public:
-    /// @param of  identifies what else they were computed from: the image, and the program
+    /// @param of  identifies the image and the version of the program, which surfaces also depend on
     KeptSurfaces(const std::string& folder, std::string of);
 
     struct Kept {
@@ -21,9 +21,9 @@ public:
             figures;  ///< of a message `result`: triangles, volume, area, extent, mean, sd, expected, warnings, seconds
         std::shared_ptr<const TriangleMesh> mesh;
     };
-    /// nullopt if no surface of exactly this input is stored. The file may come from an untrusted source.
+    /// The stored surface for exactly this structure and options, or nullopt. Its file may be from an untrusted source.
     [[nodiscard]] std::optional<Kept> find(const StudyStructure& structure, const StudyOptions& options) const;
-    /// If the folder is not writable nothing is stored, and the surface is recomputed later.
+    /// Stores a surface. If the folder is not writable, nothing is stored, and the surface is recomputed next time.
     void keep(const StudyStructure& structure, const StudyOptions& options, const Json& result,
               const TriangleMesh& mesh) const;
 

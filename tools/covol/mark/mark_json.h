@@ -11,15 +11,15 @@
 // Messages to pages as JSON; they are documented in docs/mark_protocol.md.
 namespace covol::tool {
 
-/// `stage` of a result, as text.
+/// The value of the field `stage` in a message about a result.
 [[nodiscard]] const char* stage_name(StudyResult::Stage stage);
-/// On one line; invalid UTF-8 is replaced.
+/// The JSON as text on one line; invalid UTF-8 is replaced.
 [[nodiscard]] std::string text_of(const Json& json);
-/// @param version  of the surface that pages are shown @param intensity  nullopt: not known
+/// @param version  of the surface that pages display @param intensity  inside the surface; nullopt: not known
 [[nodiscard]] Json result_json(const StudyResult& result, std::uint64_t version,
                                const std::optional<IntensityStatistics>& intensity);
 [[nodiscard]] Json options_json(const StudyOptions& options);
-/// @param result  the last one of the structure, or null
+/// @param result  the last result of the structure, or null
 [[nodiscard]] Json structure_json(const StudyStructure& structure, const Json& result);
 
 }  // namespace covol::tool

@@ -20,7 +20,7 @@ namespace covol::tool {
 namespace {
 
 constexpr int kSuggestions = 5;
-constexpr std::uint64_t kKeptVersion = 1;     // of kept surfaces from an earlier session; later versions are larger
+constexpr std::uint64_t kKeptVersion = 1;     // version of kept surfaces; new surfaces have larger ones
 constexpr double kMaxRead = double(1 << 27);  // voxels of an image in chunks that are read for a mean intensity
 
 serve::Response refused(int status, const std::string& why) {
@@ -30,8 +30,8 @@ serve::Response refused(int status, const std::string& why) {
     return response;
 }
 
-/// For surfaces that are fully supported by marks and edges: the positions on them that are farthest from marks, and
-/// from each other.
+/// Positions on a surface that are far from the marks and from each other. They are suggested if assess_evidence()
+/// suggests none, because the surface is fully supported, or if only a kept mesh is available.
 std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMesh& mesh, int count) {
     std::vector<Vec3> places;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) places.push_back(mesh.place(v));
@@ -93,7 +93,7 @@ bool MarkSession::show_kept(const std::shared_ptr<const StudyStructure>& structu
     solved.version = kKeptVersion;
     solved.kept = std::move(kept->mesh);
     solved.reported = std::move(kept->figures);
-    // Reported as the first stage only: the image may differ in parts that its digest does not cover.
+    // Reported as a first result, not as a refined one: the image may differ in parts that its digest does not cover.
     solved.reported.update({{"structure", structure->id},
                             {"version", solved.version},
                             {"seq", solved.requested},
@@ -104,7 +104,7 @@ bool MarkSession::show_kept(const std::shared_ptr<const StudyStructure>& structu
     return true;
 }
 
-/// Starts the solver for structures with changed marks. @pre locked
+/// Starts the solver for each structure whose marks have changed. @pre `mutex_` is locked
 void MarkSession::follow(const std::vector<StudyId>& structures) {
     for (const StudyId id : structures) {
         const auto structure = study_.history().find(id);
@@ -122,12 +122,12 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
     }
 }
 
-/// Called on the solver's thread.
+/// Handles a result of the solver; called on its thread.
 void MarkSession::receive(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
     Json reported;
-    std::shared_ptr<const StudyStructure> from;  // to be kept
+    std::shared_ptr<const StudyStructure> from;  // if not null, its surface is stored by KeptSurfaces
     StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
         intensity = intensity_within(image_(), *result.surface->surface, kMaxRead, run_);
@@ -142,7 +142,7 @@ void MarkSession::receive(const StudyResult& result) {
             solved.version = 0;
         }
         if (result.surface) {
-            // Pages that already have the same mesh do not request it again.
+            // The version of an unchanged mesh stays the same, so that pages do not request it again.
             const bool is_same = solved.kept && is_same_mesh(*solved.kept, result.surface->mesh);
             if (!is_same) {
                 solved.kept = nullptr;
@@ -194,7 +194,7 @@ void MarkSession::message(serve::Client client, std::string_view text) {
     try {
         act(client, text);
     } catch (const Error& error) {
-        // Without a key, the page cannot assign the answer to an action.
+        // The answer contains the key of the action, if it has one, so that the page can assign it.
         const Json sent = Json::parse(text, nullptr, false);
         constexpr std::string_view kSource = "study: ";  // a prefix that is redundant on the page
         std::string_view why = error.what();
@@ -232,7 +232,7 @@ void MarkSession::publish(const StudyHistory::Changed& changed) {
     if (changed.options) {
         solver_->set_options(options());
         for (auto& [id, solved] : solved_) {
-            solved.from = nullptr;  // its surface depends on the options
+            solved.from = nullptr;  // so that it is solved again, with the new options
             structures.push_back(id);
         }
     }

@@ -19,17 +19,17 @@
 
 namespace covol::tool {
 
-/// Without log and progress: messages about results are shown on the page, and those about the image were printed when
-/// it was read.
+/// The context without log and progress: the page shows messages about results, and messages about the image were
+/// printed when it was read.
 [[nodiscard]] RunContext quiet(RunContext run);
 
 /// Settings of the page for a study.
 struct MarkView {
     std::string page;        ///< HTML
     std::string title;       ///< the image's name
-    SegmentOptions options;  ///< of every structure, unless the study has its own
+    SegmentOptions options;  ///< options of every structure; those of the study take precedence
     StudySite site;
-    std::string image_digest;  ///< digest_of() the file and the options it is read with: identifies kept surfaces
+    std::string image_digest;  ///< identifies the file and the options it is read with, for kept surfaces
 };
 
 /// One study on the page of `covol mark`: answers requests of the page, and sends it all changes. The messages are
@@ -44,7 +44,7 @@ public:
     MarkSession(Study study, std::unique_ptr<PageImage> seen, std::function<Image()> image, MarkView view,
                 const RunContext& run);
 
-    /// From here on all changes are sent; the existing structures of the study are solved. Called once.
+    /// Sends all changes from now on, and solves the existing structures of the study. To be called once.
     void start(Send send, Broadcast broadcast);
 
     [[nodiscard]] serve::Response get(const serve::Request& request);
@@ -58,12 +58,12 @@ public:
 
 private:
     struct Solved {
-        std::shared_ptr<const StudyStructure> from;  ///< with these marks
-        std::uint64_t requested = 0;                 ///< sequence number of the study when this was requested
+        std::shared_ptr<const StudyStructure> from;  ///< state of the structure that was solved; null: none
+        std::uint64_t requested = 0;                 ///< sequence number of the study at the last request to the solver
         Json reported;                               ///< the last result, as sent to pages; null: none
         std::uint64_t version = 0;
-        std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none, or it was kept
-        std::shared_ptr<const TriangleMesh> kept;      ///< of that version, from an earlier session
+        std::shared_ptr<const SegmentResult> surface;  ///< surface of that version; null: none, or `kept`
+        std::shared_ptr<const TriangleMesh> kept;      ///< mesh of that version from an earlier session, or null
         bool is_refined = false;
         std::optional<IntensityStatistics> intensity;  ///< of the last refined surface
     };
@@ -72,13 +72,13 @@ private:
     void act(serve::Client client, std::string_view text);
     void suggest(serve::Client client, StudyId structure);
     void follow(const std::vector<StudyId>& structures);
-    /// Applies an action, and sends the change to all pages. @pre locked
+    /// Applies an action, and sends the change to all pages. @pre `mutex_` is locked
     Study::Applied apply(const KeyedAction& action);
     void publish(const StudyHistory::Changed& changed);
     [[nodiscard]] SegmentOptions options() const { return study_.history().options().applied_to(view_.options); }
-    /// The surface that is displayed. @pre locked
+    /// The mesh that is displayed. @pre `mutex_` is locked
     [[nodiscard]] static std::shared_ptr<const TriangleMesh> mesh_of(const Solved& solved);
-    /// Displays the kept surface. @return whether there is one @pre locked
+    /// Displays the kept surface of a structure. @return whether there is one @pre `mutex_` is locked
     bool show_kept(const std::shared_ptr<const StudyStructure>& structure);
     [[nodiscard]] Json to_json(const StudyStructure& structure) const;
     [[nodiscard]] Json standing() const;

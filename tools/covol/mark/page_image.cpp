@@ -13,7 +13,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kBlack = 0.002, kWhite = 0.998;  // quantiles that are shown black and white
+constexpr double kBlack = 0.002, kWhite = 0.998;  // quantiles of the values that are displayed as black and as white
 
 serve::Response answer_of(PageSlice coded) {
     serve::Response response;
@@ -42,7 +42,7 @@ PageImage::Channel PageImage::made_of(ImageLevels levels) const {
     if (!(channel.range[1] > channel.range[0])) channel.range[1] = channel.range[0] + 1;
     channel.window = channel.levels.percentiles(kBlack, kWhite, run_);
     if (!(channel.window[1] > channel.window[0])) channel.window = channel.range;
-    // For an image in chunks, both are estimates from some of the chunks.
+    // Range and window of an image in chunks are estimated from some chunks, so the window may exceed the range.
     channel.range = {std::min(channel.range[0], channel.window[0]), std::max(channel.range[1], channel.window[1])};
     return channel;
 }
@@ -54,7 +54,7 @@ const PageImage::Channel& PageImage::channel_of(const serve::Request& request) c
         throw Error(Errc::InvalidInput,
                     "'channel': expected one of the image's " + std::to_string(channels_.names.size()) + ", from 0");
     if (number == channels_.own) return own_;
-    const std::lock_guard lock(mutex_);  // each channel is opened once
+    const std::lock_guard lock(mutex_);  // so that each channel is opened only once
     const auto found = others_.find(int(number));
     if (found != others_.end()) return found->second;
     return others_.emplace(int(number), made_of(channels_.open(int(number)))).first->second;
@@ -104,7 +104,7 @@ serve::Response PageImage::slice(const serve::Request& request) const {
     if (request.query.contains("width"))
         wanted.part = SliceRequest::Part{small("x"), small("y"), small("width"), small("height")};
     RunContext run = run_;
-    run.cancel = request.gone.get();  // set when the page has moved on to another slice
+    run.cancel = request.gone.get();  // set when the page closes the connection, because it needs another slice
     return answer_of(make_page_slice(channel.levels, wanted, channel.range, run));
 }
 

@@ -14,11 +14,11 @@
 
 namespace covol::tool {
 
-/// The channels of an image with several: one is marked, the others are displayed with it.
+/// The channels of an image. One channel is marked; the others are only displayed.
 struct PageChannels {
-    std::vector<std::string> names;        ///< of all; empty: the image has one channel
-    int own = 0;                           ///< the marked one
-    std::function<ImageLevels(int)> open;  ///< opens another one, on the same lattice
+    std::vector<std::string> names;        ///< names of all channels; empty: the image has one channel
+    int own = 0;                           ///< number of the marked channel
+    std::function<ImageLevels(int)> open;  ///< opens another channel, which has the same lattice
 };
 
 /// An image as displayed by a page. Its functions may be called from any thread.
@@ -37,7 +37,7 @@ public:
 private:
     struct Channel {
         ImageLevels levels;
-        std::array<double, 2> range{0, 1}, window{0, 1};  // of brightness: for encoding, and shown initially
+        std::array<double, 2> range{0, 1}, window{0, 1};  // values: for encoding, and from black to white at first
     };
     [[nodiscard]] Channel made_of(ImageLevels levels) const;
     [[nodiscard]] const Channel& channel_of(const serve::Request& request) const;

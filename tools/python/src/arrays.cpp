@@ -15,7 +15,7 @@ std::string text_of(const py::handle& value) { return py::cast<std::string>(py::
     throw Error(Errc::InvalidInput, name + ": expected " + expected + ", got " + got, name);
 }
 
-/// Doubles in rows, converted from any numbers.
+/// Converts an array of any numbers to a contiguous array of doubles in row-major order.
 py::array_t<double> to_doubles(const char* name, const std::string& expected, const py::handle& value) {
     auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
     if (!array) {
@@ -35,7 +35,7 @@ constexpr struct {
               {'i', 2, PixelType::Int16}, {'u', 4, PixelType::UInt32}, {'i', 4, PixelType::Int32},
               {'f', 4, PixelType::Float}, {'f', 8, PixelType::Double}};
 
-/// The same values with a number type that covol supports; the array itself if its type is supported.
+/// The array, converted to a number type that covol supports if necessary.
 py::array known_numbers(py::array array) {
     const char kind = array.dtype().kind();
     const auto bytes = array.dtype().itemsize();
@@ -65,7 +65,7 @@ bool is_whole(const py::array& array) {
     return py::cast<bool>(array.attr("flags").attr("aligned"));
 }
 
-/// Keeps a reference to an array, which may be released on any thread.
+/// A pointer to `first` that keeps a reference to the array. It may be released on any thread.
 std::shared_ptr<const void> keep(const void* first, py::array array) {
     const auto owner = new py::array(std::move(array));
     return {first, [owner](const void*) {

@@ -39,7 +39,7 @@ public:
         closed_ = true;
         wake_.notify_one();
     }
-    /// Gets all events so far, after a timeout at the latest; false: there will be no more.
+    /// Waits for events, at most kSignalInterval, and gets all events so far. @return false if no more will follow
     bool wait(std::vector<Event>& events) {
         std::unique_lock lock(mutex_);
         wake_.wait_for(lock, kSignalInterval, [&] { return closed_ || !events_.empty(); });
@@ -82,7 +82,7 @@ void Call::run(const std::function<void(const RunContext&)>& work) const {
             mailbox.put({false, level == LogLevel::Warning, 0, line});
         };
 
-    std::exception_ptr failed, raised;  // by the work; by Python callbacks
+    std::exception_ptr failed, raised;  // exceptions of the work, and of Python callbacks
     {
         const py::gil_scoped_release released;
         std::thread worker([&] {

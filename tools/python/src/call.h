@@ -10,7 +10,7 @@ namespace covol::python {
 
 namespace py = pybind11;
 
-/// How a function of the module is run: the arguments that all long functions have in common.
+/// The arguments that control how a function of the module runs; all functions that may take long have them.
 struct Call {
     py::object progress = py::none();  ///< called with (stage, fraction)
     py::object log = py::none();       ///< called with (is_warning, line)

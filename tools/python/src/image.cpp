@@ -58,7 +58,7 @@ ReadPointsOptions make_reading(const py::object& space, const py::object& order,
     return reading;
 }
 
-/// Positions in one array, or of several lines that are concatenated.
+/// Points from one array of positions, or from several lines, which are concatenated.
 PointCloud make_points(const std::string& name, const py::object& positions, const std::optional<py::list>& lines,
                        const py::object& space, const py::object& order, double scale, bool closed,
                        const py::object& normals) {
@@ -86,7 +86,7 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
     return cloud;
 }
 
-/// A mask, a level set, or the path of a mesh.
+/// The guess of the marks: a mask, a level set, or the path of a mesh.
 py::object guess_of(const Marks& marks, const std::string& path) {
     const Start start = marks.guess({}).start;
     if (const auto* mask = std::get_if<MaskStart>(&start)) return py::cast(*mask->mask);
@@ -94,7 +94,7 @@ py::object guess_of(const Marks& marks, const std::string& path) {
     return py::str(path);
 }
 
-/// The study's options as keywords of structures().
+/// The options of a study as keyword arguments of structures().
 py::dict options_of_study(const std::string& folder) {
     const StudyOptions options = read_study_options(folder);
     py::dict keywords;
@@ -105,12 +105,12 @@ py::dict options_of_study(const std::string& folder) {
     return keywords;
 }
 
-/// Each structure's marks as arguments of structures().
+/// The marks of each structure of a study, as arguments of structures().
 py::dict marks_of_study(const std::string& folder) {
     py::dict structures;
     const ImageGeometry image = read_study_image(folder).geometry;
     const StudyState state = read_study(folder);
-    std::map<std::string, std::string> guesses;  // by name
+    std::map<std::string, std::string> guesses;  // paths by the name of the structure
     for (const auto& structure : state)
         if (structure->guess)
             guesses[safe_text(structure->name)] =

@@ -52,7 +52,7 @@ py::tuple run_job(const char* function, const std::optional<Image>& image, const
     return py::make_tuple(made.structures, overlaps);
 }
 
-/// As written by the program, without paths.
+/// The report of a structure, with the fields that the program writes, but without paths.
 py::object report_of(const Result& r) {
     const SegmentReport& report = r.result.report;
     tool::Json json = tool::to_json(report);
@@ -70,7 +70,8 @@ const Image& image_of(const Result& r) {
     return *r.image;
 }
 
-/// The own values of a mask that marks corrected; otherwise 1 if a voxel's centre is inside.
+/// The mask of a result: the guess with its own values if it is a mask that was corrected; otherwise 1 at voxels whose
+/// centre is inside.
 py::array mask_of(const Result& r, const Call& call) {
     const Image& image = image_of(r);
     const Image* const guess = r.guess && r.guess->mask ? &*r.guess->mask : nullptr;
@@ -102,7 +103,7 @@ Mesh mesh_of(const std::shared_ptr<Result>& r) {
     return mesh;
 }
 
-/// (slice, (z, y, x), (x, y, z), area) for each slice on which marks would improve the result.
+/// (slice, index (z, y, x), world position (x, y, z), area) for each slice on which marks would improve the result.
 py::list suggest(const Result& r, int count, const Call& call) {
     kNotNegative.require("count", count);
     const Image& image = image_of(r);

@@ -24,7 +24,7 @@ const char* word_of(Errc code) {
     return "cancelled";
 }
 
-/// "tag_distance = 3", "points_order = 'zyx'"
+/// An option as in Python: "tag_distance = 3", "points_order = 'zyx'".
 std::string spell(const std::string& name, const std::string& value) {
     if (value.empty()) return name;
     const bool is_word =

@@ -26,9 +26,9 @@ class GivenOptions {
 public:
     /// @throws Error InvalidOptions, py::type_error for an unknown name.
     GivenOptions(const char* function, const py::dict& keywords);
-    /// "voxel_size", which may be relative to the automatic one.
+    /// The value of "voxel_size", which may be a multiple of the automatic one.
     [[nodiscard]] Length voxel_size() const { return given_.length("voxel_size"); }
-    /// The settings for voxels of edge h. If no voxel size was given, it may still be increased.
+    /// The settings for voxels of edge h, which may be increased later if no voxel size was given.
     [[nodiscard]] Settings resolve(double h, bool with_image) const;
 
 private:

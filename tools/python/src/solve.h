@@ -16,7 +16,7 @@ struct LevelSet {
     FloatGridPtr grid;
 };
 
-/// A start, or a guess that marks correct: a text as on the command line, a file, a level set or a mask.
+/// A start or a guess: a text as for --init on the command line, the path of a file, a level set, or a mask.
 using Shape = std::variant<std::monostate, std::string, LevelSet, Image>;
 
 /// The marks and other inputs of one structure.
@@ -25,7 +25,7 @@ struct GivenMarks {
     std::vector<PointCloud> points, contours, inside, outside;
     std::vector<Vec3> exterior_seeds;
     Shape init, guess;
-    std::optional<Image> painted = {};  ///< of this structure only
+    std::optional<Image> painted = {};  ///< painted image with only this structure
 };
 
 /// All inputs of a job except its options.

@@ -18,7 +18,7 @@
 namespace covol::python {
 namespace {
 
-/// In single precision and without a copy, unless single precision is not sufficient.
+/// The vertices: a view in single precision, or, if the mesh has an origin other than 0, a copy in double precision.
 py::array vertices_of(const Mesh& mesh) {
     const auto count = static_cast<py::ssize_t>(mesh.triangles->vertices.size());
     if (mesh.triangles->origin != Vec3{0, 0, 0}) {
@@ -67,7 +67,7 @@ void save_mesh(const Mesh& mesh, const std::filesystem::path& path, std::optiona
     write_mesh(path.string(), *mesh.triangles, options);
 }
 
-/// The same as `covol mesh`.
+/// The mesh of a level set, as `covol mesh` makes it.
 Mesh make_mesh(const LevelSet& surface, const py::object& isovalue, const py::object& min_component,
                const py::object& target_edge, const py::object& adaptive, int smooth, bool repair, const Call& call) {
     const double h = domain_of(*surface.grid).voxel_size;

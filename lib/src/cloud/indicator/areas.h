@@ -10,8 +10,8 @@
 
 namespace covol::cloud {
 
-/// Area of the surface around each point, world units squared, from the disc that reaches to its eighth neighbour. A
-/// density on a lattice would also count points of the opposite side of thin parts.
+/// Area of the surface that each point represents, world units squared, from the area of the disc whose radius is the
+/// distance to its eighth neighbour. A density on a lattice would also count points of the opposite side of thin parts.
 [[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<double> areas(points.size());

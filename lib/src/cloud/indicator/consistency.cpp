@@ -20,7 +20,7 @@ double squared_to(double value, double nearest) {
     return off * off;
 }
 
-/// Makes each normal parallel to the slope at its point without changing its side.
+/// Makes each normal parallel to the gradient slope(point) without changing its side.
 template <typename Slope>
 void take_directions(const std::vector<Vec3>& points, Slope slope, std::vector<Vec3>& normals) {
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
@@ -48,7 +48,7 @@ Consistency::Consistency(const std::vector<Vec3>& points, std::vector<double> ar
       cells_(points, reach),
       beside_(neighbours_of(cells_)) {}
 
-void Consistency::solve(const std::vector<Vec3>& normals) {  // each solution starts from the one before
+void Consistency::solve(const std::vector<Vec3>& normals) {  // the field's last solution is the initial value
     std::vector<Vec3> vectors(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(),
                       [&](std::size_t n) { vectors[n] = times(areas_[n], normals[n]); });
@@ -95,7 +95,8 @@ void Consistency::take_better(const std::vector<Vec3>& other, std::vector<Vec3>&
     };
     std::vector<Vec3> all = taken([](std::size_t) { return true; });
     std::vector<double> all_off = off(all);
-    // The gain of each patch, summed over its cells and the cells next to them.
+    // For each patch, the decrease of the deviation by the other orientation, summed over its cells and the cells next
+    // to them.
     std::vector<double> in_cell(cells_.cell_count()), gain(std::size_t(patches), 0.0);
     for_points_of(cells_, [&](std::size_t cell, std::uint32_t n) { in_cell[cell] += own_off[n] - all_off[n]; });
     for (std::size_t cell = 0; cell < patch.size(); ++cell) {
@@ -103,7 +104,7 @@ void Consistency::take_better(const std::vector<Vec3>& other, std::vector<Vec3>&
             gain[std::size_t(patch[cell])] += in_cell[cell];
             continue;
         }
-        std::vector<int> near;  // the patches that this cell borders, each once
+        std::vector<int> near;  // the patches next to this cell, without duplicates
         for (const std::uint32_t next : beside_[cell])
             if (patch[next] >= 0 && std::count(near.begin(), near.end(), patch[next]) == 0) near.push_back(patch[next]);
         for (const int other_patch : near) gain[std::size_t(other_patch)] += in_cell[cell];

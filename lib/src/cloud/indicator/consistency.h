@@ -17,20 +17,23 @@ namespace covol::cloud {
 /// points lie inside the solid, where the winding number is not 1/2.
 class Consistency {
 public:
-    /// @param points, areas  all of them, world units squared; points and run must outlive the object
-    /// @param cell   of the finest grid, world units: fine enough to separate walls that the points separate
+    /// @param points, areas  all points, and their areas in world units squared; points and run must outlive the object
+    /// @param cell   cell size of the finest grid, world units: small enough to separate walls that are separate in the
+    /// points
     /// @param reach  distance from a point beyond which its own effect on the indicator is negligible, world units
     Consistency(const std::vector<Vec3>& points, std::vector<double> areas, double cell, double reach,
                 const RunContext& run);
 
-    /// For each point the mean of three squared deviations, each at most 1/4: of the indicator of these normals from
-    /// 1/2 at the point, and from the nearer of 0 and 1 at the distance `reach` above and below it.
+    /// For each point, the mean of three squared deviations of the indicator of these normals, each at most 1/4: from
+    /// 1/2 at the point, and from the nearer of 0 and 1 at the two positions at the distance `reach` along the normal.
     /// @param normals  in/out: only their sides are used; their directions become those of the indicator, so that
     /// orientations found with different cells are compared by their sides alone
     /// @throws Error Cancelled
     [[nodiscard]] std::vector<double> off(std::vector<Vec3>& normals);
 
-    /// Adopts the sides of another orientation for each patch that becomes more consistent by it.
+    /// Adopts the normals of another orientation in those patches that become more consistent by it, if the sum of all
+    /// deviations decreases. A patch is a set of connected cells in which most normals of the two orientations are
+    /// opposite.
     /// @param own      normals; in/out
     /// @param own_off  off(own); in/out
     void take_better(const std::vector<Vec3>& other, std::vector<Vec3>& own, std::vector<double>& own_off);

@@ -6,18 +6,20 @@
 
 namespace covol {
 
-/// Principles that the steps of a cloud have in common.
+/// Constants that several steps of the reconstruction from clouds have in common.
 struct CloudHeuristics {
-    /// [spacings, noises or cells] Edge of coarse cells, in which about four points represent the surface without
-    /// holes; and the distance from which on something is not beside a point.
+    /// [spacings, noises or cells] Edge of coarse cells: about four points of a surface are in each, so that hardly any
+    /// cell that the surface crosses is empty. Also the distance beyond which a position is not next to a point.
     double coarse = heuristic("cloud.coarse", 2.0);
-    /// [ratio] Of the distance from the plane of a sheet to the distance along it, up to which points are on the sheet.
+    /// [ratio] Maximum ratio of the distances of points from a sheet to the radius of their neighbourhood, for points
+    /// of the sheet.
     double flat = heuristic("cloud.flat", 0.25);
-    /// [fraction of the points] That is explained by single points.
+    /// [fraction of the points] Fraction below which deviations are attributed to single points.
     double few = heuristic("cloud.few", 0.002);
-    /// [fraction of the points, or of the area] That is not explained by noise.
+    /// [fraction of the points, or of the area] Fraction above which deviations are not attributed to noise.
     double some = heuristic("cloud.some", 0.02);
-    /// [rounds] After sides of normals changed, until their directions agree with the indicator.
+    /// [rounds] Number of updates after normals were reversed, until their directions agree with the indicator again;
+    /// maximum number of rounds that reverse single normals or remove stray points.
     int settling = heuristic("cloud.settling", 3);
 };
 COVOL_HEURISTICS CloudHeuristics kCloud{};
@@ -26,36 +28,38 @@ COVOL_HEURISTICS CloudHeuristics kCloud{};
 struct IndicatorHeuristics {
     /// [longest sides] Margin of the lattice around the points.
     double beyond = heuristic("indicator.beyond", 0.2);
-    /// [cells] Minimum number along the longest side.
+    /// [cells] Minimum number of cells along the longest side.
     int min_cells = heuristic("indicator.min_cells", 48);
-    /// [spacings around a point] Maximum cell size there; sparser points use coarser grids.
+    /// [spacings around a point] Maximum cell size at a point, by which sparser points get coarser grids.
     double local_cells = heuristic("indicator.local_cells", 0.5);
-    /// [V-cycles] Of multigrid without an initial solution.
+    /// [V-cycles] Number of multigrid cycles for a solution without a close initial value.
     int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
 };
 COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
 
 /// Alternating updates of the normals and their indicator: iteration.cpp. The iteration follows Hou et al., Iterative
-/// Poisson surface reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022; the turning of patches is added here.
+/// Poisson surface reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022; the reversal of whole patches is added here.
 struct IterationHeuristics {
-    /// [indicator] Deviation of a patch's mean from 1/2 from which on turning the patch is tried.
+    /// [indicator] Deviation of a cell's mean indicator from 1/2 from which on the cell belongs to a patch whose
+    /// normals are reversed on trial.
     double patch_off = heuristic("iteration.patch_off", 0.12);
-    /// [V-cycles] Of multigrid after each turning of patches.
+    /// [V-cycles] Number of multigrid cycles in each update while patches are reversed.
     int patch_cycles = heuristic("iteration.patch_cycles", 2);
-    /// [1 - cosine] Mean change of the normals at which the iteration ends.
+    /// [1 - cosine] Mean change of the normals below which the iteration ends.
     double steady = heuristic("iteration.steady", 1e-4);
-    /// [V-cycles] Of multigrid in each iteration.
+    /// [V-cycles] Number of multigrid cycles in each iteration.
     int cycles = heuristic("iteration.cycles", 1);
-    /// [V-cycles] Of multigrid in the last iteration.
+    /// [V-cycles] Number of multigrid cycles in the last iteration.
     int last_cycles = heuristic("iteration.last_cycles", 4);
 };
 COVOL_HEURISTICS IterationHeuristics kIteration{};
 
 /// Repair of normals that are reversed or tangential to their sheet, for clouds without noise: torn.cpp.
 struct TornHeuristics {
-    /// [ratio] Of the smallest to the middle variance of the neighbours, above which they are not a sheet.
+    /// [ratio] Maximum ratio of the smallest to the middle variance of the neighbours' positions, for neighbours that
+    /// form a sheet.
     double flat = heuristic("torn.flat", 0.06);
-    /// [cosine] Minimum between the normals of sheets that continue each other.
+    /// [cosine] Minimum between the normals of the sheets at neighbouring points that are on one sheet.
     double same_sheet = heuristic("torn.same_sheet", 0.9);
 };
 COVOL_HEURISTICS TornHeuristics kTorn{};

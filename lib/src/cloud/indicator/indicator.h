@@ -7,15 +7,15 @@ namespace covol::cloud {
 
 /// The longest side of the box in which the indicator is computed.
 [[nodiscard]] double indicator_side(const std::vector<Vec3>& points);
-/// `cell`, or a smaller one if the longest side would have too few cells.
+/// `cell`, or a smaller cell size if the longest side would have too few cells.
 [[nodiscard]] double indicator_cell(const std::vector<Vec3>& points, double cell);
 /// Grids around the points with a margin wide enough for the indicator to be 0 at its end, coarser around sparse
-/// points. The cell is that of indicator_cell().
-/// @param areas  of the surface that each point represents; empty: the same for all
+/// points. The cell size is that of indicator_cell().
+/// @param areas  area of the surface that each point represents; empty: the finest grid is used around all points
 [[nodiscard]] std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points,
                                                               const std::vector<double>& areas, double cell);
 
-/// The same with exactly the given cell.
+/// The same with exactly the given cell size.
 [[nodiscard]] std::shared_ptr<const GridStack> grid_around(const std::vector<Vec3>& points,
                                                            const std::vector<double>& areas, double cell);
 
@@ -36,7 +36,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(StackField field);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
 
-/// The indicator of unchanged normals, computed with another cell size.
+/// The indicator of the orientation's normals and areas, computed with the given cell size.
 [[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points,
                                                             const Orientation& orientation, double cell,
                                                             const RunContext& run);

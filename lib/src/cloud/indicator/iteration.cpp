@@ -17,7 +17,7 @@
 namespace covol::cloud {
 namespace {
 
-/// The mean of the indicator over each cell's points, minus 1/2.
+/// For each cell, the mean of the indicator over its points, minus 1/2.
 std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     std::vector<double> off(cells.cell_count());
     tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
@@ -29,8 +29,8 @@ std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
     return off;
 }
 
-/// For each patch, the sign of the deviation of its mean indicator from 1/2; 0 if the deviation is too small for the
-/// normals of the patch to be turned.
+/// For each cell, the sign of the deviation of its mean indicator from 1/2; 0 if the deviation is too small for the
+/// cell to belong to a patch.
 std::vector<int> sides_of(const std::vector<double>& off) {
     std::vector<int> side;
     for (const double x : off) side.push_back(std::abs(x) < kIteration.patch_off ? 0 : x < 0 ? -1 : 1);
@@ -72,14 +72,14 @@ void Iteration::estimate_normals(double cell, Orientation& result) const {
     });
 }
 
-/// Computes the indicator of the normals.
+/// Computes the indicator of the normals and scales the areas accordingly.
 void Iteration::solve(WindingField& field, Orientation& result, int cycles) {
     cloud::solve(field, points_, result, cycles, run_);
     const double half = scale_to_half(field, points_);
     for (double& area : result.areas) area *= half;
 }
 
-/// @return the normals' mean change, 1 - cosine
+/// Computes the indicator of the normals, and the normals of that indicator. @return the mean change, 1 - cosine
 double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
     solve(field, result, cycles);
     const std::size_t count = points_.size();
@@ -96,14 +96,14 @@ double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
     return 1 - std::accumulate(cosine.begin(), cosine.end(), 0.0) / double(count);
 }
 
-/// Updates cannot correct a patch that is turned as a whole, because its indicator reproduces its own normals; its mean
-/// indicator differs from 1/2. All such patches are therefore turned at once on trial, and those stay turned whose mean
-/// comes closer to 1/2.
+/// The iteration cannot correct a patch whose normals are all reversed, because their indicator reproduces them; but
+/// the mean of the indicator over such a patch differs from 1/2. All such patches are therefore reversed at once on
+/// trial, and those remain reversed in which the mean comes closer to 1/2.
 void Iteration::turn_patches(WindingField& field, Orientation& result) {
     const PointCells cells(points_, kCloud.coarse * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
     for (int round = 0; round < kCommon.rounds; ++round) {
-        turn(field, result, kIteration.patch_cycles);  // makes the indicator that of the current normals
+        turn(field, result, kIteration.patch_cycles);  // the indicator is then that of the last normals
         const std::vector<double> off = mean_off(cells, field.indicator());
         const std::vector<int> patch = patches_of(beside, sides_of(off));
         const int patches = 1 + *std::max_element(patch.begin(), patch.end());

@@ -10,18 +10,19 @@ namespace covol::cloud {
 
 /// A stack of grids and the iterations on it.
 struct Stage {
-    double cell;     ///< of the finest grid, world units
-    int iterations;  ///< at most
+    double cell;     ///< cell size of the finest grid, world units
+    int iterations;  ///< maximum number
     bool is_last;
-    double enclosed;  ///< indicator from which on a point counts as enclosed by another part
+    double enclosed;  ///< value of the indicator above which a point counts as enclosed by another part
 };
 
-/// Hou et al., Iterative Poisson surface reconstruction, ACM Trans. Graph. 41(4), 2022, with the addition that patches
-/// are turned as a whole.
+/// Hou et al., Iterative Poisson surface reconstruction, ACM Trans. Graph. 41(4), 2022, with the addition that whole
+/// patches are reversed.
 class Iteration {
 public:
     /// @param points, areas  must outlive the object; areas in world units squared
-    /// @param initial_cells  [cells of the first stage] cell of the density grid from which the initial normals follow
+    /// @param initial_cells  [cells of the first stage] cell size of the density grid from which the initial normals
+    /// are computed
     Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double initial_cells,
               const RunContext& run);
 
@@ -39,16 +40,16 @@ private:
     void turn_patches(WindingField& field, Orientation& result);
 
     const std::vector<Vec3>& points_;
-    const std::vector<double>& areas_;  // not scaled with the indicator's step
+    const std::vector<double>& areas_;  // unlike Orientation::areas, not scaled with the indicator
     double initial_cells_;
     const RunContext& run_;
     Stage stage_{};
     std::optional<WindingField> last_;
 };
 
-/// Outward normals according to the indicator: down its gradient between outside and inside, up the gradient if another
-/// part encloses the point.
-/// @param enclosed  the indicator from which on a point counts as enclosed
+/// Outward normals according to the indicator: opposite to its gradient; along its gradient if the indicator is
+/// negative or above `enclosed`, as for points that another part encloses.
+/// @param enclosed  value of the indicator above which a point counts as enclosed
 [[nodiscard]] std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points,
                                            double enclosed);
 

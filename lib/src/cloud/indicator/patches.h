@@ -1,5 +1,5 @@
 #pragma once
-// Parts of a cloud that may be oriented the wrong way round as a whole.
+// Connected parts of a cloud whose normals may all be reversed.
 #include <cstdint>
 #include <vector>
 
@@ -10,12 +10,13 @@ namespace covol::cloud {
 /// For each cell, its neighbouring cells that contain points.
 [[nodiscard]] std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells);
 
-/// The number of each cell's patch, from 0: connected cells of the same side; -1 for cells of side 0.
+/// For each cell, the number of its patch, from 0; -1 for cells of side 0. A patch consists of connected cells of the
+/// same side.
 /// @param beside  neighbours_of()
 [[nodiscard]] std::vector<int> patches_of(const std::vector<std::vector<std::uint32_t>>& beside,
                                           const std::vector<int>& side);
 
-/// visit(cell, index of the point in the input)
+/// Calls visit(cell, index of the point in the input) for all points.
 template <typename Visit>
 void for_points_of(const PointCells& cells, Visit visit) {
     for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)

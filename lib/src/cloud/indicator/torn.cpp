@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kNeighbours = 12;
 
-/// The sheet at each point, and which neighbouring points are on the same one.
+/// The sheet at each point, and the neighbouring points on the same sheet.
 class Sheets {
 public:
     Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
@@ -29,7 +29,7 @@ public:
                 beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
             if (near.size() < kNeighbours) return;
             const auto [sum, squares] = moments_of(cells, points[point], near);
-            const double count = double(near.size()) + 1;  // the point itself
+            const double count = double(near.size()) + 1;  // 1: the point itself
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count -
                                                                        sum * sum.transpose() / (count * count));
             if (shape.eigenvalues()[0] > kTorn.flat * shape.eigenvalues()[1]) return;
@@ -41,7 +41,7 @@ public:
     [[nodiscard]] std::size_t size() const { return axes_.size(); }
     /// The sheet's normal, of either sign; 0 if there is no sheet.
     [[nodiscard]] const Vec3& axis(std::size_t n) const { return axes_[n]; }
-    /// visit(neighbour) for the neighbours on the same sheet.
+    /// Calls visit(neighbour) for the neighbours on the same sheet.
     template <typename Visit>
     void for_beside(std::size_t n, Visit visit) const {
         for (const std::uint32_t other : beside_[n])
@@ -53,7 +53,8 @@ private:
     std::vector<std::array<std::uint32_t, kNeighbours>> beside_;
 };
 
-/// @return how many were changed
+/// Replaces normals far from the normal of their sheet by that, on the side of the neighbours' normals. @return how
+/// many
 std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::vector<char> is_lying(sheets.size(), 0);
     std::vector<std::uint32_t> lying;
@@ -64,7 +65,8 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
         lying.push_back(n);
     }
     const std::size_t all = lying.size();
-    // Each round sets those for which at least half of the neighbours on their sheet have a known side.
+    // Each round replaces the normals of points for which the side is known at no fewer than half of the neighbours on
+    // their sheet.
     for (std::size_t before = all + 1; !lying.empty() && lying.size() < before;) {
         before = lying.size();
         std::vector<std::pair<std::uint32_t, Vec3>> mended;
@@ -86,10 +88,11 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     return all - lying.size();
 }
 
-/// @return how many were turned
+/// Reverses the smaller one of two parts of a sheet with opposite normals. @return how many normals were reversed
 std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     detail::DisjointSets parts(sheets.size());  // points connected by consistent normals
-    // Compare sides relative to the sheets' normals: a chain of tilted normals could otherwise cross a seam.
+    // Normals are compared by their sides of the sheet, because gradually tilting normals could otherwise connect two
+    // parts with opposite normals.
     const auto side = [&](std::uint32_t n) { return dot(sheets.axis(n), normals[n]); };
     const auto meets = [&](std::uint32_t n, std::uint32_t other) {
         return side(n) * side(other) * dot(sheets.axis(n), sheets.axis(other));
@@ -100,13 +103,13 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
         });
     std::vector<std::size_t> size(sheets.size(), 0);
     for (std::uint32_t n = 0; n < sheets.size(); ++n) ++size[parts.root(n)];
-    // The number of neighbours with opposite normals, for each pair of parts.
+    // For each pair of parts, the number of neighbouring points with opposite normals.
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> seams;
     for (std::uint32_t n = 0; n < sheets.size(); ++n)
         sheets.for_beside(n, [&](std::uint32_t other) {
             if (const auto a = parts.root(n), b = parts.root(other); a != b && meets(n, other) < 0) ++seams[{a, b}];
         });
-    // Each part is turned to match the larger part with which it shares the longest seam.
+    // Each part is reversed to agree with the larger part to which it has the longest seam.
     std::map<std::uint32_t, std::pair<std::size_t, std::uint32_t>> turned;
     for (const auto& [pair, count] : seams) {
         const auto [a, b] = pair;
@@ -115,7 +118,7 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::erase_if(turned, [](const auto& t) { return t.second.first == 0; });
     std::size_t count = 0;
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
-        // If that part is turned as well, turning twice cancels out.
+        // If that larger part is reversed as well, the two reversals cancel out.
         int times_turned = 0;
         for (auto at = turned.find(parts.root(n)); at != turned.end(); at = turned.find(at->second.second))
             ++times_turned;

@@ -7,12 +7,11 @@
 
 namespace covol::cloud {
 
-/// If the lattice is as fine as the points, parts of a sheet can end with normals in arbitrary directions or reversed:
-/// each agrees with the resulting indicator, which is torn there. If the nearest points are flat because there is
-/// hardly any noise, the sheet itself determines the direction: a normal far from the sheet's is replaced by the
-/// sheet's, on the side of its correct neighbours, from these inwards; and of two parts of a sheet with opposite
-/// normals the smaller one is reversed.
-/// @param spacing  of the points
+/// If the cells of the indicator are as small as the spacing of the points, the normals of parts of a sheet may
+/// converge to arbitrary or reversed directions, which agree with the indicator that they cause. If there is hardly any
+/// noise, the nearest points determine the sheet: a normal far from that of its sheet is replaced by that, on the side
+/// of the neighbours' normals; and of two parts of a sheet with opposite normals, the smaller one is reversed.
+/// @param spacing  mean distance of neighbouring points, world units
 /// @param normals  in/out, unit or 0
 /// @return how many were changed
 std::size_t repair_torn(const std::vector<Vec3>& points, double spacing, std::vector<Vec3>& normals);

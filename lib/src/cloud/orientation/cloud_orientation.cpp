@@ -33,11 +33,11 @@ double bare_fraction(const CloudOrientation& cloud) {
 bool does_enclose(const CloudOrientation& cloud) {
     return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
 }
-/// Recomputes the indicator if it is too coarse for the detail of its normals.
+/// Recomputes the indicator with smaller cells if they are too large for the detail of the normals.
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double noise = cloud.scale.noise, spacing = cloud.scale.spacing;
-    // If the normals are beyond doubt, the surface may be as fine as the points allow.
+    // If the orientation is settled, the cells may be as small as the points allow.
     const double first =
         is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
     const double cell = cloud::indicator_cell(cloud.points, first);
@@ -48,10 +48,11 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
         o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
-/// For sheets, as in scans of one side or from the air: neighbours agree on one side everywhere, the one from which
-/// most points are seen. @return whether they do and the surface does not miss more points
+/// For sheets, as in scans of one side or from the air: orients neighbours to the same side, and each connected part to
+/// the side from which most of its points are seen. @return whether this is used: the normals are consistent, and the
+/// surface misses no more points than the current one
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
-    // With more noise, neighbours may lie above one another, and quadrics form handles where there are no points.
+    // With more noise, neighbours may lie above one another, and quadrics form handles in regions without points.
     if (cloud.scale.noise > kOrientation.noise_of_sheets * cloud.scale.spacing) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
@@ -68,12 +69,13 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
     return cloud.encloses = true;
 }
 
-/// For points that enclose nothing with their current orientation.
+/// For points that enclose nothing with their current orientation: orients them by views, unless the surface from views
+/// misses many more points than the current one.
 /// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);
-    // The surface that closes the gaps is larger than the one with points: the bare fraction is up to 0.04 for closed
-    // shapes, 0.14 to 0.37 for scans of some sides, and 0.66 to 0.85 for scans from the air.
+    // More of the surface closes gaps than lies near points. The bare fraction is up to 0.04 for closed shapes, 0.14 to
+    // 0.37 for scans of some sides, and 0.66 to 0.85 for scans from the air.
     const bool mostly_bare = bare_fraction(cloud) > 0.5;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most
@@ -85,8 +87,8 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
     cloud.has_quadrics = false;
 }
 
-/// Removes points that given normals place inside the solid, since they are not on the surface. @return whether there
-/// were any
+/// Removes points that are inside the solid according to the given normals, since they are not on the surface. @return
+/// whether there were any
 bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::GivenSides& given) {
     const double reach = kOrientation.passed_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
     const std::vector<char> enclosed =
@@ -101,8 +103,8 @@ bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::Give
     return true;
 }
 
-/// Uses the hints if they are consistent and nothing certain contradicts them, otherwise the points alone, otherwise
-/// views.
+/// Orients the cloud by the hints if they are consistent and a reliable orientation does not contradict them, otherwise
+/// by the points alone, and by propagation or views if the points then enclose nothing.
 void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunContext& run) {
     const auto checked = [&] {
         return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
@@ -126,7 +128,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
                 kOrientation.contradicted &&
-            // In narrow folds it is the computed normals that are wrong, and their surface misses more points.
+            // In narrow folds, the computed normals are wrong, and their surface then misses more points.
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
                 fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;

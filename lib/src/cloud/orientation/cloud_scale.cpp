@@ -1,4 +1,5 @@
-// Spacing of a cloud's points on its surface, and their distance from it, from quadrics fitted to neighbourhoods.
+// Measures the spacing of a cloud's points on its surface, and their distances from it, by quadrics fitted to
+// neighbourhoods.
 #include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
 
@@ -17,10 +18,10 @@
 namespace covol {
 namespace {
 
-constexpr double kCellRadii = 2;      // edge of the cells for sorting points, in initial radii
-constexpr std::size_t kNearest = 12;  // twice the unknowns of a quadric
+constexpr double kCellRadii = 2;      // edge of the cells by which points are sorted, in first radii
+constexpr std::size_t kNearest = 12;  // twice the number of a quadric's coefficients
 
-/// Standard deviation of points from the best-fitting quadric over the plane of the last two axes.
+/// Standard deviation of points from the best-fitting quadric over the plane of the second and third axes.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
     using Vector6 = Eigen::Matrix<double, 6, 1>;
     Eigen::Matrix<double, 6, 6> m = Eigen::Matrix<double, 6, 6>::Zero();
@@ -75,7 +76,7 @@ Around measure_around(const cloud::PointCells& cells, const Vec3& at, double rad
     return {radius, double(near.size()), radius * off_sheet(near)};
 }
 
-/// Examines a sample of the points with the nearest neighbours of each.
+/// Measures the neighbourhoods of the nearest neighbours for a sample of the points.
 std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
                                     std::size_t step) {
     tbb::concurrent_vector<Around> around;  // the order does not affect the medians
@@ -105,7 +106,7 @@ double median_of(const std::vector<Around>& around, Value value) {
 CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
     CloudScale scale;
     const double nearest = scale.nearest = measure_spacing(points).median;
-    scale.spacing = 2 * nearest;  // the expected value for points that are distributed evenly at random
+    scale.spacing = 2 * nearest;  // approximate ratio for points at random positions on a surface
     if (!(nearest > 0)) return scale;
     const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
     double radius = kCloudScale.first_spacings * nearest, best = 1;
@@ -119,15 +120,15 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
         tbb::parallel_for(std::size_t(0), around.size(),
                           [&](std::size_t m) { around[m] = measure_around(cells, points[m * step], radius); });
         std::erase_if(around, [](const Around& a) { return a.count == 0; });
-        if (2 * around.size() * step < points.size()) continue;  // too few neighbours yet
+        if (2 * around.size() * step < points.size()) continue;  // most points have too few neighbours
         const double noise = median_of(around, [](const Around& a) { return a.noise; });
         if (noise / radius < best) {
             best = noise / radius;
             scale.spacing = median_of(around, [&](const Around& a) { return radius * std::sqrt(M_PI / a.count); });
             scale.noise = noise;
         }
-        // Stops at a sheet, or when the deviation relative to the radius increases again: wider neighbourhoods would
-        // only add the surface's own curvature to the deviation.
+        // Stops when the neighbourhoods are sheets, or when the deviation relative to the radius increases again,
+        // because the surface's curvature then contributes to the deviation.
         if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
     }
     return scale;

@@ -47,17 +47,19 @@ Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radi
     return {count, std::sqrt(std::max(0.0, axes.eigenvalues()[0]))};
 }
 
-/// [radii] For random points that fill a ball; fitted to balls of 8 to 100 points, few of which have a smaller value.
+/// [radii] Thickness of random points that fill a ball. The formula was fitted to balls of 8 to 100 points such that
+/// few of them have a smaller thickness.
 double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / std::sqrt(count)); }
 
 }  // namespace
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth: 12 times the minimum
+    if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth is less than 12 rings
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
-    // Not at regular intervals, which would sample points in rows at the same position of each row.
+    // The sampled points are not at regular intervals of the order, which in rows of points would select the same
+    // position of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
     for (int n = 0; n < kMaxRadii; ++n, radius *= kCommon.growth) {
@@ -79,7 +81,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
 }
 
 Orientation orient_filled(const std::vector<Vec3>& points, const CloudScale& scale) {
-    // For evenly random points, a ball of radius near_reach contains eleven others.
+    // A ball of radius near_reach around a point contains eleven others; `spacing` cubed is the volume per point.
     const double spacing = scale.near_reach * std::cbrt(4 * M_PI / 3 / 11);
     StackField density =
         spread(grid_around(points, {}, kCloud.coarse * spacing), points, std::vector<double>(points.size(), 1.0));

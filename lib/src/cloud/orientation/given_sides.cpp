@@ -31,7 +31,7 @@ std::size_t count_known(const std::vector<Vec3>& directions) {
     }));
 }
 
-/// Normals of local planes, on the side of `towards`.
+/// Normals of local planes, on the side of `towards`; 0 if that is 0.
 std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
                                   const CloudScale& scale) {
     std::vector<Vec3> normals = plane_normals(points, scale);
@@ -40,7 +40,7 @@ std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::ve
     return normals;
 }
 
-/// Given normals and how far their indicator function supports them.
+/// Given normals, their cross-validation, and their correction by their indicator.
 class HeldOutHints {
 public:
     HeldOutHints(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale,
@@ -53,9 +53,9 @@ public:
         oriented_.areas = areas_;
     }
 
-    /// Fraction of the given normals in each half that the other half's indicator predicts. Reverses all if most point
-    /// inwards.
-    /// @param is_outward  whether they are known to point outwards
+    /// Fraction of the given normals whose sides are predicted by the indicator of the other half of the normals.
+    /// Reverses all normals if they point inwards.
+    /// @param is_outward  whether the normals are known to point outwards
     double predicted(HintsReport& report, bool is_outward) {
         std::vector<char> all(points_.size(), 1);
         compute_indicator(all);
@@ -72,8 +72,8 @@ public:
         return double(agree) / double(std::max<std::size_t>(count_known(oriented_.normals), 1));
     }
 
-    /// Reverses single normals that the indicator contradicts; points without a normal take the direction in which the
-    /// indicator decreases.
+    /// Reverses single normals that the indicator contradicts. A point without a normal receives the direction in which
+    /// the indicator decreases.
     void resolve_contradictions() {
         for (int n = 0; n < kCloud.settling; ++n) {
             compute_indicator(std::vector<char>(points_.size(), 1));
@@ -93,14 +93,15 @@ public:
     [[nodiscard]] Orientation& oriented() { return oriented_; }
 
 private:
-    /// Pseudo-random instead of alternating, because files may contain pairs of points.
+    /// Whether a point belongs to the second half. The halves are pseudo-random instead of alternating, because files
+    /// may contain pairs of points.
     static bool is_second(std::size_t n) { return (n * 2654435761U >> 16 & 1) != 0; }
 
     [[nodiscard]] double falls_along(std::size_t n) const {
         return -dot(oriented_.normals[n], field_.indicator().at(points_[n]).gradient);
     }
 
-    /// Computes the indicator of the selected points.
+    /// Computes the indicator of the normals of the selected points.
     void compute_indicator(const std::vector<char>& selected) {
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
@@ -116,8 +117,8 @@ private:
     Orientation oriented_;
 };
 
-/// Fraction of the points with a neighbour beside, not above them whose normal is opposite: this occurs along the rim
-/// of a part that is turned as a whole.
+/// Fraction of the points that have a neighbour on the same sheet, not above or below it, with an opposite normal, as
+/// along the rim of a part whose normals are all reversed.
 double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<char> is_torn(points.size(), 0);
@@ -141,7 +142,8 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
     result.off_half = std::abs(mean_at(field, points) - 0.5);
 }
 
-/// @param given  normals; @return whether they are used
+/// @param given  normals; 0 if unknown
+/// @return whether they are used
 bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool is_outward, const CloudScale& scale,
          double cell, GivenSides& result, const RunContext& run) {
     result.given = given;
@@ -158,7 +160,8 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
     find_indicator(field, points, own, run);
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);
-    // Noise that moves points across a thin part leaves them with normals of the opposite side.
+    // Points that noise has moved across a thin part have normals of the opposite side; all normals are then replaced
+    // by those of the indicator.
     for (int n = 0; own.turned > kCloud.few && n < kGivenSides.smoothings; ++n) {
         for (std::size_t p = 0; p < points.size(); ++p)
             own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
@@ -174,7 +177,7 @@ std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vect
                                 const Indicator& indicator, const CloudScale& scale, double reach) {
     std::vector<char> alone(points.size()), enclosed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-        if (normals[n] == Vec3{0, 0, 0}) return;  // its sides are not known
+        if (normals[n] == Vec3{0, 0, 0}) return;  // the two sides of the point are not known
         const Vec3 away = times(reach, normals[n]);
         alone[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
                              indicator.inside(minus(points[n], away))}) > kHalfwayInside;
@@ -206,7 +209,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     if (points.size() < 4 || !(scale.spacing > 0)) return result;
     result.report.normals = count_known(hints.normals);
     result.report.sensors = count_known(hints.to_sensor);
-    const double minimum = 0.5 * double(points.size());  // normals or sensors of a minority are not used
+    const double minimum = 0.5 * double(points.size());  // hints of fewer points are not used
     if (double(result.report.normals) >= minimum && result.report.normals > 0 &&
         use(points, hints.normals, hints.is_outward, scale, cell, result, run))
         return result;

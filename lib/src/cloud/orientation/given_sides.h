@@ -8,27 +8,28 @@ struct GivenSides {
     HintsReport report;
     std::vector<Vec3> given;  ///< the normals that were checked
     Orientation orientation;  ///< from the given normals, if they are used
-    double torn = 0;          ///< fraction of the points with an opposite normal beside them on their own sheet
+    double torn = 0;          ///< fraction of the points with a neighbour of opposite normal on their own sheet
 };
 
 /// Uses given normals, or normals of local planes on the side of the sensor. Their reliability is cross-validated
-/// between two halves of the points: each half's indicator function must decrease along the other half's normals. If
-/// nearly all are right they are left unchanged; isolated ones are reversed if all their neighbours contradict them.
+/// between two halves of the points: each half's indicator function must decrease along the other half's normals.
+/// Single normals that the indicator contradicts are reversed; if more than a few of the others disagree with it, all
+/// are replaced by the normals of the indicator.
 /// @param hints  of the points
-/// @param cell   of the indicator's lattice, world units
+/// @param cell   cell size of the indicator's grid, world units
 [[nodiscard]] GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale,
                                      double cell, const RunContext& run);
 
-/// For each point whether the position and both of its sides are inside the solid, as where two walls touch or two
-/// bodies intersect: no surface passes there, whatever the normals. Most of the points around such a point must be
-/// inside as well.
-/// @param normals  of either sign, 0 if a point has none: it is never enclosed
+/// For each point, whether it is enclosed: the point itself and the two positions at the distance `reach` along its
+/// normal are inside the solid, and so are those of most of its neighbours. This occurs where two walls touch or two
+/// bodies intersect.
+/// @param normals  of either sign; 0 if unknown: such points never count as enclosed
 /// @param reach    distance from a point beyond which its own effect on the indicator is negligible, world units
 [[nodiscard]] std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                                               const Indicator& indicator, const CloudScale& scale, double reach);
 
-/// Fraction of the given normals, reversed if all are, that agree with the orientation's indicator; 0 if there are
-/// none.
+/// Fraction of the given normals that agree with the orientation's indicator; 0 if there are none.
+/// @param turned_over  whether the given normals point inwards
 [[nodiscard]] double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given,
                               const Orientation& orientation, bool turned_over);
 

@@ -17,7 +17,7 @@ namespace {
 
 using Patch = std::vector<std::uint32_t>;  // indices of points
 
-/// Cells of points, and which of them have free directions opposed to those around them.
+/// Finds the cells of points whose mean free direction is opposed to the sum of those around them.
 class Opposed {
 public:
     Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
@@ -25,7 +25,7 @@ public:
         std::vector<Vec3> places, frees;
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             places.push_back(cells.sorted()[cells.cell(c).begin]);
-            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // equal for all points of a cell
+            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // the same for all points of a cell
         }
         const PointCells near(places, cells.edge());
         const double reach = kLayers.farthest_layer * between, touching = std::sqrt(6.0) * cells.edge();
@@ -45,7 +45,7 @@ public:
         });
     }
 
-    /// Connected groups of opposed cells, those with the most points first.
+    /// The points of each connected group of opposed cells, the largest group first.
     [[nodiscard]] std::vector<Patch> patches() const {
         std::vector<Patch> all;
         std::vector<char> seen(opposed_.size(), 0);

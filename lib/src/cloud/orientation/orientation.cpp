@@ -28,14 +28,14 @@ using cloud::Iteration;
 using cloud::normals_of;
 using cloud::Stage;
 
-/// Parameters of an attempt; attempts end once few normals turn.
+/// Parameters of an attempt. No further attempts are made after one with at least the first cell size that is settled.
 struct Attempt {
-    double cell;         // in cells of the first attempt
-    double enclosed;     // threshold of the first stage
-    bool is_propagated;  // initial normals; otherwise they point away from the other points
+    double cell;         // cell size relative to the first attempt
+    double enclosed;     // Stage::enclosed of the first stage
+    bool is_propagated;  // initial normals by propagation; false: by the density of the points
 };
 
-/// A subset of the points that is even in space, with the area that each represents.
+/// A spatially even subset of the points, with the area of the surface that each represents.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
         : step(every), order(cloud::PointCells(all, kOrientation.sample_spacings * spacing).order()) {
@@ -61,7 +61,7 @@ struct AttemptResult {
     double mean_off = 0;
 };
 
-/// The most consistent attempt, with those patches of the others that are more consistent.
+/// The most consistent attempt, with the normals of other attempts in patches in which these are more consistent.
 Orientation best_of(std::vector<AttemptResult> tried, const std::vector<Vec3>& points, const Sample& sample,
                     cloud::Consistency& consistency, const RunContext& run) {
     std::stable_sort(tried.begin(), tried.end(),
@@ -85,9 +85,9 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         throw Error(Errc::InvalidInput, "points: expected different positions, got the same one for all points");
     Orientation best;
     with_threads(run, [&] {
-        // Noise is hard to distinguish from thin parts; if normals keep turning, a finer lattice may resolve them.
+        // Normals keep turning because of noise or of thin parts; smaller cells may resolve thin parts.
         const double first = first_cell(scale, points);
-        // Parts thinner than the first cells require cells as small as the points' spacing allows.
+        // Parts thinner than the first cells require cells as small as the points allow.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
         const double fraction = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
                                          kOrientation.max_sampled / double(points.size()));
@@ -135,7 +135,8 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             }
             if (!consistency) {
                 consistency.emplace(points, sample.all_areas(), kOrientation.strain_cells * finest, reach, run);
-                // Iterations may turn normals beside thin parts to a wrong side even if they were right initially.
+                // Iterations may reverse initially correct normals near thin parts, so the propagated normals are
+                // compared as well.
                 tried.push_back(evaluated(now, cloud::propagated_normals(points, scale, scale.spacing)));
             }
             tried.push_back(evaluated(std::move(now), std::move(normals)));

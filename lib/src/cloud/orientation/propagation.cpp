@@ -19,7 +19,7 @@
 namespace covol::cloud {
 namespace {
 
-/// Sets of points, with the sign of each point relative to that of its set.
+/// Disjoint sets of points, with the sign of each point relative to that of its set.
 class SignedSets {
 public:
     explicit SignedSets(std::size_t count) : parent_(count), is_opposite_(count, 0) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kBeside = 16;
 
-/// Median distance to the last neighbour, over a sample of the points.
+/// Median distance to the last of kCommon.ring neighbours, over a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
     const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
     std::vector<double> reach(count, -1);
@@ -31,7 +31,7 @@ double usual_reach(const PointCells& cells, double spacing) {
     return median(std::move(reach));
 }
 
-/// Whether fewer than kCommon.ring points lie within a distance.
+/// Whether fewer than kCommon.ring other points lie within the distance of point n.
 bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
     const Vec3& p = cells.sorted()[n];
     std::size_t found = 0;
@@ -42,7 +42,7 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
         }
         return found >= kCommon.ring;
     };
-    // For most points, the neighbours in the sorted order are sufficient.
+    // For most points, enough of the points next to them in the sorted order are within the distance.
     if (has_enough_neighbours(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
     found = 0;
     cells.find(p, distance, ranges);
@@ -75,7 +75,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
             const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])),
                          reach = std::sqrt(near.back().squared);
-            // The farther the neighbours, the flatter they must be.
+            // The maximum of `off` decreases with the distance of the neighbours.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
             stray[point] = off * reach / far_reach > kCloud.flat;
         },

@@ -18,7 +18,7 @@
 namespace covol::cloud {
 namespace {
 
-/// Distance at which points of one sheet are distinct.
+/// The unit of the cell sizes: the spacing of the points or the noise, if that is larger.
 double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
 
 /// Directions distributed evenly over the sphere: a Fibonacci spiral.
@@ -32,7 +32,7 @@ std::vector<Vec3> directions() {
     return all;
 }
 
-/// Unit directions; 0 if about as much is free on one side as on the other.
+/// The unit vectors of mean free directions; 0 if about as many directions are free on one side as on the other.
 std::vector<Vec3> towards(std::vector<Vec3> free) {
     for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.min_free ? unit(way) : Vec3{0, 0, 0};
     return free;
@@ -64,7 +64,7 @@ public:
     }
 
 private:
-    /// Negative outside the box.
+    /// Index of the cell that contains a position; negative outside the box.
     [[nodiscard]] std::ptrdiff_t index(const Vec3& at) const {
         std::ptrdiff_t n = 0;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -147,7 +147,7 @@ void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, cons
                   const StackField* start, Orientation& result, const RunContext& run) {
     WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * apart(scale)));
     const double cell = fine.indicator().stack().cell();
-    // A view determines only the side of a normal; its direction is estimated better from its neighbours.
+    // A view determines only the side of a normal; its direction is taken from the indicator's gradient.
     std::vector<double> screen(points.size());
     std::size_t against = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {

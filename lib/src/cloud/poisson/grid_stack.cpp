@@ -15,7 +15,7 @@ namespace {
 // Margin, in cells, of each level around a point's splines, which reach nodes -1 to 2: splines of twice the cell size
 // then end within the level.
 constexpr int kAround = 3;
-constexpr int kCoarsestCells = kBlockSide - 1;  // along the longest side: one block of nodes
+constexpr int kCoarsestCells = kBlockSide - 1;  // maximum number along the longest side: one block of nodes
 constexpr int kGrading = 2;                     // margin around each block, in cells of the coarser level
 
 std::size_t hash(const BlockAt& at) {
@@ -107,7 +107,7 @@ std::array<std::int32_t, 3> GridStack::base(std::size_t level, const Vec3& world
     return node;
 }
 
-/// Adds blocks near the points of this level and around the blocks of the finer one.
+/// Adds blocks near the points of this level and around the blocks of the next finer level.
 void GridStack::add_blocks(std::size_t level, const Placed& placed) {
     std::vector<BlockAt>& blocks = levels_[level].blocks;
     const int last = (1 << (levels_.size() - 1 - level)) - 1;  // along each axis
@@ -128,8 +128,8 @@ void GridStack::add_blocks(std::size_t level, const Placed& placed) {
             add(shifted(first, -kGrading, -kGrading, -kGrading),
                 shifted(first, 4 + kGrading, 4 + kGrading, 4 + kGrading));
         }
-    // For each block with points, which of its neighbours they need, without duplicates so that few blocks are listed
-    // twice.
+    // For each block with points, masks of the neighbouring blocks that the points need. Duplicates are removed so that
+    // few blocks are added repeatedly.
     std::vector<std::pair<BlockAt, std::uint32_t>> needs;
     for (std::size_t n = 0; n < placed.points.size(); ++n) {
         if (std::min<std::size_t>(placed.level_of(n), levels_.size() - 1) != level) continue;

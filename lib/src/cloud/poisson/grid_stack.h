@@ -1,7 +1,7 @@
 #pragma once
-// A stack of grids around points, each with twice the cell size of the one before, in blocks of 8^3 nodes that exist
-// only near the points that need them: memory depends on the number of points, not on their extent or on variations of
-// their density.
+// A stack of grids around points, each with twice the cell size of the one before. Blocks of 8^3 nodes exist only near
+// the points of a level and of finer ones, so that memory depends on the number of points, hardly on their extent or on
+// variations of their density.
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace covol::cloud {
 
-using BlockAt = std::array<std::int32_t, 3>;  ///< position in units of blocks
+using BlockAt = std::array<std::int32_t, 3>;  ///< index of a block along each axis
 constexpr int kBlockSide = 8;
 constexpr std::size_t kBlockNodes = 512;
 constexpr std::uint32_t kNoBlock = 0xffffffffU;
@@ -22,9 +22,9 @@ public:
     double cell = 1;                                    ///< distance between nodes, world units
     std::vector<BlockAt> blocks;                        ///< sorted
     std::vector<std::array<std::uint32_t, 27>> beside;  ///< neighbours; the block itself at 13; kNoBlock: none
-    std::vector<std::array<std::uint32_t, 8>> finer;    ///< blocks of the finer level inside, or kNoBlock
+    std::vector<std::array<std::uint32_t, 8>> finer;    ///< its eight blocks of the finer level, or kNoBlock
     std::vector<std::uint32_t> coarser;                 ///< the block of the coarser level that contains it
-    std::vector<std::array<std::uint32_t, 6>> ghost;    ///< number of each face without a block beyond it, or kNoBlock
+    std::vector<std::array<std::uint32_t, 6>> ghost;    ///< number of each face with no block beyond it, or kNoBlock
     std::size_t ghosts = 0;                             ///< number of such faces
     std::array<std::vector<std::uint32_t>, 2> colours;  ///< blocks with even and with odd coordinate sum
     [[nodiscard]] std::uint32_t find(const BlockAt& at) const;
@@ -48,14 +48,16 @@ private:
 
 class GridStack {
 public:
-    /// @param levels  of each point: the finest grid around it has cells of cell * 2^level; empty: 0 for all
-    /// @param cell    of the finest grid, world units
+    /// @param levels  for each point, the level of the finest grid around it, whose cells are cell * 2^level; empty: 0
+    /// for all
+    /// @param cell    cell size of the finest grid, world units
     /// @param beyond  minimum margin of the coarsest grid on each side of the points, in units of their longest side
     GridStack(const std::vector<Vec3>& points, const std::vector<std::uint8_t>& levels, double cell, double beyond);
 
     [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }  ///< the finest first
     [[nodiscard]] const Vec3& origin() const { return origin_; }                    ///< of node 0 of all levels
-    /// Along each axis, nodes of the coarsest level below 1 and from end() on are the border, where values are 0.
+    /// The border of the coarsest level, where values are 0, consists of its nodes below 1 and from end() on along each
+    /// axis.
     [[nodiscard]] const std::array<int, 3>& end() const { return end_; }
     [[nodiscard]] double cell() const { return levels_.front().cell; }
     [[nodiscard]] std::size_t block_count() const;
@@ -95,7 +97,8 @@ private:
     std::shared_ptr<const GridStack> stack_;
 };
 
-/// The points' values, distributed by splines to the nodes around them on the level of each point and all finer ones.
+/// The values of the points, distributed by splines to the nodes around them on the level of each point and on those
+/// nodes of finer levels that exist.
 /// @param points  those of the stack
 [[nodiscard]] StackField spread(std::shared_ptr<const GridStack> stack, const std::vector<Vec3>& points,
                                 const std::vector<double>& values);

@@ -17,7 +17,7 @@ struct Surrounding {
     double cell;
 };
 
-/// @return whether all blocks around the position exist; if not and `whole`, missing nodes are 0
+/// Collects the nodes around a position. @return whether all of them exist; with `whole`, missing nodes are 0 instead
 bool collect(const GridLevel& level, const float* values, const Vec3& origin, const Vec3& world, bool whole,
              Surrounding& s) {
     BlockAt at;

@@ -12,7 +12,7 @@
 namespace covol::cloud {
 namespace {
 
-constexpr int kCoarsestSweeps = 32;  // of Gauss-Seidel on the coarsest grid, one block, which are almost its solution
+constexpr int kCoarsestSweeps = 32;  // Gauss-Seidel sweeps that nearly solve the coarsest grid
 
 template <typename Visit>
 void for_blocks(std::size_t count, Visit visit) {
@@ -26,7 +26,7 @@ std::size_t beside_at(int i, int j, int k) {
 }
 std::size_t node_at(int i, int j, int k) { return std::size_t((i & 7) * 64 + (j & 7) * 8 + (k & 7)); }
 
-/// The nodes low..low+count-1 along each axis, relative to a block; 0 if they do not exist.
+/// Copies the values of nodes low..low+count-1 along each axis, relative to a block; 0 for nodes that do not exist.
 void collect_nodes(const GridLevel& grid, const std::vector<float>& values, std::size_t block,
                    const std::array<int, 3>& low, int count, float* out) {
     for (int i = low[0]; i < low[0] + count; ++i)
@@ -112,7 +112,7 @@ void WindingField::find_residual(std::size_t l) {
     });
 }
 
-/// Sets the values beyond the faces at which this grid ends by trilinear interpolation of the coarser grid.
+/// Sets the values beyond the faces at which the grid of level l ends, by trilinear interpolation of the coarser grid.
 void WindingField::set_ghosts(std::size_t l) {
     if (l + 1 == levels_.size()) return;  // the border values are 0
     const GridLevel& fine = grid(l);
@@ -140,13 +140,13 @@ void WindingField::set_ghosts(std::size_t l) {
     });
 }
 
-/// Full approximation storage: sets the nodes that level l - 1 covers to its solution, and their right-hand side such
-/// that this solution is exact if level l - 1 has no residual.
+/// Full approximation storage: sets the nodes of level l that level l - 1 covers to the solution of level l - 1, and
+/// the right-hand side there such that this solution is exact if level l - 1 has no residual.
 void WindingField::restrict_from(std::size_t l) {
     const GridLevel& fine = grid(l - 1);
     const GridLevel& own = grid(l);
     std::vector<float>& u = solution_.values[l];
-    const auto for_covered = [&](std::size_t block, auto visit) {  // visit(finer block, its first node on this level)
+    const auto for_covered = [&](std::size_t block, auto visit) {  // visit(finer block, its first node on level l)
         for (std::size_t child = 0; child < 8; ++child)
             if (own.finer[block][child] != kNoBlock)
                 visit(own.finer[block][child],
@@ -160,7 +160,7 @@ void WindingField::restrict_from(std::size_t l) {
             for (std::size_t n = 0; n < 64; ++n) {
                 const std::size_t i = n / 16, j = n / 4 % 4, k = n % 4, to = first + i * 64 + j * 8 + k;
                 u[to] = solution_.values[l - 1][child * kBlockNodes + i * 128 + j * 16 + k * 2];
-                // The stencil is h times that of the weak form, and h doubles.
+                // The stencil is that of the weak form divided by h, and h doubles.
                 levels_[l].right[to] = 0.5F * sums[n];
             }
         });
@@ -181,7 +181,7 @@ void WindingField::restrict_from(std::size_t l) {
     });
 }
 
-/// Adds the change of level l + 1 since the restriction.
+/// Adds the change of the solution of level l + 1 since restrict_from() to level l.
 void WindingField::correct(std::size_t l) {
     std::vector<float>& change = levels_[l + 1].before;
     tbb::parallel_for(std::size_t(0), change.size(),

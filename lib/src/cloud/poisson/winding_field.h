@@ -1,11 +1,11 @@
 #pragma once
-// The indicator function of a solid from points with normals on its border: the solution of the Poisson equation div
-// grad chi = -div V for V = sum of area * normal at the points (Kazhdan, Bolitho and Hoppe, Poisson surface
-// reconstruction, SGP 2006), which is the generalised winding number of the same points (Barill et al., 2018). It is
-// solved on a stack of grids, each of which ends near the points that need it. The finest grid at each position
-// represents the equation and the coarser ones its correction (full approximation storage; Brandt, Multi-level adaptive
-// solutions to boundary-value problems, Math. Comp. 31, 1977); nodes beyond a grid's end are interpolated from the next
-// coarser one.
+// The indicator function of a solid from points with normals on its border: the solution chi of the Poisson equation
+// div grad chi = -div V, where V is the sum of area * normal at the points (Kazhdan, Bolitho and Hoppe, Poisson surface
+// reconstruction, SGP 2006), which is the generalised winding number of the same points (Barill et al., 2018). The
+// equation is solved on a stack of grids, which are finer only near the points. At each position, the finest grid
+// represents the equation and the coarser grids correct its solution (full approximation storage; Brandt, Multi-level
+// adaptive solutions to boundary-value problems, Math. Comp. 31, 1977); nodes beyond a grid's end are interpolated from
+// the next coarser one.
 #include <vector>
 
 #include "cloud/poisson/grid_stack.h"
@@ -24,8 +24,8 @@ public:
     /// @throws Error Cancelled
     void solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles,
                const RunContext& run = {});
-    /// From now on, a penalty pulls the indicator to 1/2 at the points; a weight of 1 at a node is as strong as its
-    /// coupling to one neighbour.
+    /// Adds to all later solutions a penalty for deviations of the indicator from 1/2 at the points. A weight of 1 at a
+    /// node is as strong as the node's coupling to one neighbour.
     void screen(const std::vector<Vec3>& points, const std::vector<double>& weights);
     /// Uses another field as the initial value.
     void start_from(const StackField& other);
@@ -36,7 +36,7 @@ public:
 private:
     struct Level {
         std::vector<float> right, residual;
-        std::vector<float> before;  ///< solution before its correction
+        std::vector<float> before;  ///< solution before the correction by this level, then its change
         std::vector<float> ghosts;  ///< 8^2 nodes for each face without a block beyond it
         std::vector<float> screen;  ///< weights at the nodes, or empty
     };

@@ -20,7 +20,7 @@ COVOL_INLINE Float8 square_root(Float8 x) {
     return x;
 }
 
-/// visit(i, j, x squared plus y squared, relative to the foot) for each row that the piece reaches.
+/// Calls visit(i, j, squared distance from the foot in x and y) for each row that the piece reaches.
 template <typename Visit>
 COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
     int first[3], last[3];
@@ -36,7 +36,7 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
-/// First-order distance of a position, or of a row of positions, to a sheet.
+/// First-order distance from a sheet to a position or a row of positions.
 template <typename Real>
 COVOL_INLINE Real distance_to(const BlendSheet& s, float x, float y, Real z) {
     x -= s.origin[0], y -= s.origin[1], z -= s.origin[2];
@@ -84,7 +84,8 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
                 nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
             });
     }
-    // In rows that are far from the surface according to their nearest pieces, the others are not evaluated.
+    // In rows that are far from the surface according to the nearest pieces of their voxels, the other pieces are not
+    // evaluated.
     bool is_near[64];
     for (int row = 0; row < 64; ++row) {
         bool any = false;

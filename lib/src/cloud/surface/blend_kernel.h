@@ -1,5 +1,5 @@
 #pragma once
-// Quadrics blended over the voxels of one leaf, eight at a time. Lengths are world units relative to the leaf's first
+// Blends quadrics over the voxels of one leaf, eight at a time. Lengths are world units relative to the leaf's first
 // voxel; voxel (i, j, k) of 8^3 is at index 64 i + 8 j + k.
 #include <array>
 #include <cstddef>
@@ -20,13 +20,14 @@ struct BlendPiece {
 
 struct BlendLeaf {
     static constexpr float kNone = 1e30F;
-    alignas(32) std::array<float, 512> fraction;  ///< squared distance from the nearest foot over its squared reach
-    alignas(32) std::array<std::int32_t, 512> nearest;         ///< its piece; -1: none reaches the voxel
-    alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< of the nearest piece
-    alignas(32) std::array<float, 512> sum, weight;            ///< sums over the pieces on the nearest one's side
+    alignas(32) std::array<float, 512> fraction;               ///< minimum of (distance from a foot / reach) squared
+    alignas(32) std::array<std::int32_t, 512> nearest;         ///< piece with that minimum; -1: none reaches the voxel
+    alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< normal of that piece
+    alignas(32) std::array<float, 512> sum, weight;            ///< sums over the pieces on the side of `normal`
 };
 
-/// Fills a leaf of voxels of edge h. Rows farther than `limit` from their nearest pieces use these alone.
+/// Fills a leaf of voxels of edge h. Rows whose voxels are all farther than `limit` from their nearest pieces are
+/// computed from these alone.
 void blend(const BlendPiece* pieces, std::size_t count, float h, float limit, BlendLeaf& leaf);
 
 }  // namespace covol::cloud

@@ -25,7 +25,7 @@ namespace covol::cloud {
 using openvdb::Coord;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Quadrics with the distance up to which they apply, sorted into cells.
+/// Quadrics, sorted into cells, each with its reach: the distance from its foot up to which it applies.
 class CloudField::Pieces {
 public:
     Pieces(std::vector<Quadric> quadrics, double h)
@@ -48,13 +48,14 @@ public:
     [[nodiscard]] const Quadric& operator[](std::size_t n) const { return quadrics_[n]; }
     [[nodiscard]] double reach(std::size_t n) const { return double(reach_[n]); }
     [[nodiscard]] const Vec3& foot(std::size_t n) const { return cells_.sorted()[n]; }
-    /// Maximum distance to the side at which a piece may be the nearest: if the surface continues there, another piece
-    /// is nearer.
+    /// Maximum lateral distance from its foot at which a piece applies: beyond it, other pieces are nearer if the
+    /// surface continues.
     [[nodiscard]] double own_radius(std::size_t n) const {
         const Quadric& q = quadrics_[n];
         return std::max({kBlend.beside_of_min * q.min_radius, kBlend.min_reach_voxels * h_, kCloud.coarse * q.apart});
     }
-    /// Half the sides of a box around the foot that contains the piece's own part of the narrow band.
+    /// Half the edges of a box around the foot that contains the part of the narrow band within own_radius() and
+    /// reach().
     [[nodiscard]] Vec3 own_box(std::size_t n) const {
         const Quadric& q = quadrics_[n];
         const double beside = std::min(own_radius(n), reach(n));
@@ -92,7 +93,7 @@ private:
 
 namespace {
 
-constexpr double kMaxLeaves = 2e7;  // length of the list before duplicates are removed
+constexpr double kMaxLeaves = 2e7;  // maximum length of the list before duplicates are removed
 
 /// Collects leaves of the domain from boxes of voxels.
 class LeafList {
@@ -130,7 +131,7 @@ private:
     Coord first_ = Coord::max(), last_ = Coord::min();
 };
 
-/// visit(part) for the parts of a box, with edges of at most `edge`, that the indicator's level 1/2 may cross.
+/// Calls visit(part) for the parts of a box, with edges of at most `edge`, that the indicator's level 1/2 may cross.
 template <typename Visit>
 void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, const Visit& visit) {
     const double side = box.max[0] - box.min[0];
@@ -142,12 +143,12 @@ void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, c
         WorldBox half = box;
         for (int a = 0; a < 3; ++a) ((part >> a & 1) != 0 ? half.min : half.max)[a] = 0.5 * (box.min[a] + box.max[a]);
         const Indicator::Sample at = indicator.at(times(0.5, plus(half.min, half.max)));
-        // The corners are 0.43 sides from the centre.
+        // The corners of the half are 0.43 sides of the box from its centre; 0.6 includes a margin.
         if (std::abs(at.inside - 0.5) <= 0.6 * side * length(at.gradient)) add_crossed(indicator, half, edge, visit);
     }
 }
 
-/// The leaves of the domain that contain the band of a quadric or are crossed by the indicator's surface.
+/// The leaves of the domain that contain the narrow band of a quadric or are crossed by the indicator's surface.
 /// @throws Error InvalidInput if the indicator's cells are so much larger than the voxels that the leaves of its
 /// surface do not fit into memory, as for small parts that are far apart
 std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
@@ -206,7 +207,7 @@ std::vector<Coord> continuing_faces(const Leaf& leaf, float limit) {
     return ways;
 }
 
-/// The sheet relative to a leaf.
+/// The sheet, relative to the position of a leaf.
 BlendSheet blend_sheet(const Sheet& sheet, const Vec3& leaf) {
     BlendSheet result;
     for (int a = 0; a < 3; ++a) {
@@ -247,7 +248,7 @@ public:
     }
 
 private:
-    /// Distance from its level 1/2, limited to the range -limit to limit, whose ends mean only inside or outside.
+    /// Approximate distance from the indicator's level 1/2, limited to the range -limit to limit.
     [[nodiscard]] double indicator_distance(const Vec3& world, double limit) const {
         const Indicator::Sample at = indicator_.at(world);
         const double off = 0.5 - at.inside, beyond = (std::abs(off) - kBlend.sure) / kBlend.sure;
@@ -263,7 +264,8 @@ private:
         return beyond - 0.5;
     }
 
-    /// 1 below the trusted fraction, 0 from 1 on.
+    /// Weight of a piece at this fraction of its maximum distance: 1 up to kBlend.trusted, then decreasing smoothly to
+    /// 0 at 1.
     static double faded(double fraction) {
         const double beyond = std::clamp((fraction - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
         return 1 - beyond * beyond * (3 - 2 * beyond);
@@ -324,13 +326,13 @@ private:
     BlendLeaf leaf_;
 };
 
-/// The distance according to the pieces where they apply, and elsewhere according to the indicator's level 1/2; not yet
-/// the narrow band of a level set.
+/// The distance according to the pieces where they apply, and elsewhere according to the indicator's level 1/2. The
+/// active voxels are whole leaves, not yet a narrow band.
 FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& within,
                           const RunContext& run) {
     const auto limit = float(kHalfWidthVoxels * within.voxel_size);
     FloatGridPtr field = make_grid(within, limit, "u");
-    // A surface that leaves the domain is closed so far outside that no value within changes.
+    // A surface that leaves the domain is closed so far outside it that the values within do not change.
     constexpr int kBeyond = int(kHalfWidthVoxels) + 1;
     const Domain domain = widened(within, kBeyond);
     openvdb::CoordBBox box = detail::box_of(domain);
@@ -365,8 +367,8 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
     return field;
 }
 
-/// Moves the points to the indicator's surface, as far as noise can have displaced them: otherwise there would be nodes
-/// throughout the layer that they fill.
+/// Moves those points to the indicator's surface that are no farther from it than noise may have displaced them.
+/// Otherwise there would be nodes throughout the layer of points.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
     const double maximum = kBlend.max_noises * noise;
     points.squares_off.clear();

@@ -1,5 +1,5 @@
 #pragma once
-// The surface behind a cloud as a function of position.
+// The surface that a cloud samples, as a function of position.
 #include <memory>
 
 #include "covol/cloud_surface.h"
@@ -11,17 +11,18 @@ namespace covol::cloud {
 /// not depend on the part.
 class CloudField {
 public:
-    /// @param h  voxel size of the lattices. Sets those fields of `report` that follow from the points alone.
+    /// @param h  voxel size of the lattices
+    /// @param report  out: the fields that do not depend on a domain
     CloudField(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run);
     ~CloudField();
     CloudField(const CloudField&) = delete;
     CloudField& operator=(const CloudField&) = delete;
 
-    /// The distance according to the quadrics where they apply, and elsewhere according to the indicator's level 1/2;
-    /// not yet the narrow band of a level set. @pre domain.voxel_size is h
+    /// The distance according to the quadrics where they apply, and elsewhere according to the indicator's level 1/2.
+    /// The active voxels are whole leaves, not yet a narrow band. @pre domain.voxel_size is h
     [[nodiscard]] FloatGridPtr on(const Domain& domain, const RunContext& run) const;
 
-    /// Null if there are none.
+    /// The creases; null if there are none.
     [[nodiscard]] const std::shared_ptr<const Creases>& creases() const { return creases_; }
 
     class Pieces;
@@ -32,14 +33,15 @@ private:
     std::shared_ptr<const Creases> creases_;
 };
 
-/// The same from the indicator alone.
+/// Like CloudField::on(), from an indicator without quadrics.
 [[nodiscard]] FloatGridPtr level_set_of(const Indicator& indicator, const Domain& domain, const RunContext& run);
 
-/// Removes and joins pieces of a whole cloud's field and simplifies its topology, as its points suggest.
+/// Removes pieces with few points, joins pieces that were torn off, and gives the field of a whole cloud the topology
+/// of an indicator that has fewer pieces and handles.
 void settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run);
 
-/// The settled field over a domain. Its zero level set is the surface, but its values are no distances and its active
-/// voxels no narrow band; use start_from_grid() or extract_surface() for these.
+/// The field over a domain after settle(). Its zero level set is the surface, but its values are not distances and its
+/// active voxels not a narrow band; start_from_grid() and extract_surface() compute these.
 [[nodiscard]] CloudSurface settled_field(const Domain& domain, const CloudOrientation& cloud, const RunContext& run);
 
 }  // namespace covol::cloud

@@ -43,7 +43,7 @@ struct Complexity {
 /// Gives a level set the topology of an indicator that has fewer pieces and handles.
 struct TopologyOf {
     Complexity own;
-    std::size_t minimum;  // number of points on a piece
+    std::size_t minimum;  // minimum number of points on a piece
     const std::vector<Vec3>& points;
     const RunContext& run;
 
@@ -54,12 +54,13 @@ struct TopologyOf {
         detail::drop_bare_pieces(*rough, points, minimum);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
-        // Small pieces may be torn off, but large ones are bodies that the indicator's cells are too wide to separate.
+        // Small pieces may have been torn off, but large ones are bodies that the indicator's cells are too wide to
+        // separate.
         if (simpler.pieces < own.pieces &&
             cloud::count_large_pieces(*rough, run) < cloud::count_large_pieces(level_set, run))
             return;
-        // Surfaces more than a voxel apart on average are not two versions of one surface: each may close a scan of one
-        // side in a different way.
+        // If more voxels differ in sign than a layer of one voxel on the surface contains, nothing is changed: the two
+        // surfaces may then close a scan of one side in different ways.
         const auto layer = std::size_t(double(level_set.activeVoxelCount()) / (2 * kHalfWidthVoxels));
         report.held_voxels += cloud::hold_topology(*rough, level_set, run, layer);
         own = simpler;
@@ -114,7 +115,7 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
     topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
                   report);
-    // Around gaps in the points, a lattice as fine as their spacing creates small handles.
+    // Around gaps between the points, cells as small as their spacing create small handles.
     if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
         topology.hold(
             field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),

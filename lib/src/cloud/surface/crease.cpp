@@ -18,15 +18,15 @@ using Eigen::Vector3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t kPlanePoints = 5;     // minimum on a sheet
-constexpr std::size_t kQuadricPoints = 10;  // minimum on a curved sheet
-constexpr double kFlat = 1e-3;              // [radii] misfit of a perfect fit
+constexpr std::size_t kPlanePoints = 5;     // minimum number of points on a plane
+constexpr std::size_t kQuadricPoints = 10;  // minimum number of points on a quadric
+constexpr double kFlat = 1e-3;              // [radii] misfit below which a fit counts as exact
 constexpr int kRobustTurns = 3;             // iterations of reweighting by distance
 constexpr int kTurns = 6;                   // maximum number of iterations of k-planes
 
-/// Points, with the sheet to which each belongs.
+/// Points, and for each the index of the sheet to which it belongs.
 struct Parts {
-    static constexpr std::size_t kAll = 3;  // all points, instead of the number of a part
+    static constexpr std::size_t kAll = 3;  // stands for all points instead of one part
     const std::vector<CreasePoint>& points;
     double radius;
     std::vector<std::uint8_t> of;
@@ -36,8 +36,8 @@ struct Parts {
         for (const CreasePoint& p : points) weights.push_back(p.weight);
     }
 
-    /// Prevents a few points beyond another crease from tilting a sheet: weights decrease with the distance (Cauchy's
-    /// weights, squared).
+    /// Reduces the weights of points with their distance from their sheet (Cauchy's weights, squared), so that a few
+    /// points beyond another crease do not tilt the sheet.
     void reweight(const std::array<Sheet, 3>& sheets) {
         std::vector<double> off(points.size());
         for (std::size_t n = 0; n < points.size(); ++n) off[n] = std::abs(sheets[of[n]].distance(points[n].place));
@@ -121,8 +121,8 @@ struct Parts {
     }
 };
 
-/// Divides the points by their normals, starting from those that differ most.
-/// @return false if the normals differ less than those of a crease
+/// Divides the points into `count` parts by their normals, starting from the normals that differ most.
+/// @return false if these normals differ too little for a crease
 bool divide(Parts& parts, std::size_t count) {
     const std::vector<CreasePoint>& points = parts.points;
     Vector3d mean = Vector3d::Zero();
@@ -159,7 +159,7 @@ bool divide(Parts& parts, std::size_t count) {
     return true;
 }
 
-/// Whether the points of each of the two sheets lie below the other.
+/// Whether the points of each of the two sheets are below the other sheet on average.
 bool is_convex(const Parts& parts, const std::array<Sheet, 3>& sheets, std::size_t a, std::size_t b) {
     double above = 0;
     for (std::size_t n = 0; n < parts.points.size(); ++n)
@@ -175,11 +175,11 @@ void combine(const Parts& parts, Crease& crease) {
         return;
     }
     const bool with[3] = {is_convex(parts, sheets, 1, 2), is_convex(parts, sheets, 0, 2),
-                          is_convex(parts, sheets, 0, 1)};  // index: the remaining sheet
+                          is_convex(parts, sheets, 0, 1)};  // index: the sheet that is not in the pair
     const int convex = with[0] + with[1] + with[2];
     crease.first_is_convex = convex >= 2;
     crease.others_are_convex = convex == 3 || convex == 1;
-    // The sheet of the pair that differs from the other two pairs must come first.
+    // If one pair differs from the other two, the sheet that is not in it must come first.
     for (std::size_t n = 0; n < 3; ++n)
         if (convex % 3 != 0 && with[n] == (convex == 1)) std::swap(sheets[0], sheets[n]);
 }
@@ -194,7 +194,7 @@ double misfit_of(const std::vector<CreasePoint>& points, const auto& shape) {
     return std::sqrt(squares / weight);
 }
 
-/// @param misfit  of one quadric: planes with a larger misfit are rejected
+/// @param misfit  misfit of the best fit so far: planes with a larger misfit are rejected
 std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double radius, std::size_t count,
                                  double misfit) {
     Parts parts(points, radius);
@@ -220,7 +220,7 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
     }
     combine(parts, crease);
     crease.misfit = misfit_of(points, crease);
-    // Quadrics that few points determine are useless beyond them; they are used only if planes fit badly.
+    // Quadrics that are determined by few points are wrong beyond these; they are used only if planes fit badly.
     if (crease.misfit > kFlat * radius) {
         Crease bent = crease;  // All its sheets are fitted again because combine() may have swapped them.
         for (std::size_t n = 0; n < points.size(); ++n) parts.weights[n] = points[n].weight;

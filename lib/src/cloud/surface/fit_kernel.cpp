@@ -23,7 +23,8 @@ COVOL_INLINE Double4 dot(const Double4 (&a)[3], const Double4 (&b)[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// For each mask of lanes: indices of the half lanes in the mask, in order, to move them to the front.
+/// For each mask of lanes, the indices of the 32-bit halves of its lanes, in order, for a shuffle that moves these
+/// lanes to the front.
 struct LanesFirst {
     alignas(32) std::int32_t halves[16][8] = {};
     std::size_t count[16] = {};
@@ -67,7 +68,7 @@ void FitPoints::clear(std::size_t room) {
 
 void FitPoints::fill_up() {
     for (std::size_t n = size; n % kFitLanes != 0; ++n) {
-        u[n] = 1;  // gives weight 0
+        u[n] = 1;  // the weight is then 0
         v[n] = t[n] = count[n] = 0;
     }
 }
@@ -160,7 +161,7 @@ COVOL_CLONES FitResidual fit_residual(const FitPoints& points, const double x[6]
         const Double4 u = load(&points.u[n]), v = load(&points.v[n]), t = load(&points.t[n]);
         const Double4 inside = 1 - u * u - v * v;
         const Double4 off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
-        // Padding points have u = 1 and thus no weight.
+        // Points of the padding have u = 1 and thus weight 0.
         const Double4 near = inside * inside, w = load(&points.count[n]) * near;
         squares += w * off * off;
         weight += w;

@@ -1,5 +1,5 @@
 #pragma once
-// Weighted sums over points for the fit of a quadric, four at a time.
+// Weighted sums over points for the fit of a quadric, computed for four points at a time.
 #include <cstddef>
 #include <vector>
 
@@ -12,7 +12,7 @@ class FitCloud {
 public:
     void reserve(std::size_t count);
     void add(const double (&place)[3], const double (&normal)[3], double count);
-    /// Call after the last add(): vectors of kFitLanes may then be read from any point on.
+    /// Must be called after the last add(): appends padding, so that kFitLanes values may be read from any point on.
     void finish();
 
     std::vector<double> place[3], normal[3], count;

@@ -17,8 +17,8 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kCheckEvery = 10'000;  // voxels between two checks for cancellation
-// [voxels] Distance from the surface of voxels that keep their sign: far less than a voxel, so that its value cannot be
-// seen, but not 0, so that triangles do not degenerate.
+// [voxels] Absolute value of voxels that keep rough's sign: far less than a voxel, so that they hardly displace the
+// surface, but not 0, so that triangles do not degenerate.
 constexpr double kHeld = 0.1;
 
 /// The 26 neighbours of a voxel, one bit each, with their adjacency.
@@ -69,8 +69,8 @@ std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& n
     return all;
 }
 
-/// Whether the voxels of the set that are adjacent to the centre are connected by paths of at most `steps`, and there
-/// are any.
+/// Whether the set contains voxels adjacent to the centre (`next`), and these are connected by voxels of the set that
+/// are less than `steps` from them.
 bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::uint32_t, 26>& neighbours, int steps) {
     const std::uint32_t touching = set & next;
     if (touching == 0) return false;
@@ -83,7 +83,7 @@ bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::u
     return (touching & ~reached) == 0;
 }
 
-/// Whether a voxel can change sides without a change of topology.
+/// Whether a voxel can change its sign without a change of topology. @param inside  its neighbours that are inside
 bool is_simple(std::uint32_t inside) {
     return is_one_piece(inside, kAround.faces, kAround.beside6, 3) &&
            is_one_piece(~inside & 0x3FFFFFFU, kAround.faces_and_edges, kAround.beside18, 2);
@@ -95,14 +95,14 @@ struct Waiting {
     bool operator<(const Waiting& other) const { return depth != other.depth ? depth < other.depth : other.at < at; }
 };
 
-/// Depth of voxels below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra),
-/// because target's own values end with its band.
+/// Distance of each of the voxels from target's surface, in voxels, along paths through them (Dijkstra), because target
+/// has distances only in its band.
 FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target, const RunContext& run) {
     FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
     auto depth_at = depth->getAccessor();
     auto target_at = target.getConstAccessor();
     const auto h = float(target.voxelSize()[0]);
-    std::priority_queue<Waiting> queue;  // of the negated depth, since the queue returns the maximum first
+    std::priority_queue<Waiting> queue;  // with negated depths, because the queue returns the maximum first
     for (const Coord& at : voxels) {
         const float value = target_at.getValue(at);
         bool is_beside = false;
@@ -132,7 +132,7 @@ FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& targe
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run, std::size_t maximum) {
     auto rough_at = rough.getConstAccessor();
     auto target_at = target.getAccessor();
-    // Beyond a cut through a surface, as at a domain's end, voxels have no side.
+    // Outside this box, signs are not reliable if a surface is cut off, as at the end of a domain.
     openvdb::CoordBBox box = target.evalActiveVoxelBoundingBox();
     box.expand(rough.evalActiveVoxelBoundingBox());
     openvdb::MaskGrid kept;  // voxels that still have rough's sign instead of target's
@@ -155,7 +155,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
     }
-    // The deepest voxels first: those that finally remain, to separate two fronts, are then at the narrowest places.
+    // The deepest voxels change first, so that the voxels that keep rough's sign are at the narrowest places.
     const FloatGrid::Ptr depth = depth_of(found, target, run);
     auto depth_at = depth->getConstAccessor();
     std::priority_queue<Waiting> queue;

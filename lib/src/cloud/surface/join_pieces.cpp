@@ -29,9 +29,9 @@ struct Gap {
 struct Piece {
     std::vector<Vec3> surface;
     double volume = 0;  ///< negative for a cavity
-    Gap gap;            ///< to the piece to which it may be joined
-    /// Finds the shortest gap to `other`.
-    /// @param maximum  length of a gap
+    Gap gap;            ///< shortest gap to a piece to which it may be joined
+    /// Updates `gap` if `other` is nearer.
+    /// @param maximum  maximum length of a gap
     void find_gap(const detail::KdTree& other, double maximum) {
         for (const Vec3& v : surface)
             if (const Vec3* near = other.nearest_within(v, std::min(gap.length, maximum)))
@@ -39,7 +39,7 @@ struct Piece {
     }
 };
 
-/// The largest piece first; without cavities.
+/// The pieces of a mesh without cavities, the largest first.
 std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     detail::DisjointSets joined(mesh.vertices.size());
     for (const auto& t : mesh.triangles)
@@ -58,7 +58,7 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     return solid;
 }
 
-/// The pieces are sorted by size, the largest first.
+/// The first piece that is small compared with the largest. @param pieces  the largest first
 std::vector<Piece>::iterator first_small_of(std::vector<Piece>& pieces) {
     return std::find_if(pieces.begin(), pieces.end(),
                         [&](const Piece& p) { return p.volume < kCommon.minority * pieces.front().volume; });
@@ -119,7 +119,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
     const double voxel = domain_of(level_set).voxel_size;
     const PointCells cells(points, apart);
     std::vector<PointCells::Range> ranges;
-    // Otherwise the surface ends there.
+    // Without points all along the gap, the surface really ends at it.
     const auto has_points_along = [&](const Gap& gap) {
         const int steps = 1 + int(2 * gap.length / voxel);
         for (int n = 0; n <= steps; ++n)
@@ -135,7 +135,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         const Gap gap = next->gap;
         if (!(gap.length < max_gap)) break;
         if (!has_points_along(gap)) {
-            next->gap = {};  // it may still be joined to a piece that is joined later
+            next->gap = {};  // it may still be joined to another piece that is joined first
             continue;
         }
         std::vector<double> around;
@@ -144,7 +144,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
             for (std::uint32_t n = range.begin; n < range.end; ++n)
                 if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < apart)
                     around.push_back(off);
-        // Parts that are thicker than the distance between points do not tear.
+        // The radius is limited because parts thicker than the distance between points are not torn off.
         fill(level_set, gap, std::max(std::min(median(std::move(around)), 0.5 * apart), voxel));
         ++joined;
         const detail::KdTree own(std::move(next->surface));

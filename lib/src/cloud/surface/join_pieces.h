@@ -7,11 +7,11 @@
 
 namespace covol::cloud {
 
-/// Joins small pieces of a solid to the nearest other piece if there are points all along the gap: parts as thin as the
-/// spacing of the points tear. Pieces of less than a tenth of the volume of the largest are small; others remain
-/// separate, however close.
-/// @param level_set  active near its surface and signed everywhere; the values of joined parts have the right sign but
-/// are no distances
+/// Joins small pieces of a solid to the nearest other piece if there are points all along the gap, because parts as
+/// thin as the spacing of the points may be torn off. Pieces of less than a tenth of the volume of the largest are
+/// small; larger ones are not joined to each other, however close they are.
+/// @param level_set  active near its surface and signed everywhere; values at the joints have the right sign but are
+/// not distances
 /// @param apart  spacing of the points or their noise, if that is larger
 /// @return how many were joined
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run);

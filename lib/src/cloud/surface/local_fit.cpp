@@ -26,12 +26,12 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 struct Fit {
     std::array<double, 6> c{};
     double noise = 0;      // standard deviation of the points
-    double misfit = 0;     // of means of points, which averages noise but not the quadric's error
-    double deviation = 0;  // of c0
+    double misfit = 0;     // of means of points, in which noise averages out, unlike the quadric's error
+    double deviation = 0;  // standard deviation of c[0]
     bool good = false;
 };
 
-/// The cloud, thinned for one radius.
+/// The cloud, thinned for neighbourhoods of one radius.
 struct Level {
     Level(const OrientedCloud& all, double r) : radius(r), cells(all.points, r) {
         sorted.reserve(all.size());
@@ -48,12 +48,12 @@ struct Level {
     double radius;
     PointCells cells;
     FitCloud sorted;                 // in the order of the cells
-    std::vector<float> squares_off;  // in the same order, or empty
+    std::vector<float> squares_off;  // in the same order; empty: unknown
 };
 
 struct Scratch {
     std::vector<PointCells::Range> ranges;
-    FitPoints near;  // in radii
+    FitPoints near;  // in units of the radius
     std::vector<CreasePoint> crease;
 };
 
@@ -85,7 +85,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
     if (std::hypot(m(0, 1), m(0, 2)) > kFit.max_off_centre * sum) return result;
-    // For narrow bodies, the quadric is undetermined across the points.
+    // If the points lie near a line, as on narrow bodies, the quadric is undetermined across the line.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
@@ -95,7 +95,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
     const Vector6 first = solver.solve(Vector6::Unit(0));
-    const FitResidual residual = fit_residual(near, x.data());  // the variance of a mean of c points is 1 / c of theirs
+    const FitResidual residual = fit_residual(near, x.data());  // squares are weighted by counts
     const double effective = sums.near * sums.near / sums.near_squares;
     if (effective < 7) return result;
     result.noise = r * std::sqrt(residual.squares / residual.near * effective / (effective - 6));
@@ -106,7 +106,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     return result;
 }
 
-/// Whether most points beside this one on its own sheet have a similar normal; -1: too few points.
+/// 1 if most points around `origin` on its sheet have normals on the side of `normal`, 0 if not; -1: too few points.
 int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
                    const std::vector<PointCells::Range>& ranges) {
     const double r2 = level.radius * level.radius, height = kFit.sheet_height * level.radius;
@@ -120,7 +120,8 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
     return same + opposite < kFit.min_majority ? -1 : same >= opposite;
 }
 
-/// Root mean square distance of the neighbourhood's points on this side of a sheet to the indicator's surface.
+/// Root mean square distance from the indicator's surface of the neighbourhood's points whose normals are on the side
+/// of `normal`.
 double off_indicator(const Level& level, const Vec3& origin, const Vec3& normal,
                      const std::vector<PointCells::Range>& ranges) {
     if (level.squares_off.empty()) return std::numeric_limits<double>::infinity();
@@ -183,19 +184,20 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
-        if (seen.empty()) best.noise = now.noise;  // wider neighbourhoods also contain the surface's own shape
+        if (seen.empty()) best.noise = now.noise;  // in wider neighbourhoods, the surface's shape adds to it
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
     }
-    // Noise along a curved surface brings in points from where it is lower or higher: their mean height is off by half
-    // the variance times the Laplacian.
+    // Noise along a curved surface displaces points to positions where the surface is lower or higher. This changes
+    // their mean height by half the variance times the surface's Laplacian.
     const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), maximum = kFit.max_unbent * best.noise;
     best.c[0] -= std::clamp(lower, -maximum, maximum);
     return best;
 }
 
-/// The sheets that meet around a node, if any. Points on the other side of a thin body are excluded by their normals.
+/// The sheets that meet near a node, if there are any. Points on the other side of a thin body are excluded by their
+/// normals.
 std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec3& normal, Scratch& scratch) {
     level.cells.find(place, level.radius, scratch.ranges);
     std::vector<CreasePoint>& points = scratch.crease;
@@ -211,7 +213,7 @@ std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec
     return fit_crease(points, place, level.radius);
 }
 
-/// Replaces a quadric that could not grow by a crease, if there is one.
+/// Replaces a quadric by a crease, if there is one, unless the quadric's neighbourhood is wider than the crease's.
 void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& scratch) {
     if (q.radius > level.radius) return;
     const std::optional<Crease> crease = crease_at(level, q.origin, normal, scratch);
@@ -234,15 +236,15 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
     q.crease = std::make_shared<const Crease>(*crease);
 }
 
-/// A radius so large that noise keeps the misfit of sheets below its limit, but too small for other creases; 0 if the
-/// noise is too large for both.
+/// A radius at which noise keeps the misfit of sheets below its limit, at most twice the usual radius, so that other
+/// creases are not included; 0 if there is none.
 double crease_radius_for(double spacing, double noise) {
     const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
     if (noise > kCrease.max_misfit * widest) return 0;
     return std::clamp(noise / (0.75 * kCrease.max_misfit), smallest, widest);
 }
 
-/// The cloud, thinned for each radius.
+/// Fits quadrics to the cloud, which is thinned for each radius.
 class Fitter {
 public:
     Fitter(const OrientedCloud& cloud, double spacing, double noise, const RunContext& run) {
@@ -252,7 +254,7 @@ public:
         double radius = kFit.first_spacings * spacing;
         for (int n = 0; n < kFit.levels; ++n, radius *= kCommon.growth) {
             run.check();
-            // Averages of averages are fast to compute and lose nothing at the scale of this radius.
+            // Averages of the last level's averages are fast to compute and precise enough for this radius.
             last = thinned(n == 0 ? cloud : last, kFit.thinned_fraction * radius);
             levels_.emplace_back(last, radius);
         }
@@ -281,7 +283,7 @@ private:
     std::optional<Level> every_;  // not thinned, because that averages across creases
 };
 
-/// The nodes that are not yet represented by a nearby quadric.
+/// The nodes that are not yet represented by a nearby quadric on the same sheet.
 OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quadric>& quadrics) {
     std::vector<Vec3> feet;
     double reach = 0;
@@ -315,8 +317,8 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
     return left;
 }
 
-/// Removes quadrics from a few isolated points where others have more data: such a quadric reaches as far as its
-/// neighbourhood and may belong to another side.
+/// Removes quadrics that are fitted to a few sparse points near quadrics of much denser points: their neighbourhoods
+/// are so wide that they may belong to another side.
 std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
     if (quadrics.empty()) return {};
     std::vector<Vec3> feet;
@@ -358,7 +360,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
         double count = 0, squares_off = 0;
     };
     const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
-        std::array<Mean, 6> means;  // by the axis direction closest to the normal
+        std::array<Mean, 6> means;  // indexed by the signed axis closest to the normal
         const auto [begin, end] = cells.cell(n);
         for (std::uint32_t at = begin; at < end; ++at) {
             const std::uint32_t point = cells.order()[at];
@@ -375,7 +377,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
             mean.count += c;
             if (is_off_known) mean.squares_off += c * double(cloud.squares_off[point]);
         }
-        // Normals at a small angle, on both sides of the limit between two directions, belong to one side of a sheet.
+        // Means whose normals differ by less than 90 degrees belong to one side of a sheet and are merged.
         for (std::size_t m = 0; m < 6; ++m)
             for (std::size_t o = 0; o < m; ++o)
                 if (means[m].count > 0 && means[o].count > 0 && dot(means[m].normal, means[o].normal) > 0) {

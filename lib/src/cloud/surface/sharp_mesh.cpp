@@ -18,15 +18,15 @@ namespace covol {
 namespace cloud {
 namespace {
 
-// Lengths are in voxels.
-constexpr double kOnSurface = 1;      // maximum distance of a vertex on a crease's sheets from them
-constexpr double kBeside = 2;         // maximum distance of a vertex beside the crease from the second sheet
-constexpr double kOnCrease = 0.3;     // maximum distance from all its sheets of a vertex that is moved onto the crease
-constexpr double kSame = 0.02;        // maximum difference of distances for a vertex on both sheets
-constexpr double kLongestMove = 1.5;  // maximum move of a vertex of marching cubes
+// All lengths are in voxels.
+constexpr double kOnSurface = 1;      // maximum distance of a vertex from the surface that a crease's sheets form
+constexpr double kBeside = 2;         // maximum difference between the distances of a moved vertex to two sheets
+constexpr double kOnCrease = 0.3;     // the same for a vertex that is moved onto the crease of the two sheets
+constexpr double kSame = 0.02;        // the same for a vertex that lies on both sheets
+constexpr double kLongestMove = 1.5;  // maximum distance of a new position from the old or the estimated one
 
 constexpr double kNeedle = 0.2;       // maximum length of a degenerate triangle's shortest edge that is collapsed
-constexpr double kLineHeight = 0.02;  // height of a triangle that counts as degenerate
+constexpr double kLineHeight = 0.02;  // height below which a triangle counts as degenerate
 constexpr int kMendings = 10;         // maximum number of passes until no triangle is folded or flat
 
 std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {
@@ -36,7 +36,7 @@ std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {
     return feet;
 }
 
-/// The point nearest to a position at which these sheets meet, by Newton's method.
+/// A point near `from` at which these sheets meet, by Newton's method; none if it is not within `longest`.
 std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& from, double longest) {
     Vec3 at = from;
     for (int step = 0; step < 5; ++step) {
@@ -49,7 +49,7 @@ std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& f
                 normals.row(count) = Eigen::Vector3d(n[0], n[1], n[2]);
                 off[count++] = crease.sheets[s].distance(at);
             }
-        // The shortest step is along the normals.
+        // The shortest step that satisfies the linearised equations is a combination of the normals.
         Eigen::Matrix3d gram = normals * normals.transpose();
         for (int a = count; a < 3; ++a) gram(a, a) = 1;
         for (int a = 0; a < count; ++a) gram(a, a) += 1e-9;
@@ -98,14 +98,14 @@ private:
             if (std::has_single_bit(crease->sheets_at(place, kBeside * h_))) return;
             const unsigned on = crease->sheets_at(place, kOnCrease * h_);
             std::optional<Vec3> moved = meeting(*crease, on, place, kLongestMove * h_);
-            // A point on two sheets need not be on the solid's border.
+            // A point on two sheets need not be on the surface that the crease's sheets form.
             if (!moved || std::abs(crease->distance(*moved)) > kSame * h_)
                 moved = meeting(*crease, 1U << crease->nearest(place), place, kLongestMove * h_);
             if (moved) put(v, *moved);
         });
     }
 
-    /// The point at which an edge crosses a crease.
+    /// The point at which the edge between two vertices crosses a crease, if it does.
     std::optional<Vec3> division(std::uint32_t a, std::uint32_t b) const {
         const Vec3 from = mesh_.place(a), to = mesh_.place(b), middle = times(0.5, plus(from, to));
         const Crease* crease = creases_.nearest(middle);
@@ -149,7 +149,8 @@ private:
                 divided += found != divided_.end();
             }
             if (divided == 0) continue;
-            // Rotate such that the first edge is divided, and with two, also the last: they share the first corner.
+            // Rotates the triangle such that its first edge is divided, and of two divided edges, the other is the
+            // last.
             while (on[0] == kNone || (divided == 2 && on[2] == kNone)) {
                 std::rotate(t.begin(), t.begin() + 1, t.end());
                 std::rotate(on.begin(), on.begin() + 1, on.end());
@@ -171,7 +172,7 @@ private:
 
     [[nodiscard]] bool is_near(std::uint32_t vertex) const { return vertex >= near_.size() || near_[vertex] != 0; }
 
-    /// If a triangle's corners have no sheet in common, three sheets meet within it.
+    /// Inserts a vertex where three sheets meet, in each triangle whose vertices have no sheet in common.
     void insert_corners() {
         std::vector<Vec3> corners;
         const std::size_t count = mesh_.triangles.size();
@@ -221,8 +222,8 @@ private:
         meshing::remove_gone(mesh_.triangles, mesh_.vertices);
     }
 
-    /// Collapses vertices that are closer to a corner than marching cubes resolve: edges between its creases would cut
-    /// it off.
+    /// Collapses edges from a vertex at a corner to vertices that are so close that edges between the corner's creases
+    /// would cut the corner off.
     void clear_around(meshing::CornerTable& table, std::uint32_t vertex) {
         for (bool any = true; any;) {
             std::uint32_t close = meshing::CornerTable::kNone;
@@ -243,7 +244,7 @@ private:
             std::uint32_t corner = 3 * triangle + shape.at_shortest;
             const std::uint32_t across = table.opposite(corner), kept = table.vertex(table.next(corner)),
                                 gone = table.vertex(table.previous(corner));
-            // The vertex on more sheets is kept.
+            // Keeps the vertex on more sheets.
             if (across != meshing::CornerTable::kNone && count_sheets(gone) > count_sheets(kept)) corner = across;
             if (table.can_collapse(corner)) return table.collapse(corner);
         }

@@ -32,7 +32,7 @@ Vec3 Sheet::normal(const Vec3& world) const {
 }
 
 double Sheet::curvature() const {
-    // For [2 c3, c4; c4, 2 c5], because the slope at the foot is small.
+    // The larger absolute eigenvalue of the Hessian [2 c3, c4; c4, 2 c5], since the slope at the foot is small.
     const double mean = c[3] + c[5];
     return std::abs(mean) + std::hypot(c[3] - c[5], c[4]);
 }

@@ -47,8 +47,8 @@ void convert_row(const ChunkedArray& array, const char* from, std::uint64_t step
     if (array.swap) swap_bytes(to, count, array.stored_bytes());
 }
 
-/// If an axis has a single chunk, that chunk may be longer than the image, by any amount in a damaged file. The chunk
-/// size is therefore limited to the image.
+/// The size of a chunk, limited to that of the image: if an axis has a single chunk, the chunk may be longer than the
+/// image, in a damaged file by any amount.
 Index3 chunk_size_of(const ChunkedArray& array, const ArrayAxes& axes, const Index3& size) {
     Index3 chunk;
     for (int a = 0; a < 3; ++a)
@@ -117,7 +117,7 @@ bool ArrayChunks::read(const Index3& chunk, void* out) const {
     return stored.has_value();
 }
 
-/// Copies this channel and frame of a chunk, i fastest.
+/// Copies the voxels of this channel and frame from a stored chunk to `out`, i fastest.
 void ArrayChunks::gather(const char* elements, char* out) const {
     const Index3& n = chunk_size();
     const std::uint64_t stored = array_.stored_bytes(), row = std::uint64_t(n[0]) * pixel_bytes(array_.type);

@@ -12,14 +12,14 @@
 
 namespace covol::detail {
 
-/// How elements are stored whose type is no pixel type.
+/// How the elements are stored: with a pixel type, or with another type that is converted when it is read.
 enum class StoredAs { Pixels, Half, Int64, UInt64 };  ///< Half is converted to Float, 64-bit integers to Double
 
 /// An array with any number of dimensions, in chunks of one size.
 struct ChunkedArray {
     PixelType type = PixelType::UInt8;
     StoredAs stored_as = StoredAs::Pixels;
-    bool swap = false;  ///< stored in the other byte order
+    bool swap = false;  ///< the byte order is not that of this machine
     std::vector<std::uint64_t> shape;
     std::vector<std::uint64_t> chunk;  ///< elements along each dimension
     std::vector<std::uint64_t>
@@ -30,7 +30,7 @@ struct ChunkedArray {
     [[nodiscard]] std::uint64_t chunk_bytes() const;   ///< bytes of an unpacked chunk
 };
 
-/// The dimensions of an array that are the axes x, y, z, and those of channels and frames if there are any.
+/// The indices of the dimensions that are the axes x, y, z, and of those for channels and frames if there are any.
 struct ArrayAxes {
     std::array<std::size_t, 3> space{};
     std::optional<std::size_t> channel, frame;
@@ -41,7 +41,7 @@ struct ArrayAxes {
 ArrayAxes describe_axes(const std::string& path, const std::string& letters, const ChunkedArray& array,
                         ImageInfo& info);
 
-/// The chunks of one channel and frame. Dimensions other than the axes have one element.
+/// The chunks of one channel and frame of an array. Dimensions that are not named in ArrayAxes have one element.
 class ArrayChunks : public ChunkSource {
 public:
     [[nodiscard]] bool read(const Index3& chunk, void* out) const final;
@@ -62,7 +62,7 @@ private:
     const ChunkedArray array_;
     const ArrayAxes axes_;
     std::vector<std::uint64_t> place_;  ///< position of the channel and frame in the grid of chunks
-    std::uint64_t first_ = 0;           ///< index of their first element within a chunk
+    std::uint64_t first_ = 0;           ///< index within a chunk of the first element of this channel and frame
 };
 
 }  // namespace covol::detail

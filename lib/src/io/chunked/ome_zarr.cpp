@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxAxes = 16, kMaxLevels = 64, kMaxChannels = 4096;
 
-/// A group's attributes, including those of OME if there are any, and the file that they come from.
+/// The attributes of a group: the object "ome" if the file has one, and the file that they come from.
 struct Attributes {
     Json json;
     std::string file;
@@ -151,7 +151,7 @@ std::optional<OmePlace> find_ome_image(const std::string& array_folder) {
     fs::path group = whole;
     for (int up = 0; up < kHighest && group.has_relative_path(); ++up) {
         group = group.parent_path();
-        // Within a store each folder is an array or a group.
+        // The folders above the array are groups of the store, one of which may describe the image.
         const std::optional<OmeImage> image = read_ome_image(group.string());
         if (!image) continue;
         for (std::size_t n = 0; n < image->levels.size(); ++n)

@@ -12,7 +12,7 @@ struct OmeAxis {
 
 /// world = scale * index + translation, along each axis of the array.
 struct OmeLevel {
-    std::string path;  ///< of its array, relative to the group
+    std::string path;  ///< of the level's array, relative to the group
     std::vector<double> scale, translation;
     bool has_scale = false;
     bool has_translation = false;  ///< a translation of this level itself, not of the whole pyramid
@@ -21,7 +21,7 @@ struct OmeLevel {
 /// The first image of a group, as described by its metadata. https://ngff.openmicroscopy.org/0.5/
 struct OmeImage {
     std::string group;     ///< the folder
-    std::string metadata;  ///< the file that the metadata comes from
+    std::string metadata;  ///< path of the file with the metadata
     std::string version;   ///< for example "0.4"
     int images = 0;        ///< number of images in the group
     std::vector<OmeAxis> axes;
@@ -32,8 +32,8 @@ struct OmeImage {
 /// @returns nothing if the folder has no metadata of an image. @throws Error InvalidInput, Io, Unsupported.
 std::optional<OmeImage> read_ome_image(const std::string& folder);
 
-/// The image that a folder is a level of, and the number of that level. The image's group may be up to three folders
-/// above.
+/// The image to which an array belongs as a level, and the number of that level. The image's group is one of the three
+/// folders above the array.
 struct OmePlace {
     OmeImage image;
     std::size_t level = 0;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "1 x 0.5 x 0.5"
+/// The numbers as a text, separated by `between`: "1 x 0.5 x 0.5".
 template <typename Numbers>
 std::string list_text(const Numbers& numbers, const char* between) {
     std::ostringstream text;
@@ -145,7 +145,7 @@ private:
         info_.spacing_known = {false, false, false};
     }
 
-    /// A level's numbers along x, y, z, in the common unit of the image.
+    /// Converts a level's numbers, one for each dimension, to lengths along x, y, z in the unit of x.
     [[nodiscard]] Vec3 along_axes(const std::vector<double>& numbers) const {
         Vec3 along{};
         for (int a = 0; a < 3; ++a) along[a] = numbers[axes_.space[a]] * in_unit_[a];
@@ -193,7 +193,7 @@ private:
         }
     }
 
-    /// "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2". Errors in a level are ignored until that level is read.
+    /// Describes a level: "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2"; "1: cannot be read" if its metadata is invalid.
     [[nodiscard]] std::string level_text(const OmeLevel& level) const {
         std::string text = level.path + ": ";
         try {
@@ -207,8 +207,8 @@ private:
         }
     }
 
-    /// If no translation is stated for a level that was computed by averaging, its position is off by half a voxel: the
-    /// centre of its first voxel is the centre of several voxels of level 0.
+    /// A level without a translation has the wrong position if its voxels are means of those of level 0: the centre of
+    /// its first voxel is then the centre of several voxels of level 0. Corrects this, or warns about it.
     void describe_shift(bool correct, const RunContext& run) {
         if (!ome_ || level_ == 0 || ome_->levels[level_].has_translation) return;
         const Vec3 own = along_axes(ome_->levels[level_].scale), finest = along_axes(ome_->levels[0].scale);
@@ -233,7 +233,7 @@ private:
     std::size_t level_ = 0;
     std::string letters_;
     ArrayAxes axes_;
-    Vec3 in_unit_{1, 1, 1};  ///< lengths along x, y, z in the common unit
+    Vec3 in_unit_{1, 1, 1};  ///< factors that convert lengths along x, y, z to the unit of x
 };
 
 }  // namespace

@@ -102,7 +102,7 @@ void ArrayReader::set_strides(const std::vector<std::size_t>& slowest_first) {
         array_.strides[slowest_first[n]] = stride;
 }
 
-/// Zarr 3 may give a floating-point number by its bits.
+/// Converts the bits of a floating-point number, which Zarr 3 allows as a hexadecimal text ("0x..."), to its value.
 double ArrayReader::bits_as_number(const std::string& text) const {
     std::uint64_t bits = 0;
     const std::string digits = text.substr(2);
@@ -143,7 +143,7 @@ void ArrayReader::set_fill(const Json& value) {
         throw wrong("its fill_value " + std::to_string(array_.fill) + " is not a valid " + to_string(array_.type));
 }
 
-/// A chunk is unpacked as a whole, including its channels and frames, so its size is limited.
+/// Limits the size of a chunk, because it is unpacked as a whole, including all of its channels and frames.
 void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -193,7 +193,7 @@ void ArrayReader::read_2() {
 
 // ---- Zarr 3 -------------------------------------------------------------------------------------------------------
 
-/// The name of a codec, a grid or a chunk key encoding, which is either an object with a name, or the name alone.
+/// The name of a codec, a chunk grid or a chunk key encoding: each is an object with a name, or a string.
 std::string ArrayReader::codec_name(const Json& codec) const {
     return codec.is_string() ? text_of(codec) : text_of(member(codec, "name"));
 }
@@ -281,8 +281,8 @@ void ArrayReader::read_codecs(const Json& codecs) {
             is_transposed = true;
             slowest_first = transposed(codec);
         } else if (name == "sharding_indexed" && array_.shards.counts.empty() && !is_transposed) {
-            // A shard has codecs of its own, the last of which is for bytes: read_shards() calls read_codecs() for
-            // these.
+            // The chunks within a shard have a list of codecs of their own, which contains the codec bytes;
+            // read_shards() calls read_codecs() for this list.
             read_shards(member(codec, "configuration"));
             has_bytes = true;
         } else {

@@ -15,7 +15,7 @@
 namespace covol::detail {
 namespace {
 
-/// Packed bytes, and what is known of their contents.
+/// Packed bytes, the file that they come from, and the maximum size after unpacking.
 struct Packed {
     const std::string& path;
     const Bytes& bytes;
@@ -32,9 +32,8 @@ struct Packed {
     }
 };
 
-/// Maximum number of unpacked bytes for one packed byte, by the codec's format: zlib needs at least two bits for 258
-/// bytes, LZ4 adds 255 to a length with one byte, zstd repeats a byte over a block of 128 KiB with 4 bytes. Blosc may
-/// contain zstd.
+/// Maximum number of unpacked bytes for one packed byte. Deflate encodes at most 258 bytes in two bits, LZ4 adds at
+/// most 255 to a length with each byte, zstd encodes a block of 128 KiB in at least 4 bytes. Blosc may use zstd.
 std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     switch (codec) {
         case ZarrCodec::Deflate: return 1032;
@@ -46,7 +45,7 @@ std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     return 1;
 }
 
-/// The last codec has to produce the whole chunk; a few bytes cannot be enough for that. @throws Error InvalidInput.
+/// Rejects packed bytes that are too few to be unpacked to `packed.maximum` bytes. @throws Error InvalidInput.
 void check_ratio(const Packed& packed, ZarrCodec codec) {
     if (packed.maximum / max_unpacked_of_byte(codec) > packed.bytes.size())
         throw packed.damaged("packed", std::to_string(packed.bytes.size()) + " bytes cannot hold a chunk of " +
@@ -56,7 +55,7 @@ void check_ratio(const Packed& packed, ZarrCodec codec) {
 Bytes unpack_blosc(const Packed& packed) {
     std::size_t claimed = 0;
     const Bytes& in = packed.bytes;
-    // The functions of Blosc read the header without checking that it is complete.
+    // Blosc's functions do not check that the header is complete before they read it.
     if (in.size() < BLOSC_MIN_HEADER_LENGTH) throw packed.damaged("blosc", "its header is truncated");
     if (blosc_cbuffer_validate(in.data(), in.size(), &claimed) != 0)
         throw packed.damaged("blosc", "its header does not match its size of " + std::to_string(in.size()) + " bytes");
@@ -109,7 +108,7 @@ Bytes unpack_deflate(const Packed& packed) {
                                  "expected " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
         written += made;
         if (status == Z_STREAM_END) {
-            // gzip files may be several streams in a row
+            // A gzip file may contain several streams, one after another.
             ended = read == in.size();
             if (!ended && inflateReset(&stream) != Z_OK) throw packed.damaged("zlib", "zlib could not continue");
         } else if (status != Z_OK || (taken == 0 && made == 0)) {
@@ -149,7 +148,7 @@ constexpr std::array<std::uint32_t, 256> crc32c_table() {
 }  // namespace
 
 ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
-    // Zarr 3 uses Zarr 2's codecs under numcodecs' prefix.
+    // In Zarr 3, the names of Zarr 2's codecs have this prefix.
     constexpr const char* kPrefix = "numcodecs.";
     const std::string own = name.starts_with(kPrefix) ? name.substr(std::string_view(kPrefix).size()) : name;
     if (own == "blosc") return ZarrCodec::Blosc;
@@ -163,7 +162,7 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
 }
 
 std::uint64_t max_packed_bytes(std::uint64_t unpacked) {
-    // Incompressible data grows by a few per cent and by headers; no codec more than doubles it.
+    // Codecs enlarge incompressible data by a few per cent and by headers, and never to more than twice its size.
     constexpr std::uint64_t kHeaders = 1U << 16;
     return 2 * unpacked + kHeaders;
 }

@@ -12,20 +12,20 @@ enum class ZarrCodec {
     Blosc,
     Zstd,
     Deflate,  ///< zlib or gzip, according to the stream's header
-    Lz4,      ///< as in numcodecs: the size, then a block
+    Lz4,      ///< as in numcodecs: the unpacked size in 4 bytes, then one LZ4 block
     Crc32c    ///< a checksum after the bytes
 };
 
-/// The codec of a name in the metadata of a Zarr 2 or 3 array. @throws Error Unsupported, with `path`, which is the
-/// metadata's.
+/// The codec that has this name in the metadata of a Zarr 2 or 3 array. @param path  of the metadata, for messages
+/// @throws Error Unsupported.
 ZarrCodec zarr_codec(const std::string& path, const std::string& name);
 
-/// Upper bound for the packed size of so many bytes with any codec.
+/// Upper bound for the packed size of `unpacked` bytes, for all codecs.
 std::uint64_t max_packed_bytes(std::uint64_t unpacked);
 
 /// Reverses the codecs, the last first. Sizes are checked before memory is allocated.
 /// @param path  of the file that contains `packed`
-/// @throws Error InvalidInput unless all of it is valid and yields `expected` bytes.
+/// @throws Error InvalidInput unless `packed` is valid and is unpacked to `expected` bytes.
 Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Bytes packed, std::uint64_t expected);
 
 /// The checksum of RFC 3720, appendix B.4 (Castagnoli's polynomial).
@@ -33,7 +33,7 @@ std::uint32_t crc32c(const void* bytes, std::uint64_t count);
 
 /// A little-endian number at `bytes`.
 std::uint32_t little_endian_32(const char* bytes);
-/// Removes a crc32c from the end of the bytes. @throws Error InvalidInput if it is wrong.
+/// Checks the crc32c at the end of the bytes and removes it. @throws Error InvalidInput if it is wrong.
 void take_crc32c(const std::string& path, const std::string& what, Bytes& bytes);
 
 }  // namespace covol::detail

@@ -25,7 +25,7 @@ Error cannot_read(const std::string& path, int code) {
 }  // namespace
 
 std::optional<StoreFile> StoreFile::open(const std::string& path) {
-    // opening a named pipe would wait for a writer
+    // Without O_NONBLOCK, opening a named pipe would wait for a writer.
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (file < 0 && errno == ENOENT) return std::nullopt;
     if (file < 0) throw cannot_read(path, errno);

@@ -29,7 +29,7 @@ private:
     std::uint64_t size_ = 0;
 };
 
-/// A file that is open for reading. It is not mapped, because it may be truncated by others while it is read.
+/// A file that is open for reading. It is not mapped, because another process may truncate it while it is read.
 class StoreFile {
 public:
     /// @returns nothing if there is no such file. @throws Error Io.

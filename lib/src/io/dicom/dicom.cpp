@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether a file is an object without an image, as they occur next to series: structure sets, plans and treatments,
-/// registrations and segmentations, reports, presentations, documents (PS3.4 B.5).
+/// Whether a file is a DICOM object without an image, or a segmentation. Such files are often stored in the folder of a
+/// series: structure sets, plans, treatments, registrations, reports, presentations, documents (PS3.4 B.5).
 bool holds_no_image(const std::string& path) {
     const std::string own = dicom_class(path);
     constexpr std::string_view kClasses = "1.2.840.10008.5.1.4.1.1.";
@@ -55,7 +55,7 @@ std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folde
         }
         for (const DicomSlice& slice : std::get<std::vector<DicomSlice>>(file)) series[slice.series].push_back(slice);
     }
-    // A gap between slices is an error, but a missing slice at an end would shorten the volume without a warning.
+    // A missing slice between others is reported as an error later; one at an end can be reported only here.
     if (passed_over > 0)
         run.warn(why + "; skipped" +
                  (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " other files of the folder" : "") +
@@ -83,7 +83,7 @@ public:
         info_.frames = int(volumes.size());
         info_.type = first.type;
         for (const DicomSlice& slice : slices_)
-            if (slice.type != first.type) info_.type = PixelType::Float;  // each slice has its own slope
+            if (slice.type != first.type) info_.type = PixelType::Float;  // different rescaling of slices
         info_.channels = int(std::max(1U, first.components));
         if (first.file_frames > 1)
             info_.fields.emplace_back("NumberOfFrames (0028,0008)", std::to_string(first.file_frames));
@@ -106,7 +106,7 @@ public:
     }
 
 private:
-    /// Rejects frames that are all time points of one plane, because they are not a volume.
+    /// Rejects a series whose volumes have only one plane each: time points of one plane, or planes of many directions.
     void check_depth(const std::vector<DicomVolume>& volumes) const {
         if (volumes.size() < 2 || volumes.front().slices.size() > 1) return;
         throw read_error(Errc::InvalidInput, path_,
@@ -115,13 +115,13 @@ private:
                              "orientations");
     }
 
-    /// Calls use(slice, pixels) for slices [begin, end) with all pixels of each, in the order of decoding: uncompressed
-    /// slices one by one, compressed files several at once.
+    /// Calls use(slice, pixels) for the slices [begin, end), in this order, with all pixels of the slice. Uncompressed
+    /// slices are decoded one by one, compressed files several at once.
     template <typename Use>
     void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
         constexpr std::uint64_t kMaxAtOnce = std::uint64_t(256) << 20;
         std::optional<DecodedPixels> packed;
-        std::map<std::string, std::size_t> numbers;  // of the compressed files that are decoded
+        std::map<std::string, std::size_t> numbers;  // path to index of the compressed files in `packed`
         for (std::size_t n = begin; n < end; ++n) {
             run.check();
             run.report("image", double(n - begin) / double(end - begin));
@@ -176,7 +176,7 @@ private:
                     auto* target = reinterpret_cast<To*>(values.data());
                     const int unused = slice.unused_bits;
                     for (std::uint64_t n = 0; n < pixels; ++n) {
-                        // the unused bits may have any content
+                        // The shifts clear the unused upper bits, which may have any content, and extend the sign.
                         const From value = From(From(std::make_unsigned_t<From>(source[n]) << unused) >> unused);
                         target[n] = static_cast<To>(place.slope * double(value) + place.intercept);
                     }

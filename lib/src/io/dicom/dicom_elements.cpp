@@ -141,8 +141,8 @@ std::string dicom_uid(const std::string& text) {
         const char* const at = hex.data() + 2 * n;
         std::from_chars(at, at + 2, bytes[n], 16);
     }
-    bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // version 8
-    bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // variant
+    bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // UUID version 8
+    bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // UUID variant
     // Converts the 128 bits to one decimal number.
     std::string decimal = "0";
     for (const unsigned byte : bytes) {

@@ -10,23 +10,23 @@
 // Elements for writing DICOM files: PS3.5 7.1, 7.5, and PS3.10 7.1.
 namespace covol::detail {
 
-/// The elements of a file, or of an item of a sequence, by their tags (group << 16 | element).
+/// The elements of a file or of an item of a sequence, sorted by tag (group << 16 | element).
 class DicomItem {
 public:
     /// Replaces an element of the same tag.
     /// @param vr  two letters
-    /// @param bytes  as in the file; padded here
+    /// @param bytes  the value as in the file; put() pads it to an even length
     void put(std::uint32_t tag, const char* vr, std::string bytes);
     /// Numbers of 16 bits.
     void put_shorts(std::uint32_t tag, const std::vector<std::uint16_t>& values);
     /// Numbers of 32 bits (VR UL).
     void put_longs(std::uint32_t tag, const std::vector<std::uint32_t>& values);
-    /// A tag as a value.
+    /// An element whose value is a tag (VR AT).
     void put_tag(std::uint32_t tag, std::uint32_t value);
-    /// Numbers as decimal text.
+    /// Numbers as decimal texts (VR DS).
     void put_decimals(std::uint32_t tag, const std::vector<double>& values);
     void put_items(std::uint32_t tag, const std::vector<DicomItem>& items);
-    /// Adds the elements of another item; they replace those of the same tag.
+    /// Adds the elements of another item; they replace elements with the same tags.
     void add(const DicomItem& other);
 
     /// The elements one after another, little-endian. @param with_vr  explicit VR, otherwise implicit
@@ -40,10 +40,10 @@ private:
     std::map<std::uint32_t, Element> elements_;
 };
 
-/// Whether this VR, if explicit, has a length of 32 bits after two empty bytes.
+/// Whether an element with this explicit VR has two reserved bytes and a length of 32 bits after the VR.
 [[nodiscard]] bool is_long_vr(std::string_view vr);
 
-/// A code of a coding scheme, as an item.
+/// An item with a coded term: the code, its coding scheme and its meaning.
 [[nodiscard]] DicomItem dicom_code(const char* value, const char* scheme, const char* meaning);
 
 /// Converts Latin-1 (ISO 8859-1) to UTF-8.
@@ -52,11 +52,11 @@ private:
 /// A number with at most 16 characters, as the VR DS requires.
 [[nodiscard]] std::string decimal_string(double value);
 
-/// A UID that is derived from a text: the same for equal texts. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
+/// A UID that is derived from a text: equal texts have equal UIDs. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
 [[nodiscard]] std::string dicom_uid(const std::string& text);
 
-/// Writes a file with one instance, which is the only one of its series. The UIDs of both are derived from the
-/// contents.
+/// Writes a file with one instance, which is the only one of its series. The UIDs of the instance and of the series are
+/// derived from the contents.
 /// @param with_vr  explicit VR, otherwise implicit, which allows texts longer than 64 KiB
 /// @throws Error Io, Unsupported if the length of an element does not fit into 32 bits.
 void write_dicom_instance(const std::string& path, DicomItem& file, bool with_vr, const std::string& sop_class);

@@ -35,13 +35,13 @@ constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 /// Sequences outside functional groups that give the positions of frames: detectors (PS3.3 C.8.4.11), regions of
 /// ultrasound (C.8.5.5). Only the first item of each is used.
 constexpr std::uint32_t kPositionSequences[] = {0x00186011, 0x00540022};
-/// The functional groups that are used: echo, contents, position, orientation, those of volumes, time, pixel measures,
-/// rescaling.
+/// The functional groups that are used: echo, frame content, position, orientation, position and orientation of
+/// volumes, time, pixel measures, rescaling.
 constexpr std::uint32_t kGroups[] = {0x00189114, 0x00209111, 0x00209113, 0x00209116, 0x0020930E,
                                      0x0020930F, 0x00209310, 0x00289110, 0x00289145};
 
-/// The value representations in PS3.6 of the elements that describe an image. Debian's GDCM terminates the process if a
-/// file has other ones, even in a sequence.
+/// The value representations (VR) that PS3.6 prescribes for the elements that describe an image. Debian's GDCM
+/// terminates the process if a file uses other VRs, even in a sequence.
 struct Representation {
     std::uint32_t tag;
     std::string_view vr;
@@ -61,7 +61,7 @@ constexpr Representation kRepresentations[] = {
 /// "UN" (unknown) is accepted for all tags.
 bool has_expected_vr(std::uint32_t tag, std::string_view vr) {
     if (vr == "UN") return true;
-    // The descriptors of palettes are signed if the pixels are.
+    // The descriptors of palettes (tags 0028,1101 to 1103) may be signed numbers.
     if (vr == "SS" && tag >= 0x00281101 && tag <= 0x00281103) return true;
     const auto* known = std::lower_bound(std::begin(kRepresentations), std::end(kRepresentations), tag,
                                          [](const Representation& r, std::uint32_t t) { return r.tag < t; });
@@ -116,8 +116,8 @@ public:
     }
 
 private:
-    /// The syntax of a file without a meta group: the group number shows the byte order, and two letters after the tag
-    /// mean explicit VR.
+    /// The transfer syntax of a file without a meta group, from its first element: the group number shows the byte
+    /// order, and two capital letters after the tag mean explicit VR.
     std::string inferred_syntax() {
         const std::uint64_t begin = at_;
         char first[6] = {};
@@ -148,7 +148,7 @@ private:
         tag = group << 16 | number;
         return true;
     }
-    /// Reads tag, value representation and length; the value follows.
+    /// Reads the tag, the VR and the length of an element; the value follows in the file.
     bool read_element(Element& e) {
         if (!read_tag(e.tag)) return false;
         if (e.tag >> 16 == 0xFFFE || !explicit_) return read_number(4, e.length);
@@ -160,7 +160,7 @@ private:
         if (is_long_vr(e.vr)) return read_number(2, reserved) && reserved == 0 && read_number(4, e.length);
         return is_one_of(e.vr, kShort) && read_number(2, e.length);
     }
-    /// Whether the numbers of the image pixel module are consistent.
+    /// Whether the elements of the image pixel module are consistent and supported.
     [[nodiscard]] bool describes_pixels() const {
         const auto number = [&](std::uint32_t tag) { return header_.integer(tag).value_or(kUndefined); };
         const std::uint32_t allocated = number(kBitsAllocated), stored = number(kBitsStored),
@@ -170,7 +170,7 @@ private:
                number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 && number(kRows) > 0 &&
                number(kRows) <= kMaxPixels && number(kColumns) > 0 && number(kColumns) <= kMaxPixels;
     }
-    /// Reads the elements up to `end`, or up to the end of an item.
+    /// Reads the elements up to `end` or, if `in_item`, up to the item's delimiter. @returns false if they are invalid
     bool walk(std::uint64_t end, bool in_item, int depth) {
         if (depth > kDeepest) return false;
         for (std::uint32_t last = 0; at_ < end;) {
@@ -184,7 +184,7 @@ private:
         }
         return !in_item && at_ == end;
     }
-    /// Where the elements of an item of sequence `tag` are stored; null if they are not needed.
+    /// The map that receives the elements of an item of the sequence `tag`; null if they are not needed.
     DicomValues* values_of_item(std::uint32_t tag, int depth, std::size_t item) {
         const bool outermost = depth == 1;
         if (outermost && tag == kFrameGroups) {
@@ -313,8 +313,8 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 
 std::string dicom_class(const std::string& path) {
     std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a pipe would wait for a writer
-    constexpr std::size_t kMeta = 1024;                              // the class is near the beginning
+    if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a named pipe would wait for a writer
+    constexpr std::size_t kMeta = 1024;                              // bytes; the SOP class is near the beginning
     std::string begin(kMeta, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), std::streamsize(begin.size()));
@@ -337,7 +337,7 @@ bool is_dicom(const std::string& path) {
     const auto bytes = static_cast<std::size_t>(file.gcount());
     if (bytes == begin.size() && std::memcmp(begin.data() + kPreamble, "DICM", 4) == 0) return true;
     if (bytes < 12) return false;
-    // An element of group 0002 or 0008 that occurs at the beginning of a file, with a plausible length or a known VR.
+    // Without "DICM", the file must begin with an element of group 0002 or 0008 with a plausible length or a known VR.
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(begin[at]); };
     const bool big = byte(0) == 0;
     const unsigned group = big ? byte(1) : byte(0), other = big ? byte(0) : byte(1);

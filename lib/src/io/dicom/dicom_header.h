@@ -12,7 +12,7 @@ inline constexpr std::uint32_t kSamples = 0x00280002, kRows = 0x00280010, kColum
 inline constexpr std::uint32_t kBitsAllocated = 0x00280100, kBitsStored = 0x00280101, kHighBit = 0x00280102;
 inline constexpr std::uint32_t kRepresentation = 0x00280103;
 
-/// Tag (group << 16 | element) to bytes; long values are omitted.
+/// The values of elements, as in the file, by their tags (group << 16 | element); long values are omitted.
 using DicomValues = std::map<std::uint32_t, std::string>;
 
 /// The elements of a DICOM file outside its sequences, those of its functional groups (PS3.3 C.7.6.16), and the
@@ -26,9 +26,8 @@ struct DicomHeader {
     std::uint64_t pixel_offset = 0;  ///< position in the file
     std::uint64_t pixel_bytes = 0;   ///< 0 when encapsulated
 
-    /// The text of an element without padding; empty if there is none. If a frame is given, the value that applies to
-    /// it: the frame's own functional groups have priority over the shared ones, and those over the elements outside
-    /// sequences.
+    /// The text of an element without padding; empty if there is none. If a frame is given, its functional groups have
+    /// priority over the shared functional groups, and these have priority over the elements outside of sequences.
     [[nodiscard]] std::string text(std::uint32_t tag, std::optional<std::size_t> frame = std::nullopt) const;
     /// Decimal strings, one for each value; empty if there is none, or if one is not a finite number.
     [[nodiscard]] std::vector<double> numbers(std::uint32_t tag, std::optional<std::size_t> frame = std::nullopt) const;
@@ -43,15 +42,15 @@ private:
 };
 
 /// Reads the elements of a file as PS3.10 and PS3.5 specify, and checks the structure up to the end of the file:
-/// lengths, value representations, nesting, order, and the numbers of the image pixel module. Debian's GDCM terminates
-/// the process on invalid files, so only files that pass are given to it. Empty if a check fails, or if there are no
-/// pixels. The preamble and the meta group may be missing: the encoding is then derived from the first element.
+/// lengths, value representations, nesting, order, and the elements of the image pixel module. Debian's GDCM terminates
+/// the process on invalid files, so it reads only files that pass these checks. The result is empty if a check fails or
+/// there are no pixels. If the preamble and the meta group are missing, the first element determines the encoding.
 std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
 /// The kind of object according to the file's meta group (a SOP class, PS3.6 A); empty if it is not stated.
 std::string dicom_class(const std::string& path);
 
-/// RT structure sets: contours, no pixels.
+/// SOP classes: RT structure sets, which contain contours but no pixels, and segmentations.
 inline constexpr const char* kRtStructureSet = "1.2.840.10008.5.1.4.1.1.481.3";
 inline constexpr const char* kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
 

@@ -70,7 +70,8 @@ Planes read_planes(const PixelSource& source, const RunContext& run) {
     return planes;
 }
 
-/// A stream of frames that are not aligned to bytes: each begins at the bit after the end of the previous one.
+/// The pixel data of all frames. A frame begins at the bit after the end of the previous one, so it may begin within a
+/// byte.
 class BitStream {
 public:
     void add(const Bits& bits, std::size_t count) {
@@ -211,10 +212,10 @@ void check_size(const std::string& path, const PixelSource& source) {
 std::array<std::uint16_t, 3> to_cielab(const std::array<std::uint8_t, 3>& color) {
     std::array<double, 3> linear{};
     for (std::size_t n = 0; n < 3; ++n) {
-        const double c = color[n] / 255.0;  // IEC 61966-2-1
+        const double c = color[n] / 255.0;  // sRGB as defined in IEC 61966-2-1
         linear[n] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
     }
-    // sRGB, adapted to D50 by Bradford's matrix, over D50's white: http://www.brucelindbloom.com
+    // From linear sRGB to XYZ, adapted to the white point D50 by Bradford's method: http://www.brucelindbloom.com
     constexpr double kToXyz[3][3] = {
         {0.4360747, 0.3850649, 0.1430804}, {0.2225045, 0.7168786, 0.0606169}, {0.0139322, 0.0971045, 0.7141733}};
     constexpr double kWhite[3] = {0.96422, 1, 0.82521};
@@ -241,9 +242,9 @@ void write_dicom_segmentation(const std::string& path, const PixelSource& source
     if (segments.empty())
         throw Error(Errc::InvalidInput, path + ": expected labels, got an image that is 0 everywhere");
     const std::size_t pixels = std::size_t(g.size[0]) * std::size_t(g.size[1]);
-    // A file has at least one frame.
+    // DICOM requires at least one frame. If no label has voxels, the first one gets an empty frame.
     if (planes.empty()) planes[segments.front().value][0].resize((pixels + 7) / 8);
-    std::map<std::int32_t, std::size_t> places;  // numbers of the slices that occur, from 1
+    std::map<std::int32_t, std::size_t> places;  // slice index to number in the file, from 1
     for (const auto& [value, slices] : planes)
         for (const auto& [k, bits] : slices) places[k] = 0;
     std::size_t place = 0;

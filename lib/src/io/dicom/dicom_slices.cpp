@@ -26,7 +26,8 @@ constexpr std::uint32_t kVolumePosition = 0x00209301, kVolumeOrientation = 0x002
 constexpr std::uint32_t kPlanar = 0x00280006, kFrameCount = 0x00280008, kPixelSpacing = 0x00280030;
 constexpr std::uint32_t kIntercept = 0x00281052, kSlope = 0x00281053, kFrameOffsets = 0x3004000C;
 
-/// The smallest type that holds every rescaled value.
+/// The type of the rescaled values: without rescaling the stored type, otherwise Int16 or Int32 if it holds every
+/// value, otherwise Float.
 PixelType rescaled_type(PixelType stored, double slope, double intercept, int stored_bits) {
     if (slope == 1 && intercept == 0) return stored;
     const bool integral = slope == std::floor(slope) && intercept == std::floor(intercept);
@@ -35,7 +36,7 @@ PixelType rescaled_type(PixelType stored, double slope, double intercept, int st
     return largest < std::ldexp(1.0, 15) ? PixelType::Int16 : PixelType::Int32;
 }
 
-/// Text that sorts in the order of the numbers.
+/// A text whose alphabetical order is that of the numbers; the number itself follows the last blank.
 std::string sortable(double value) {
     const auto digits = std::to_string(std::int64_t(std::llround(std::clamp(value, -1e9, 1e9) * 1e6) + (1LL << 60)));
     return std::string(20 - std::min<std::size_t>(20, digits.size()), '0') + digits + " " + number(value);
@@ -53,7 +54,7 @@ Rescaling rescaling_of(const DicomHeader& header, std::size_t frame) {
     return found;
 }
 
-/// Uncompressed pixels, which are read without GDCM. The file holds `frames` consecutive frames.
+/// Describes uncompressed pixels, which are read without GDCM. The file holds `frames` consecutive frames.
 void fill_plain(const DicomHeader& header, std::size_t frames, const std::string& unusable, DicomSlice& slice) {
     const int allocated = int(header.integer(kBitsAllocated).value_or(0)),
               stored = int(header.integer(kBitsStored).value_or(0));
@@ -80,7 +81,8 @@ void fill_plain(const DicomHeader& header, std::size_t frames, const std::string
                     slice.path + ": expected interleaved colours (RGBRGB...), got separate colour planes");
 }
 
-/// Compressed pixels. GDCM rescales all frames with the slope and intercept in `image`.
+/// Describes compressed pixels. GDCM rescales all frames with the slope and intercept in `image`; if those of the frame
+/// differ, the slice's slope and intercept correct the decoded pixels.
 void fill_packed(const DicomHeader& header, const ItkHeader& image, DicomSlice& slice) {
     slice.components = image.components;
     slice.type = slice.decoded_type = image.type;
@@ -92,8 +94,8 @@ void fill_packed(const DicomHeader& header, const ItkHeader& image, DicomSlice& 
     slice.type = PixelType::Float;
 }
 
-/// In a file with several frames, only the functional groups of the frame itself are used. A position that is shared by
-/// all frames does not give the position of each, unless the frames are time points of one plane.
+/// The stated position of the plane; empty if there is none. If the file has `several` frames, the frame's own
+/// functional groups must state it; a shared position is used only if the frames are time points of one plane.
 std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bool several) {
     if (several) {
         if (header.frames.size() <= frame) return {};
@@ -106,7 +108,7 @@ std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bo
     return position.size() == 3 ? position : header.doubles(kVolumePosition, frame);
 }
 
-/// The directions of columns and rows, and the normal of the plane.
+/// Sets the direction: along a row, along a column, and the normal of the plane.
 void fill_direction(const DicomHeader& header, DicomSlice& slice) {
     std::vector<double> cosines = header.numbers(kOrientation, slice.frame);
     if (cosines.size() != 6) cosines = header.doubles(kVolumeOrientation, slice.frame);
@@ -131,7 +133,8 @@ void fill_step(const DicomHeader& header, DicomSlice& slice) {
         slice.step = {10 * std::abs(x[0]), 10 * std::abs(y[0])};
 }
 
-/// The position of the plane: as stated, otherwise from the distance between planes, in the order of the file.
+/// Sets the position of the plane: the stated one, otherwise from offsets or distances between planes, in the order of
+/// the file, or from the slice location.
 void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     fill_direction(header, slice);
     fill_step(header, slice);
@@ -145,7 +148,7 @@ void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice
     if (first.size() == 3) slice.origin = {first[0], first[1], first[2]};
     double offset = 0;
     if (frames > 1 && offsets.size() == frames) {
-        // For doses, the offsets are either relative to the first plane or positions along z.
+        // Offsets of RT doses are relative to the first plane, or are z positions; the differences are the same.
         offset = offsets[slice.frame] - offsets[0];
         slice.has_origin = true;
         slice.gap_field = "GridFrameOffsetVector (3004,000c)";
@@ -167,7 +170,7 @@ void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice
     }
 }
 
-/// Which of several volumes in a series the plane belongs to.
+/// Sets time, echo and stack, which distinguish the volumes of a series.
 void fill_volume(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     const std::size_t n = slice.frame;
     const auto first_of = [](const std::vector<double>& list) { return list.empty() ? "" : sortable(list[0]); };
@@ -231,7 +234,7 @@ std::vector<std::variant<std::vector<DicomSlice>, Error>> read_dicom_slices(cons
                                                                             const RunContext& run) {
     std::vector<std::variant<std::vector<DicomSlice>, Error>> files;
     std::vector<Piece> for_gdcm;
-    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // with their indices among the files
+    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // indices in `files`, and headers
     for (const std::string& path : paths) {
         run.check();
         const std::string unusable = path + ": damaged, truncated, or not a DICOM image";

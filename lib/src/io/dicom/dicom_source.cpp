@@ -26,7 +26,7 @@ constexpr std::uint32_t kCharacterSet = 0x00080005, kStudyUid = 0x0020000D, kFra
 struct Copied {
     std::uint32_t tag;
     const char* vr;
-    bool must_be;  ///< of type 2: required, but may be empty
+    bool must_be;  ///< DICOM type 2: the element is required, but may be empty
 };
 /// The modules Patient, General Study and Patient Study: PS3.3 C.7.1.1, C.7.2.1 and C.7.2.2.
 constexpr Copied kPatientAndStudy[] = {
@@ -55,7 +55,7 @@ std::string identity_of(const std::string& like) {
     return like + " " + date + time;
 }
 
-/// The planes of the series that an image belongs to; empty for other formats.
+/// The planes of the chosen volume of the image `like`; empty if it is not a DICOM image.
 std::vector<DicomSlice> planes_of(const std::string& like, std::optional<int> frame, const RunContext& run) {
     std::error_code status;
     const bool is_folder = std::filesystem::is_directory(like, status);
@@ -67,7 +67,7 @@ std::vector<DicomSlice> planes_of(const std::string& like, std::optional<int> fr
     return std::move(volumes[std::min(chosen, volumes.size() - 1)].slices);
 }
 
-/// Copies the elements, converted to UTF-8 if their character set allows it.
+/// Copies the elements. Latin-1 is converted to UTF-8; texts in other character sets are copied unchanged.
 void copy_patient_and_study(const DicomHeader& header, DicomSource& source) {
     const std::string set = header.text(kCharacterSet);
     std::vector<std::pair<Copied, std::string>> texts;
@@ -161,7 +161,7 @@ void DicomSource::refer(DicomItem& file, const std::vector<SourcePlane>& used) c
     std::vector<DicomItem> instances;
     for (SourcePlane plane : used) {
         if (!known.insert(plane.sop_instance).second) continue;
-        plane.file_frames = 1;  // the instance as a whole
+        plane.file_frames = 1;  // refers to the whole instance, not to one frame
         instances.push_back(reference(plane));
     }
     DicomItem item;

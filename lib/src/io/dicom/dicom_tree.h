@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-// DICOM files without pixels, whose content is in sequences.
+// A parser for DICOM files whose content is in sequences, not in pixels.
 namespace covol::detail {
 
 /// The elements of a file or an item, by their tags. Refers to the bytes of the file, which must outlive it.
@@ -13,7 +13,7 @@ struct DicomTree {
     std::map<std::uint32_t, std::string_view> values;
     std::map<std::uint32_t, std::vector<DicomTree>> sequences;  ///< only the requested sequences
 
-    /// The text without padding; empty if there is none.
+    /// The text of an element without padding; empty if there is no such element.
     [[nodiscard]] std::string_view text(std::uint32_t tag) const;
     /// The items of a sequence; empty if there is no such sequence.
     [[nodiscard]] const std::vector<DicomTree>& items(std::uint32_t tag) const;

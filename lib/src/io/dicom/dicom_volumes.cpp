@@ -27,7 +27,7 @@ bool same_direction(const DicomSlice& a, const DicomSlice& b) {
     return maximum < 1e-3;
 }
 
-/// Position along the normal of the first plane, whose direction all planes have.
+/// The position of a plane along the normal of the first plane; all planes have the same normal.
 double depth(const DicomSlice& slice, const DicomSlice& first) {
     double along = 0;
     for (std::size_t a = 0; a < 3; ++a) along += first.direction[a][2] * slice.origin[a];
@@ -52,8 +52,8 @@ bool has_planes_at_one_place(const Slices& slices) {
     return slices.front().has_origin && std::adjacent_find(sorted.begin(), sorted.end(), same_place) != sorted.end();
 }
 
-/// Splits volumes by the value of `key` in their planes. A key that differs in every plane, or in none, does not
-/// distinguish volumes.
+/// Splits volumes by the value of `key` in their planes. A volume stays whole if the key differs in none of its planes;
+/// with `only_at_one_place`, if no two planes have the same position; without, if the key differs in every plane.
 std::vector<DicomVolume> split_by(const std::vector<DicomVolume>& volumes, const char* what,
                                   std::string DicomSlice::*key, bool only_at_one_place) {
     std::vector<DicomVolume> parts;
@@ -87,8 +87,8 @@ std::vector<DicomVolume> split_by_direction(const DicomVolume& volume) {
     return parts;
 }
 
-/// Splits frames of one file at equal positions for which no reason is stated: the first ones of each position, the
-/// second ones, ...
+/// Splits frames of one file that have the same position although time, echo and stack do not differ: the first frames
+/// of all positions form one volume, the second frames another, and so on.
 std::vector<DicomVolume> split_by_order(const std::vector<DicomVolume>& volumes) {
     std::vector<DicomVolume> parts;
     for (const DicomVolume& volume : volumes) {
@@ -129,7 +129,7 @@ void check_gaps(const std::string& path, const Slices& slices) {
     }
 }
 
-/// Slices of a tilted gantry lie on a straight line, although it is oblique to them.
+/// Checks that the slices lie on a straight line. With a tilted gantry, the line is oblique to the slices.
 void check_straight(const std::string& path, const Slices& slices, const Vec3& step) {
     const DicomSlice& first = slices.front();
     const double pixel = std::min(first.step[0], first.step[1]), maximum = pixel > 0 ? pixel / 2 : 0.5;
@@ -147,7 +147,8 @@ void check_straight(const std::string& path, const Slices& slices, const Vec3& s
     }
 }
 
-/// Sets order, origin, spacing along k and its direction from the positions. A tilted gantry shears that direction.
+/// Sorts the slices by position and sets the spacing and direction along k. With a tilted gantry, this direction is not
+/// perpendicular to the slices.
 void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info) {
     sort_by_depth(slices);
     check_gaps(path, slices);
@@ -163,7 +164,8 @@ void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info
                              "order of " + std::to_string(slices.size()) + " slices, origin, spacing along z");
 }
 
-/// Orders frames as in the file and slices by InstanceNumber, with the distance that the file states.
+/// Orders frames as in the file (reversed if the stated distance is negative) and slices by InstanceNumber. The spacing
+/// is the distance that the file states.
 void place_by_order(Slices& slices, ImageInfo& info) {
     const bool are_frames = slices.front().file_frames > 1;
     if (!are_frames)

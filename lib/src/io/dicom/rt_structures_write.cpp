@@ -17,7 +17,7 @@ using detail::DicomItem, detail::DicomSource, detail::SourcePlane, detail::decim
 
 constexpr std::uint32_t kFrameOfReferenceUid = 0x00200052;
 
-/// The series that the contours were drawn on, as a structure set refers to it.
+/// Adds the references of a structure set to the frame of reference, and to the series and planes of the contours.
 void put_frame_of_reference(DicomItem& file, const DicomSource& from, const std::vector<SourcePlane>& planes) {
     DicomItem frame;
     frame.put(kFrameOfReferenceUid, "UI", from.frame_of_reference);

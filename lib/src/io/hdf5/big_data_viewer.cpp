@@ -27,7 +27,7 @@ struct BdvChoice {
     int level = 0;
 };
 
-/// Whether a name is a letter and digits, as "t00012".
+/// Whether a name consists of this letter and digits, such as "t00012".
 bool is_named(const std::string& name, char letter) {
     return name.size() > 2 && name[0] == letter &&
            std::all_of(name.begin() + 1, name.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
@@ -70,10 +70,10 @@ std::optional<Vec3> to_vector(const std::string& text) {
     return vector;
 }
 
-/// The file of the same name that ends in .xml; empty if there is none.
+/// The path with the extension .xml instead of its own.
 std::string xml_path(const std::string& path) { return path.substr(0, path.rfind('.')) + ".xml"; }
 
-/// The setups by their numbers.
+/// Reads the setups from the XML file, sorted by their numbers.
 std::map<int, Setup> read_setups(const std::string& path) {
     constexpr std::uint64_t kMaxXml = std::uint64_t(64) << 20;
     std::map<int, Setup> setups;
@@ -109,7 +109,7 @@ class Reader {
 public:
     Reader(const Hdf5File& file, BdvChoice choice) : file_(file), choice_(std::move(choice)) {}
 
-    /// @returns false if the file is of another kind.
+    /// Finds the time points and setups. @returns false if the file does not have BigDataViewer's layout
     bool find() {
         times_ = named(file_.members("/"), 't');
         if (choice_.time.empty() && !times_.empty()) choice_.time = times_.front(), chosen_time_ = false;
@@ -164,7 +164,7 @@ private:
                          "expected setups of one size, got several; give the path of one: " + list);
     }
 
-    /// The factors along x, y, z for each level.
+    /// For each level, the sizes of its voxels along x, y, z relative to those of the finest level.
     [[nodiscard]] std::vector<Vec3> factors() const {
         const std::vector<double> numbers = file_.table("/" + setups_.front() + "/resolutions");
         std::vector<Vec3> factors;
@@ -207,8 +207,8 @@ private:
         for (std::size_t level = 0; level < factor.size(); ++level) {
             Vec3 spacing;
             for (int a = 0; a < 3; ++a) spacing[a] = voxel[a] * factor[level][a];
-            // A voxel is the mean of finer ones, so its centre is the centre of theirs; the first voxel of the finest
-            // level is at world 0.
+            // A coarse voxel is the mean of finer voxels, so its centre is the centre of the box that they cover. The
+            // centre of the first voxel of the finest level is at world 0.
             if (int(level) == choice_.level) {
                 info.geometry.spacing = spacing;
                 for (int a = 0; a < 3; ++a) info.geometry.origin[a] = 0.5 * (spacing[a] - voxel[a]);

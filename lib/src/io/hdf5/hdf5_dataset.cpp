@@ -57,16 +57,16 @@ const char* class_name(H5T_class_t kind) {
     }
 }
 
-/// The type of the numbers; for an enumeration (Python's bool is one), that of its values.
+/// The type of the numbers. For an enumeration, as h5py stores Python's bool, it is the type of the values.
 Hdf5Id number_type(hid_t type) {
     const bool is_enum = H5Tget_class(type) == H5T_ENUM;
     return {is_enum ? H5Tget_super(type) : H5Tcopy(type), H5Tclose};
 }
 
-/// Whether H5Dget_chunk_storage_size(), which just failed, did so for a chunk that was never written, not because of a
-/// damaged index: HDF5 1.10 fails in both cases, 1.12 only in the second. In the first case the function itself reports
-/// the error, in the second a function that it called. Reading a voxel would show the difference, too, but fills a
-/// whole chunk.
+/// Call this after H5Dget_chunk_storage_size() has failed. @returns whether it failed because the chunk was never
+/// written, which is an error only in HDF5 1.10, and not because of a damaged index. For a missing chunk, the function
+/// itself reports the error; for a damaged index, a function that it calls. Reading a voxel would show the difference,
+/// too, but fills a whole chunk.
 bool is_of_missing_chunk() {
     const auto look_at_first = [](unsigned, const H5E_error2_t* error, void* found) -> herr_t {
         *static_cast<bool*>(found) = error->func_name == std::string_view("H5D__get_chunk_storage_size");
@@ -154,7 +154,7 @@ void Hdf5Dataset::read_shape(hid_t space) {
 }
 
 void Hdf5Dataset::read_filters(hid_t properties) {
-    constexpr int kMaxFilters = 32;  // the library's own limit
+    constexpr int kMaxFilters = 32;  // the HDF5 library's own limit
     const int count = H5Pget_nfilters(properties);
     if (count < 0 || count > kMaxFilters) throw damaged("its filters cannot be read");
     for (int n = 0; n < count; ++n) {
@@ -199,7 +199,7 @@ std::string Hdf5Dataset::filter_names() const {
     return names;
 }
 
-/// A chunk is unpacked as a whole, including its channels and frames, so its size is limited.
+/// Limits the size of a chunk, because it is unpacked as a whole, including all of its channels and frames.
 void Hdf5Dataset::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -251,7 +251,7 @@ void Hdf5Dataset::read_fill(hid_t properties) {
         array_.fill = fill;
 }
 
-/// @returns nothing if the file has no such chunk.
+/// The bytes of a chunk as stored. @returns nothing if the file has no such chunk.
 std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>& begin, unsigned& skipped) const {
     const std::vector<hsize_t> offset(begin.begin(), begin.end());
     hsize_t stored = 0;
@@ -273,7 +273,7 @@ std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>&
     return packed;
 }
 
-/// Lets the library read a box into memory of this shape; nothing is written outside of the box.
+/// Reads a box with the HDF5 library into memory of this `shape`; elements beyond the dataset are left unchanged.
 void Hdf5Dataset::read_box(const std::vector<std::uint64_t>& begin, const std::vector<std::uint64_t>& shape,
                            void* out) const {
     const std::vector<hsize_t> offset(begin.begin(), begin.end()), memory(shape.begin(), shape.end()),

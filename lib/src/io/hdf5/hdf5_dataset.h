@@ -18,7 +18,7 @@ public:
     Hdf5Dataset(std::shared_ptr<const Hdf5File> file, const std::string& name);
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< "FILE.h5:/name", for messages
-    /// The array with the chunks of the file; a dataset without chunks is divided into bricks.
+    /// The array, with the chunks of the file; if the dataset has no chunks, with bricks that are read separately.
     [[nodiscard]] const ChunkedArray& array() const noexcept { return array_; }
     /// Position in the file at which all values are stored contiguously; empty if they are not contiguous.
     [[nodiscard]] std::optional<std::uint64_t> offset() const noexcept { return offset_; }
@@ -46,11 +46,11 @@ private:
     Hdf5Id dataset_, type_;
     ChunkedArray array_;
     std::vector<Hdf5Filter> filters_;
-    bool as_packed_ = false;  ///< chunks are read in packed form and unpacked here
+    bool as_packed_ = false;  ///< the HDF5 library reads packed chunks, and undo_filters() unpacks them
     std::optional<std::uint64_t> offset_;
 };
 
-/// The shape alone, and whether the elements are numbers, without the information that is needed to read them.
+/// The shape of a dataset, and whether its elements are numbers.
 struct Hdf5Shape {
     std::vector<std::uint64_t> shape;
     bool has_numbers = false;

@@ -19,7 +19,7 @@ std::mutex& library_mutex() {
     return mutex;
 }
 
-// Number of locks that this thread holds; only the first locks the mutex.
+// Number of objects Hdf5Lock that this thread holds; only the first of them locks the mutex.
 thread_local int held_locks = 0;
 
 herr_t refuse_link(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) { return -1; }
@@ -100,7 +100,7 @@ Hdf5File::Hdf5File(std::string path) : path_(std::move(path)) {
     std::error_code status;
     bytes_ = std::filesystem::file_size(path_, status);
     const Hdf5Id how(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    // The file stays open until all its objects are closed; some network file systems do not support locks.
+    // The file stays open until all its objects are closed. It is locked unless the file system does not support this.
     H5Pset_fclose_degree(how.get(), H5F_CLOSE_WEAK);
     H5Pset_file_locking(how.get(), true, true);
     file_ = Hdf5Id(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, how.get()), H5Fclose);

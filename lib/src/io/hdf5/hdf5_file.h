@@ -10,8 +10,8 @@
 // HDF5 files, through the HDF5 library. Their contents are untrusted.
 namespace covol::detail {
 
-/// While one of these exists, only its thread uses the HDF5 library, which need not be thread-safe, and the library
-/// prints no messages. A thread may hold several. ITK's readers use the same library.
+/// While an object of this class exists, only its thread uses the HDF5 library, which need not be thread-safe, and the
+/// library prints no messages. A thread may hold several objects. Calls of ITK's HDF5 reader need the lock, too.
 class Hdf5Lock {
 public:
     Hdf5Lock();
@@ -29,7 +29,7 @@ class Hdf5Id {
 public:
     using Close = herr_t (*)(hid_t);
     Hdf5Id() = default;
-    /// Takes ownership of what a function of the library returned; < 0 means that it failed.
+    /// Takes ownership of an ID that a function of the library has returned; a negative ID means that it failed.
     Hdf5Id(hid_t id, Close close) : id_(id), close_(close) {}
     Hdf5Id(Hdf5Id&& other) noexcept;
     Hdf5Id& operator=(Hdf5Id&& other) noexcept;
@@ -67,7 +67,7 @@ public:
 
     /// The numbers of an attribute; empty if there is none, or if it has another type or too many elements.
     [[nodiscard]] std::vector<double> numbers(const std::string& object, const char* attribute) const;
-    /// The text of an attribute, which may be a list of characters; empty if there is none.
+    /// The text of an attribute, which may be stored as a list of characters; empty if there is none.
     [[nodiscard]] std::string text(const std::string& object, const char* attribute) const;
     /// The texts of an attribute that is a list.
     [[nodiscard]] std::vector<std::string> texts(const std::string& object, const char* attribute) const;

@@ -39,7 +39,8 @@ Bytes unshuffle(const Bytes& bytes, std::uint64_t width) {
     return out;
 }
 
-/// M. Lehmann's LibLZF: runs of literals, and back-references of 13 bits.
+/// Unpacks the format of M. Lehmann's LibLZF: runs of literal bytes, and references to earlier output with 13-bit
+/// distances.
 Bytes unpack_lzf(const std::string& path, const Bytes& packed, std::uint64_t expected) {
     constexpr unsigned kLongestRun = 32, kLongLength = 7;
     Bytes out(expected);
@@ -65,7 +66,7 @@ Bytes unpack_lzf(const std::string& path, const Bytes& packed, std::uint64_t exp
         if (in == end) throw damaged(path, "LZF");
         const std::uint64_t back = ((control & 0x1FU) << 8U) + *in++ + 1;
         if (back > made || length > expected - made) throw damaged(path, "LZF");
-        // one by one, because a reference may overlap its own output
+        // Bytes are copied one by one, because a reference may overlap the output that it produces.
         for (std::uint64_t n = 0; n < length; ++n, ++made) out.data()[made] = out.data()[made - back];
     }
     out.shrink(made);
@@ -78,8 +79,8 @@ std::uint64_t big_endian(const char* bytes, int width) {
     return value;
 }
 
-/// Big-endian: 8 bytes with the size, 4 bytes with the size of a block, then each block after 4 bytes with its packed
-/// size.
+/// Unpacks the format of HDF5's LZ4 filter. All numbers are big-endian: the size (8 bytes) and the block size
+/// (4 bytes), then for each block its packed size (4 bytes) and its data.
 Bytes unpack_lz4(const std::string& path, const Bytes& packed, std::uint64_t expected) {
     constexpr std::uint64_t kHeader = 12, kMaxBlock = std::uint64_t(1) << 30;
     if (packed.size() < kHeader || big_endian(packed.data(), 8) != expected) throw damaged(path, "LZ4");

@@ -14,12 +14,12 @@ struct Hdf5Filter {
     std::string name;
 };
 
-/// Whether undo_filters() supports all of them: shuffle, and at most one of gzip, LZF, Blosc, Zstandard and LZ4. It
-/// works in parallel, whereas the library uses a single thread and supports only some of these filters.
+/// Whether undo_filters() supports the filters: shuffle, and at most one of gzip, LZF, Blosc, Zstandard and LZ4.
+/// Several threads can call it, whereas one thread at a time uses the HDF5 library, which may lack some of the filters.
 bool can_undo(const std::vector<Hdf5Filter>& filters);
 
 /// Reverses the filters, the last first. Sizes are checked before memory is allocated.
-/// @param passed_over  a bit for each filter that was not applied to this chunk
+/// @param passed_over  bit mask of the filters that were not applied to this chunk
 /// @throws Error InvalidInput, with `path`, unless the result has `expected` bytes.
 Bytes undo_filters(const std::string& path, const std::vector<Hdf5Filter>& filters, unsigned passed_over, Bytes bytes,
                    std::uint64_t expected);

@@ -82,7 +82,7 @@ private:
             throw read_error(Errc::InvalidInput, dataset.path(),
                              "expected " + std::to_string(layout_.letters.size()) + " dimensions, got " +
                                  std::to_string(shape.size()));
-        if (info_.geometry.size[0] == 0) return dataset;  // the first one
+        if (info_.geometry.size[0] == 0) return dataset;  // the first dataset; it determines the size and type
         bool same = dataset.array().type == info_.type;
         for (int a = 0; a < 3; ++a) same = same && shape[axes_.space[a]] >= std::uint64_t(info_.geometry.size[a]);
         if (!same)
@@ -92,7 +92,7 @@ private:
         return dataset;
     }
 
-    /// The position of values that are contiguous in the file as in an unpacked image, and so may be mapped.
+    /// The position of a volume that is stored uncompressed and contiguously, i fastest; empty if it is not.
     [[nodiscard]] std::optional<PixelPlace> place_in(const Hdf5Dataset& dataset, const PixelRequest& request) const {
         const ChunkedArray& array = dataset.array();
         const std::string& letters = layout_.letters;
@@ -114,7 +114,7 @@ private:
         if (*dataset.offset() > file_->bytes() || volumes > file_->bytes() / volume)
             throw read_error(Errc::InvalidInput, dataset.path(), "damaged or truncated: it lies beyond the file's end");
         place.file_offset = *dataset.offset() + volumes * volume;
-        // Values that cannot be mapped would be read as a whole; bricks are read when they are needed.
+        // A large volume that cannot be mapped is read in bricks on demand, not as a whole.
         const bool mappable = place.as_stored() && place.file_offset % width == 0;
         if (!mappable && is_worth_mapping(volume)) return std::nullopt;
         return place;

@@ -11,14 +11,14 @@ namespace covol::detail {
 struct Hdf5Name {
     std::string path, inside;
 };
-/// @returns an empty `inside` if `text` names only a file; nothing if the name is not that of an HDF5 file.
+/// @returns an empty `inside` if `text` names only a file; nothing if `text` does not name an HDF5 file.
 std::optional<Hdf5Name> split_hdf5_name(const std::string& text);
 
 /// Whether the file as a whole is an image in ITK's own layout, which ITK reads. @throws Error InvalidInput.
 bool is_itk_hdf5(const Hdf5Name& name);
 
 /// An image in an HDF5 file in the layout of Imaris, BigDataViewer or ilastik, or any dataset of grey values.
-/// @throws Error InvalidInput (damaged), Io, Unsupported (types, filters, several datasets: lists them).
+/// @throws Error InvalidInput (damaged), Io, Unsupported (types, filters; several datasets, which the message lists).
 std::unique_ptr<ImageFile> open_hdf5(const Hdf5Name& name);
 
 }  // namespace covol::detail

@@ -13,26 +13,26 @@ namespace covol::detail {
 
 /// An image in one of the layouts. If channels and frames are separate datasets, all have the same type and size.
 struct Hdf5Layout {
-    ImageInfo info;               ///< all except size, type, order and chunks
+    ImageInfo info;               ///< all members except for size, type, order and chunks
     std::string letters = "zyx";  ///< of a dataset's dimensions: x, y, z, c, t, or ? for one with a single element
-    bool in_datasets = false;     ///< each channel and frame is a dataset; info then has their numbers
+    bool in_datasets = false;     ///< each channel and frame is a dataset; `info` then has the counts
     std::function<std::string(std::uint64_t channel, std::uint64_t frame)> dataset;  ///< name of the dataset
     std::vector<std::string> coarser;  ///< names of a pyramid's coarser levels, finest first
-    std::optional<Index3> size;        ///< if datasets are padded
+    std::optional<Index3> size;        ///< size without padding, if the datasets may be padded
     bool is_unsigned = false;          ///< 16-bit integers are unsigned, even if the file declares them as signed
 };
 
 /// A level of a pyramid: "/name: 512 x 512 x 100, spacing 0.4 x 0.4 x 1".
 std::string level_text(const std::string& name, const Index3& size, const Vec3& spacing);
 
-/// The number after a word, as in "TimePoint 12" or "s07"; nothing if a name is not of that form.
+/// The number that follows `word` in a name such as "TimePoint 12" or "s07"; nothing if the name has another form.
 std::optional<int> number_after(const std::string& name, const std::string& word);
 
-/// The parts of "a/b/c"; empty ones are omitted.
+/// Splits "a/b/c" at the slashes; empty parts are omitted.
 std::vector<std::string> parts_of(const std::string& name);
 
-/// Each of the functions below is given the path within the file, or an empty one. @returns nothing if the file, or the
-/// object at that path, does not have the layout. @throws Error as read_image().
+/// For each of the functions below, `inside` is a path within the file, or empty. @returns nothing if the file, or the
+/// object at `inside`, does not have the layout. @throws Error as read_image().
 
 /// Imaris 5.5 and later: /DataSet/ResolutionLevel L/TimePoint T/Channel C/Data, described in /DataSetInfo.
 /// https://imaris.oxinst.com/support/imaris-file-format
@@ -41,8 +41,8 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
 /// BigDataViewer: tNNNNN/sNN/L/cells, with voxel sizes in an XML file of the same name. https://imagej.net/plugins/bdv/
 std::optional<Hdf5Layout> big_data_viewer_layout(const Hdf5File& file, const std::string& inside);
 
-/// A dataset given by its path, or the only one of three dimensions. ilastik's axistags state the meaning of each
-/// dimension. https://www.ilastik.org/documentation/basics/dataselection
+/// The dataset at `inside`, or the only dataset with at least three dimensions. If it has ilastik's attribute axistags,
+/// this states the meaning of each dimension. https://www.ilastik.org/documentation/basics/dataselection
 Hdf5Layout plain_layout(const Hdf5File& file, const std::string& inside);
 
 }  // namespace covol::detail

@@ -55,7 +55,7 @@ public:
         }
     }
     [[nodiscard]] bool is_known() const { return known_; }
-    /// Spacing of the finest level.
+    /// Spacing of the finest level, which has this size.
     [[nodiscard]] Vec3 spacing(const Index3& size) const {
         Vec3 spacing{1, 1, 1};
         for (int a = 0; known_ && a < 3; ++a) spacing[a] = side_[a] / size[a];
@@ -85,17 +85,17 @@ Shape padded_size(const Hdf5File& file, int level, int time, int channel) {
     return {shape[2], shape[1], shape[0]};
 }
 
-/// A count that is stored as an attribute of a group.
+/// Reads a positive count from an attribute of a group.
 std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& group, const std::string& name) {
     const auto count = to_number<std::uint64_t>(trim(file.text(group, name.c_str())));
     return count && *count > 0 ? count : std::nullopt;
 }
 
-/// The size without the padding to whole chunks: stated by the channel, otherwise derived from the size of the finest
-/// level, which the image states.
+/// The size of a level without the padding to whole chunks. It is stated by the channel; otherwise it is derived from
+/// the size in /DataSetInfo/Image, which is that of the finest level.
 struct ImarisSize {
     Index3 size{};
-    std::string field;  ///< the attribute that states it; empty if none does, and the array's size is used
+    std::string field;  ///< the attributes that state the size; empty if there are none: it is then the array's size
     bool is_known = true;
 };
 
@@ -127,8 +127,8 @@ ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
     return found;
 }
 
-/// Each voxel of a level covers 1, 2, 4, ... fine voxels along each axis; a last odd one is either dropped or gets a
-/// voxel of its own.
+/// The number of fine voxels that a coarse voxel covers along each axis, a power of two. The ratio of the sizes is
+/// rounded, because an incomplete coarse voxel at the end may be omitted or stored.
 Vec3 factors(const Index3& fine, const Index3& coarse) {
     Vec3 factor;
     for (int a = 0; a < 3; ++a)
@@ -177,7 +177,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     layout.size = size_of(file, choice->level, time, channel).size;
     const Vec3 factor = factors(fine, *layout.size);
     info.geometry.spacing = times(extent.spacing(fine), factor);
-    // ExtMin is the corner of the first voxel.
+    // ExtMin is the outer corner of the first voxel; the origin is the voxel's centre.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
     // If the stated size of the image exceeds its array, it is unknown how many voxels the extent covers.

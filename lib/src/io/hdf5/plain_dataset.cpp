@@ -9,14 +9,15 @@
 namespace covol::detail {
 namespace {
 
-/// "50 x 1024 x 1024"
+/// The shape as a text, such as "50 x 1024 x 1024".
 std::string shape_text(const std::vector<std::uint64_t>& shape) {
     std::string text;
     for (const std::uint64_t n : shape) text += (text.empty() ? "" : " x ") + std::to_string(n);
     return text;
 }
 
-/// The only dataset of three dimensions or more. @throws Error Unsupported if there are several: lists them.
+/// The only dataset of numbers with at least three dimensions. @throws Error Unsupported if there is none, or several,
+/// which the message lists.
 std::string only_dataset(const Hdf5File& file, const std::string& group) {
     constexpr std::size_t kShown = 20;
     std::vector<std::string> names;
@@ -38,7 +39,7 @@ std::string only_dataset(const Hdf5File& file, const std::string& group) {
                          file.path_of(names.front()) + "`: " + list);
 }
 
-/// The meaning of each dimension.
+/// Determines the meaning of each dimension of a dataset.
 class Axes {
 public:
     Axes(const Hdf5File& file, std::string name) : file_(file), name_(std::move(name)), shape_(shape_of(file, name_)) {
@@ -52,7 +53,7 @@ public:
         }
     }
     [[nodiscard]] const std::string& letters() const { return letters_; }
-    /// "axistags: zyxc"
+    /// How the axes were determined, such as "axistags: zyxc".
     [[nodiscard]] const std::string& source() const { return source_; }
     /// Resolution along x, y, z from axistags; 0 if they do not state it.
     [[nodiscard]] const Vec3& resolution() const { return resolution_; }
@@ -82,7 +83,7 @@ private:
         return true;
     }
 
-    /// From HDF5's own dimension labels.
+    /// Uses HDF5's dimension labels. @returns false if they do not name all dimensions
     bool from_labels() {
         const std::vector<std::string> labels = file_.texts(name_, "DIMENSION_LABELS");
         std::string letters;
@@ -94,7 +95,7 @@ private:
         return true;
     }
 
-    /// By the order z, y, x, without the dimensions of one element.
+    /// Assumes the order z, y, x. If there are more than three dimensions, those of one element are left out.
     void by_order() {
         std::vector<std::size_t> wide;
         for (std::size_t d = 0; d < shape_.shape.size(); ++d)
@@ -116,7 +117,8 @@ private:
     Vec3 resolution_{0, 0, 0};
 };
 
-/// Reads the spacing along z, y, x (or all dimensions) from an attribute with one of the usual names.
+/// Reads the spacing from an attribute with one of the usual names, which has a number for each of z, y, x or for each
+/// dimension; otherwise from axistags.
 void describe_spacing(const Hdf5File& file, const std::string& name, const Axes& axes, ImageInfo& info) {
     info.spacing_known = {false, false, false};
     const std::string unit = file.text(name, "unit"), units = file.text(name, "units");

@@ -24,7 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 using std::string_view;
 
-/// The categories "layout", "representation", "parameter" and "source" of a header. Histories and sensors are skipped.
+/// The lines of a header in the categories "layout", "representation", "parameter" and "source". The categories
+/// "history" and "sensor" are skipped.
 class IcsHeader {
 public:
     /// @throws Error InvalidInput.
@@ -40,7 +41,7 @@ public:
     [[nodiscard]] int version() const { return version_; }
     /// Position of the first byte after the line "end".
     [[nodiscard]] std::uint64_t end() const { return end_; }
-    /// The values of a line, for example of "layout sizes"; none if there is no such line.
+    /// The words after the key of a line, for example after "layout sizes"; none if there is no such line.
     [[nodiscard]] const std::vector<std::string>& values(const std::string& key) const {
         static const std::vector<std::string> none{};
         const auto found = lines_.find(key);
@@ -56,7 +57,8 @@ public:
         for (const std::string& value : values(key)) text += (text.empty() ? "" : " ") + value;
         return text;
     }
-    /// A finite number. @throws Error InvalidInput for any other text.
+    /// The value with index `at` of a line as a number; nothing if there is none. @throws Error InvalidInput if it is
+    /// not a finite number.
     [[nodiscard]] std::optional<double> number(const std::string& key, std::size_t at) const {
         if (at >= values(key).size()) return std::nullopt;
         const std::optional<double> value = to_number(values(key)[at]);
@@ -96,7 +98,7 @@ private:
         return words;
     }
 
-    /// Whether this is the line "end".
+    /// Takes the words of one line. @returns whether it is the line "end"
     bool take(std::vector<std::string> words) {
         if (version_ == 0) {
             if (words.size() < 2 || lower(words[0]) != "ics_version" || (words[1] != "1.0" && words[1] != "2.0"))
@@ -121,13 +123,13 @@ private:
     std::map<std::string, std::vector<std::string>> lines_;
 };
 
-/// The axes after the bits of a voxel, which come first: x, y and z, then channels and frames in either order.
+/// The sizes that a header states: bits of a voxel, then x, y and z, then channels and frames in either order.
 struct IcsAxes {
     std::uint64_t bits = 0;
     std::array<std::uint64_t, 3> size{1, 1, 1};
     int channels = 1, frames = 1;
-    bool channels_first = true;  ///< they vary faster than the frames
-    std::string order;           ///< "XYZCT"
+    bool channels_first = true;  ///< channels vary faster than frames
+    std::string order;           ///< fastest first, for example "XYZCT"
 };
 
 IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
@@ -193,7 +195,7 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
                          "expected integers of 8, 16 or 32 bits, or reals of 32 or 64 bits, got the format " +
                              quote(format) + " with " + std::to_string(bits) + " bits");
     place.type = type->type;
-    // For each stored byte its significance from 1, the lowest: 1 2 in little endian, 2 1 in big endian.
+    // The line gives the significance of each stored byte; 1 is the lowest. "1 2" is little-endian, "2 1" big-endian.
     const std::vector<std::string>& order = header.values("representation byte_order");
     const std::size_t bytes = bits / 8;
     bool little = true, big = true;
@@ -208,8 +210,8 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
     place.swap = bytes > 1 && big == (std::endian::native == std::endian::little);
 }
 
-/// Spacing and origin, converted to the unit of x. libics writes a scale of 1 and the unit "undefined" if it knows
-/// none.
+/// Sets spacing and origin, converted to the unit of x. libics writes a scale of 1 and the unit "undefined" if the
+/// spacing is not known.
 void set_geometry(const IcsHeader& header, ImageInfo& info) {
     ImageGeometry& geometry = info.geometry;
     const std::vector<std::string>& units = header.values("parameter units");
@@ -236,7 +238,7 @@ void set_geometry(const IcsHeader& header, ImageInfo& info) {
 /// A file whose channels and frames are whole volumes, stored one after another.
 class IcsFile : public ImageFile {
 public:
-    /// @param volumes  the same voxels with channels * frames frames and one channel
+    /// @param volumes  the same voxels as an image with one channel and channels * frames frames
     IcsFile(std::unique_ptr<ImageFile> volumes, const ImageInfo& info, bool channels_first)
         : volumes_(std::move(volumes)), channels_first_(channels_first) {
         info_ = info;

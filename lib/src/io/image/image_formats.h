@@ -14,14 +14,14 @@ namespace covol::detail {
 std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run);
 
 /// NIfTI-1 in one file (.nii, .nii.gz). The positions of voxels are taken from the sform if sform_code > 0, else from
-/// the qform if qform_code > 0, else from pixdim with the image's middle at 0: nibabel's rule. If both forms have codes
-/// and differ by more than half a voxel, a warning is reported.
+/// the qform if qform_code > 0, else from pixdim with the image's centre at 0, as in nibabel. A warning is reported if
+/// the sform is not invertible (the qform is then used), or if both forms differ by more than half a voxel.
 std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
 /// ITK's reader for files with this extension.
 OpenWithItk* itk_reader_of(const std::string& path);
 
-/// An HDF5 file, in ITK's layout or another.
+/// Opens an HDF5 file in ITK's layout or in any other supported layout.
 std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name);
 
 /// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
@@ -33,13 +33,13 @@ std::unique_ptr<ImageFile> open_ics(const std::string& path);
 /// NumPy's .npy: an array of three axes z, y, x, in C's or Fortran's order.
 std::unique_ptr<ImageFile> open_npy(const std::string& path);
 
-/// The series in a folder, or the one that a file belongs to; its slices are sorted by position.
-/// @param frame  the volume (of several times, echoes or stacks) whose geometry is reported; by default the first
-/// @throws Error Unsupported if a folder holds several series: lists them.
+/// The series in a folder, or the series that a file belongs to; its slices are sorted by position.
+/// @param frame  index of the volume (time, echo or stack) whose geometry is reported; by default the first
+/// @throws Error Unsupported if a folder holds several series, which the message lists.
 std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int> frame, const RunContext& run);
 
-/// A float grid as an image, on the bounding box of its active voxels. @param name  the grid's, or empty for the file's
-/// first float grid
+/// A float grid as an image, on the bounding box of its active voxels. @param name  of the grid; if it is empty, the
+/// first float grid of the file is used
 std::unique_ptr<ImageFile> open_vdb_image(const std::string& path, const std::string& name);
 
 }  // namespace covol::detail

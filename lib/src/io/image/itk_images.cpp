@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Reads the unit, whether there is a spacing at all, and the fields that were used.
+/// Sets the unit, spacing_known, and the header fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
     std::string unit = header.value_of({"distanceunits", "unit"});
     if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
@@ -62,7 +62,8 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
         if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
 }
 
-/// Empty for rare variants that are left to ITK: ASCII pixels, one file for each slice, a header to skip.
+/// Position of the pixels of a MetaImage. Empty for variants that ITK reads: ASCII pixels, one file for each slice, a
+/// header of the data file that is skipped.
 std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
     const std::string file = header.data_file();
     if (header.has_value("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
@@ -78,8 +79,8 @@ std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// Empty for rare variants that are left to ITK: text and bzip2, several data files, skipped lines, channels that are
-/// not the first axis.
+/// Position of the pixels of a NRRD. Empty for variants that ITK reads: text and bzip2, several data files, skipped
+/// lines or bytes, channels that are not the first axis.
 std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader& header, PixelType type, int channels) {
     const std::string file = header.data_file(), encoding = lower(header.value("encoding"));
     PixelPlace place;
@@ -99,19 +100,19 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// MetaIO prints missing fields of a header on std::cerr, so such headers are rejected before they reach it.
+/// Rejects headers without the required fields, because MetaIO prints messages about them on std::cerr.
 void require_meta_header(const TextHeader& header, const std::string& unusable) {
     for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
         if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
-    // MetaIO allocates arrays for any number of dimensions that is stated here.
+    // MetaIO allocates arrays of any length that this field states.
     const std::string dimensions = header.value("ndims");
     if (dimensions.size() > 2 || dimensions.find_first_not_of("0123456789") != std::string::npos ||
         std::stoi(dimensions) < 1 || std::stoi(dimensions) > 10)
         throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
-/// Images that only ITK can read. They are read as a whole in the separate program, because ITK's readers of text and
-/// of lists crash on damaged files; HDF5 is read in boxes, by `reader`.
+/// Images whose pixels ITK reads. They are read as a whole in the separate program, because ITK's readers of text and
+/// of lists of files crash on damaged files. HDF5 images of three dimensions are read in boxes, by `reader`.
 class ItkFile : public ImageFile {
 public:
     ItkFile(std::string path, std::string unusable, ImageInfo info, std::vector<std::uint64_t> size,
@@ -127,7 +128,7 @@ public:
     ~ItkFile() override {
         std::optional<Hdf5Lock> lock;
         if (reader_) lock.emplace();
-        reader_ = nullptr;  // closes the file
+        reader_ = nullptr;  // closes the file while the lock is held
     }
     ItkFile(const ItkFile&) = delete;
     ItkFile& operator=(const ItkFile&) = delete;
@@ -224,7 +225,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     if (is_meta) require_meta_header(*header, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    // ITK's readers abort or do not terminate if headers are inconsistent; an HDF5 file has already been tried.
+    // ITK's readers abort or do not terminate if headers are inconsistent, so they run in the separate program; an HDF5
+    // file has already been tried there.
     std::unique_ptr<ItkReader> reader = is_hdf5 ? itk_reader_of(path)(path, unusable) : nullptr;
     const ItkHeader image = reader ? reader->header() : header_by_itk(path, unusable);
 

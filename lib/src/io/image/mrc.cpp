@@ -37,7 +37,7 @@ private:
         if (swap_) swap_bytes(&value, 1, sizeof(T));
         return value;
     }
-    /// Plausibility check of the byte order: small numbers are huge in the wrong one.
+    /// Whether the byte order is plausible: in the wrong byte order, small numbers become huge or negative.
     [[nodiscard]] bool is_sound() const {
         constexpr std::int32_t kHuge = 1 << 24;
         bool sound = integer(kMode) >= 0 && integer(kMode) < 128 && integer(kExtended) >= 0;
@@ -52,7 +52,8 @@ private:
 void set_type(const std::string& path, const Header& header, ImageInfo& info, PixelPlace& place) {
     switch (header.integer(kMode)) {
         case 0: {
-            // Signed in the standard; unsigned in older files, and in IMOD's files unless a flag is set.
+            // MRC2014 prescribes signed bytes. IMOD's files have unsigned bytes unless a flag is set. Other files have
+            // unsigned bytes if their minimum is at least 0 and their maximum exceeds 127.
             const bool imod = header.integer(kImodStamp) == kImod;
             const bool is_unsigned =
                 imod ? (header.integer(kImodFlags) & 1) == 0 : header.number(kMin) >= 0 && header.number(kMax) > 127;
@@ -73,7 +74,7 @@ void set_type(const std::string& path, const Header& header, ImageInfo& info, Pi
     info.type = place.type;
 }
 
-/// The world axis of the file's columns, rows and sections. @throws Error InvalidInput.
+/// The world axes along the file's columns, rows and sections. @throws Error InvalidInput.
 std::array<int, 3> axes_of(const std::string& path, const Header& header) {
     std::array<int, 3> axes{};
     int seen = 0;
@@ -81,7 +82,7 @@ std::array<int, 3> axes_of(const std::string& path, const Header& header) {
         axes[a] = header.integer(kAxes + 4 * a);
         if (axes[a] >= 1 && axes[a] <= 3) seen |= 1 << axes[a];
     }
-    // old programs leave zeros
+    // Old programs write zeros, which mean the order x, y, z.
     if (axes == std::array<int, 3>{0, 0, 0}) return {0, 1, 2};
     if (seen != 0b1110)
         throw read_error(Errc::InvalidInput, path,

@@ -1,4 +1,4 @@
-// NIfTI-1. ITK reads headers too, but refuses sheared lattices, and has its own rule for choosing between the forms.
+// NIfTI-1. ITK's reader is not used: it rejects sheared lattices, and chooses between sform and qform by another rule.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -53,7 +53,7 @@ std::optional<PixelType> nifti_type(int code) {
     }
 }
 
-/// The 348 bytes that a NIfTI-1 file begins with.
+/// The header of a NIfTI-1 file: its first 348 bytes.
 class NiftiHeader {
 public:
     /// @throws Error InvalidInput, Unsupported (NIfTI-2).
@@ -99,7 +99,7 @@ private:
     bool swap_ = false;
 };
 
-/// Empty if the file is not in one piece or does not hold grey values. Adds the fields to `info`.
+/// Position of the pixels; empty if they are in another file or are not grey values. Adds header fields to `info`.
 std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
     const auto type = nifti_type(header.integer(70));
     const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
@@ -122,7 +122,7 @@ std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace pla
     return place;
 }
 
-/// Spacing from pixdim, which may be negative.
+/// The spacing: the absolute values of pixdim, which may be negative.
 Vec3 pixdim_of(const NiftiHeader& header) {
     return {std::abs(header.number(80)), std::abs(header.number(84)), std::abs(header.number(88))};
 }
@@ -136,12 +136,12 @@ NiftiAffine sform_of(const NiftiHeader& header) {
     return sform;
 }
 
-/// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h, method 2
+/// The qform as "method 2" of https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h.
 NiftiAffine qform_of(const NiftiHeader& header) {
     double b = header.number(nifti::kQuatern), c = header.number(nifti::kQuatern + 4),
            d = header.number(nifti::kQuatern + 8);
     const double square = b * b + c * c + d * d, a = std::sqrt(std::max(0.0, 1 - square));
-    if (square > 1)  // a rotation by 180 degrees, rounded up
+    if (square > 1)  // rounding errors of a rotation by 180 degrees
         for (double* part : {&b, &c, &d}) *part /= std::sqrt(square);
     NiftiAffine qform;
     qform.matrix = {{{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
@@ -167,7 +167,7 @@ NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     return base;
 }
 
-/// The maximum distance between the two positions of a corner voxel.
+/// The maximum distance between the positions that the two maps give to a corner voxel.
 double distance_between(const NiftiAffine& p, const NiftiAffine& q, const Index3& size) {
     double maximum = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -218,7 +218,7 @@ public:
     }
 
 private:
-    /// Converts the file's RAS to LPS.
+    /// Sets the geometry from an affine map, and converts it from RAS to LPS.
     void use(const NiftiAffine& affine, bool by_sform) {
         ImageGeometry& g = info_.geometry;
         const Vec3 pixdim = pixdim_of(header_);

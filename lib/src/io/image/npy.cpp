@@ -18,7 +18,7 @@ struct NpyHeader {
     std::uint64_t end = 0;  ///< position of the first value
 };
 
-/// The text between the colon after a key and the end of its value.
+/// The value of a key in the header's dictionary, without quotes and parentheses at its end; empty if there is none.
 std::string value_of(const std::string& dictionary, const std::string& key) {
     std::size_t at = dictionary.find("'" + key + "'");
     if (at != std::string::npos) at = dictionary.find(':', at);
@@ -78,7 +78,7 @@ void set_type(const std::string& path, const std::string& descr, PixelPlace& pla
                          "; save array.astype(\"float32\")");
 }
 
-/// The shape in the order of the file.
+/// Parses a shape such as "(58, 512, 512"; the sizes are in the order of the text.
 std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string& shape) {
     std::vector<std::string_view> words;
     std::vector<std::uint64_t> sizes;
@@ -96,7 +96,7 @@ std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string
     return {sizes[0], sizes[1], sizes[2]};
 }
 
-/// An array in Fortran order, which is an array in C order with the axes reversed.
+/// An array in Fortran order. It is read as an array in C order whose axes are reversed.
 class FortranFile : public ImageFile {
 public:
     FortranFile(const std::string& path, const ImageInfo& info, const PixelPlace& place) : path_(path) {

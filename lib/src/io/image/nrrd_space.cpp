@@ -10,7 +10,8 @@
 namespace covol::detail {
 namespace {
 
-/// Parses "(1,0,0) (0,1,0) none": a vector for each axis, or none if it has no direction. Empty if it cannot be parsed.
+/// Parses "(1,0,0) (0,1,0) none": for each axis a vector, or nothing if the axis has no direction. The list is empty if
+/// the text cannot be parsed.
 std::vector<std::optional<Vec3>> read_vectors(std::string_view text) {
     std::vector<std::optional<Vec3>> vectors;
     while (!(text = trim(text)).empty()) {
@@ -37,7 +38,7 @@ std::vector<std::optional<Vec3>> read_vectors(std::string_view text) {
     return vectors;
 }
 
-/// Parses "um" "um" "mm".
+/// Parses a list of units such as `"um" "um" "mm"`.
 std::vector<std::string> read_units(const std::string& text) {
     std::vector<std::string> units;
     if (text.find('"') == std::string::npos) {
@@ -54,7 +55,7 @@ std::vector<std::string> read_units(const std::string& text) {
     return units;
 }
 
-/// Factors from the axes of the header's space to those of LPS; 1 for spaces that are not anatomical.
+/// Factors, 1 or -1, that convert coordinates of the header's space to LPS; 1 for spaces that are not anatomical.
 Vec3 to_lps(const std::string& space) {
     Vec3 sign{1, 1, 1};
     std::string letters;
@@ -73,7 +74,7 @@ Vec3 to_lps(const std::string& space) {
     return sign;
 }
 
-/// The header's axes that are the image's i, j and k.
+/// The indices of the header's axes that are the image's axes i, j and k.
 std::vector<std::size_t> space_axes(const TextHeader& header, const std::vector<std::optional<Vec3>>& directions) {
     std::vector<std::size_t> axes;
     std::istringstream words(lower(header.value("kinds")));
@@ -86,7 +87,7 @@ std::vector<std::size_t> space_axes(const TextHeader& header, const std::vector<
     return axes.size() == 3 ? axes : std::vector<std::size_t>{0, 1, 2};
 }
 
-/// Each axis' unit relative to the first axis' unit; 0 if unknown.
+/// The unit of each axis, as a multiple of the unit of the first axis; 0 if it is unknown.
 Vec3 unit_factors(const std::array<std::string, 3>& units) {
     Vec3 factors{1, 1, 1};
     const double first = unit_in_metres(units[0]);
@@ -115,7 +116,7 @@ void restore_nrrd_space(const std::string& path, const TextHeader& header, Image
     }
     if (!of_space.empty() || !of_axes.empty()) g.unit = units[0];
     const Vec3 factors = unit_factors(units);
-    std::array<bool, 3> unknown{};  // along world axes if of_space is set, otherwise along image axes
+    std::array<bool, 3> unknown{};  // per world axis if there are "space units", otherwise per image axis
     for (std::size_t a = 0; a < 3; ++a) {
         unknown[a] = factors[a] == 0;
         if (unknown[a])

@@ -4,10 +4,10 @@
 
 namespace covol::detail {
 
-/// Sets spacing, origin, direction and unit from the header's own `space`, `space directions`, `space origin`, `space
+/// Sets spacing, origin, direction and unit from the fields `space`, `space directions`, `space origin`, `space
 /// units` and `units`, because Debian's ITK flips the wrong axis of a left-anterior-superior space, and ignores units.
-/// Lengths are converted to the first axis' unit. An axis of an unknown unit among known ones has no spacing, and a
-/// warning is reported.
+/// Lengths are converted to the unit of the first axis. If this is not possible for an axis because a unit is unknown,
+/// a warning is reported and the axis has no spacing.
 void restore_nrrd_space(const std::string& path, const TextHeader& header, ImageInfo& info, const RunContext& run);
 
 }  // namespace covol::detail

@@ -15,11 +15,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFiles = 100000;
 
-/// "slice%03d.raw 1 12 1": the names for all numbers, formatted as printf() does with %d, with an optional width and
-/// leading zeros.
+/// Expands a pattern, first, last and step, such as "slice%03d.raw 1 12 1", to the names of all files. The numbers are
+/// formatted as by printf() with %d, with an optional width and leading zeros.
 std::vector<std::string> numbered_files(const std::string& text) {
     std::vector<std::string> names;
-    // The numbers are parsed from the end, because names may contain blanks.
+    // The last % is used, because names may contain this character and blanks.
     const std::size_t percent = text.rfind('%'), letter = text.find('d', percent), blank = text.find(' ', letter);
     if (letter == std::string::npos || blank == std::string::npos) return names;
     const std::string width = text.substr(percent + 1, letter - percent - 1);

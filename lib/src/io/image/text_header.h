@@ -12,7 +12,7 @@ struct TextHeader {
     std::uint64_t end = 0;           ///< position of the pixels if they are in the same file
 
     explicit TextHeader(const std::string& path);
-    /// The text after "key", one of ":", ":=" or "=", and blanks; empty if there is no such line. Keys are lower case.
+    /// The text after "key:", "key:=" or "key =" and blanks; empty if there is no such line. `key` is in lower case.
     [[nodiscard]] std::string value(const std::string& key) const;
     /// The value of the first of the keys that is present.
     [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const;
@@ -24,11 +24,11 @@ struct TextHeader {
 
 private:
     std::string path_;
-    std::vector<std::string> listed_;  ///< the lines after "LIST"
+    std::vector<std::string> listed_;  ///< the names of files in the lines after "LIST"
 };
 
-/// Rejects named pipes, for example, whose reader would wait. @throws Error Io if one of the files exists but is not a
-/// regular file.
+/// Rejects named pipes, for example, because reading from them would wait. @throws Error Io if one of the files exists
+/// but is not a regular file.
 void require_regular_files(const std::string& path, const std::vector<std::string>& files);
 
 }  // namespace covol::detail

@@ -110,8 +110,8 @@ public:
     }
 
 private:
-    /// ImageJ writes stacks over 4 GB with a single directory, and the pixels of the other slices directly after those
-    /// of the first.
+    /// Recognizes stacks over 4 GB as ImageJ writes them: a single directory, and the pixels of the other slices
+    /// directly after those of the first slice.
     void find_single_directory(const std::string& description) {
         const std::uint64_t images = imagej_images(description);
         if (images < 2 || TIFFLastDirectory(tiff_->get()) == 0) return;
@@ -125,7 +125,7 @@ private:
         contiguous_ = *begin;
     }
 
-    /// Rejects files without slices: planes that are all labelled as channels or time points are often slices.
+    /// Rejects files with several channels or time points of a single slice, because they are often mislabelled slices.
     void require_slices() const {
         if (stack_.slices > 1 || stack_.channels * stack_.frames < 2) return;
         std::string there = plane_axes(stack_), list, axes = there;
@@ -141,7 +141,7 @@ private:
 
     void fill_info(const std::string& axes) {
         const bool colour = kind_.samples > 1;
-        // In colour images the samples are the channels; OME counts them in SizeC too.
+        // In colour images, the samples of a pixel are the channels. OME counts them in SizeC, too.
         if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
             throw read_error(Errc::Unsupported, path_, "expected one sample for each pixel of a channel, got several");
         if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
@@ -170,7 +170,7 @@ private:
             info_.chunk_size = tiff_chunk_size(*tiff_, frame_of_kind());
     }
 
-    /// One channel and frame, without its slices.
+    /// The properties that all channels and frames have in common; the slices are not set.
     [[nodiscard]] TiffFrame frame_of_kind() const {
         TiffFrame frame;
         frame.path = path_;
@@ -265,7 +265,7 @@ private:
             if (begins[n] < begins[n - 1] || begins[n] - begins[n - 1] != step) return std::nullopt;
         const std::uint64_t bytes = begins.back() + kind_.bytes() - begins.front();
         if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_))
-            return std::nullopt;  // read() reports the position
+            return std::nullopt;  // read() then reports the slice that is missing
         const auto slab = map_file(path_, begins.front(), bytes);
         const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * kind_.row_bytes() +
                             std::uint64_t(box.min[0]) * width;

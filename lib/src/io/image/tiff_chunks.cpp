@@ -11,11 +11,11 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;  // of a chunk
+constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;  // minimum size of a chunk
 constexpr std::size_t kMaxHandles = 64;                       // maximum number of idle open files
 constexpr std::int32_t kBrick = 256;                          // strips are divided into columns of this width
 
-/// Open files. A libtiff handle can be used by one thread at a time.
+/// A pool of open files, because a libtiff handle can be used by only one thread at a time.
 class TiffHandles {
 public:
     struct Handle {
@@ -48,7 +48,7 @@ public:
         idle_.push_back(std::move(handle));
     }
 
-    /// The offsets of the pages of a file, which are listed once.
+    /// The offsets of the pages of a file, 0 for pages of another kind. The pages are listed only once.
     std::vector<std::uint64_t> pages(std::uint32_t file, const TiffPage& kind) {
         const std::lock_guard<std::mutex> lock(listing_);
         auto found = pages_.find(file);
@@ -88,12 +88,12 @@ public:
         return true;
     }
 
-    /// A strip is as wide as the page, and is unpacked once for all its columns.
+    /// Chunks of one slice are read together: a strip is as wide as the page, and is unpacked once for all its chunks.
     [[nodiscard]] bool in_layers() const noexcept override { return true; }
 
     void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const override {
         const Index3& n = chunk_size();
-        // Chunks are read row by row, so that nothing between them is unpacked, and no strip is unpacked twice.
+        // Neighbouring chunks of a row are read together: no strip is unpacked twice, and none that is not needed.
         for (std::size_t first = 0; first < chunks.size();) {
             std::size_t last = first + 1;
             while (last < chunks.size() && chunks[last][1] == chunks[first][1] &&
@@ -158,7 +158,7 @@ private:
 
     TiffFrame frame_;
     mutable TiffHandles handles_;
-    std::vector<std::uint64_t> offsets_;  ///< a multiple of the strip height
+    std::vector<std::uint64_t> offsets_;  ///< offset of the directory of each slice
 };
 
 }  // namespace
@@ -174,7 +174,7 @@ Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame) {
         chunk[0] = up_to(tiff.tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0), frame.size[0]);
         chunk[1] = up_to(tiff.tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0), frame.size[1]);
     } else if (frame.contiguous == 0) {
-        // whole strips
+        // The height of a chunk is a multiple of the height of a strip if strips are small.
         const auto rows = std::uint64_t(
             up_to(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, std::uint32_t(frame.size[1])), frame.size[1]));
         const std::uint64_t minimum = std::max<std::uint64_t>(kMinBytes / width / std::uint64_t(chunk[0]), 1);

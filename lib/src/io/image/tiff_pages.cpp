@@ -24,7 +24,7 @@ public:
 
     /// Returns false if the page is damaged or truncated.
     bool read(char* out) {
-        // A tile may be larger than the page, but not absurdly so.
+        // A tile may be larger than the page, but only by this number of pixels per side.
         constexpr std::uint64_t kSlack = 65536;
         if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack)
             return false;
@@ -110,7 +110,7 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status)
         throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
-    // m: without mapping, because the mapped pages of packed tiles would stay in memory after they were read
+    // "m" prevents libtiff from mapping the file: mapped pages of packed tiles would stay in memory.
     auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kMinLimit, 4 * bytes));
     if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, path + ": not a usable TIFF file");
     return tiff;

@@ -11,9 +11,9 @@
 
 namespace covol::detail {
 
-/// A directory of a TIFF.
+/// A page (directory) of a TIFF.
 struct TiffPage {
-    std::uint64_t offset = 0;  ///< of the directory in the file
+    std::uint64_t offset = 0;  ///< position of the directory in the file
     std::uint32_t width = 0, height = 0;
     std::uint16_t bits = 0, format = 0, samples = 0;
 
@@ -45,15 +45,16 @@ struct TiffFrame {
     std::string path;
     PixelType type = PixelType::UInt8;
     Index3 size{0, 0, 0};
-    TiffPage kind;                         ///< of every page
-    std::uint64_t sample = 0;              ///< of each pixel
-    std::vector<std::string> files;        ///< of the image
+    TiffPage kind;                         ///< properties that all pages have
+    std::uint64_t sample = 0;              ///< index of the sample that is read of each pixel
+    std::vector<std::string> files;        ///< paths of the files of the image
     std::vector<TiffStack::Plane> slices;  ///< position of each slice
-    std::uint64_t contiguous = 0;          ///< if not 0: a single directory whose slices are contiguous from here
-    bool swapped = false;                  ///< the contiguous slices are in the other byte order
+    std::uint64_t contiguous = 0;          ///< if not 0, position of contiguous slices with a single directory
+    bool swapped = false;                  ///< contiguous slices have the opposite of this machine's byte order
 };
 
-/// The chunk size: tiles, or parts of strips, of about 64 KiB. `tiff` has to be at one of the frame's pages.
+/// The chunk size: tiles, or parts of strips, of at least about 64 KiB. The current page of `tiff` has to be one of the
+/// frame's pages.
 Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame);
 std::shared_ptr<const ChunkSource> tiff_chunks(const TiffFrame& frame, const Index3& chunk_size);
 

@@ -1,4 +1,4 @@
-// The three ways in which programs describe the pages of a TIFF.
+// Descriptions of the pages of a TIFF as written by ImageJ, tifffile and OME.
 #include "io/image/tiff_stack.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// More planes than any microscope acquires; a damaged description may claim more.
+// Maximum number of planes, more than any microscope acquires; a damaged description may claim more.
 constexpr std::uint64_t kMaxPlanes = std::uint64_t(1) << 24;
 
 double to_number(const std::string& text) {
@@ -27,10 +27,10 @@ double to_number(const std::string& text) {
     return status == std::errc() && std::isfinite(value) ? value : 0;
 }
 
-/// Some programs state a negative distance between slices for stacks that go down.
+/// The absolute value, because some programs state a negative distance between slices for descending stacks.
 double to_length(const std::string& text) { return std::abs(to_number(text)); }
 
-/// Removes the rounding error of unit conversions from the last digits.
+/// Rounds to 13 digits, which removes rounding errors of unit conversions.
 double rounded(double length) {
     std::array<char, 32> text{};
     const auto end =
@@ -67,7 +67,8 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     for (std::size_t a = 0; a < 2; ++a) {
         const float spacing = 1.0F / facts.resolution[a];
         if (!std::isfinite(spacing) || !(spacing > 0)) continue;
-        // libtiff returns single precision; the shortest text of this float is the number that was intended (0.35).
+        // libtiff returns single precision. The shortest text that represents this float is the decimal number that the
+        // writer intended, for example 0.35.
         std::array<char, 32> text{};
         const auto end = std::to_chars(text.data(), text.data() + text.size(), spacing).ptr;
         std::from_chars(text.data(), end, stack.spacing[a]);
@@ -108,15 +109,15 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
     if (units[0].empty() && facts.resolution_unit == kInch) units[0] = "inch";
     if (units[0].empty() && facts.resolution_unit == kCentimetre) units[0] = "cm";
     const std::string depth = value("spacing");
-    // Writers that do not know the spacing state one pixel per unnamed unit.
+    // A resolution of 1 without a unit means that the writer did not know the spacing.
     const bool known = !units[0].empty() || facts.resolution[0] != 1.0F || !depth.empty();
     if (!known) return;
     read_resolution(facts, stack);
     stack.spacing[2] = to_length(depth);
-    // ImageJ omits a depth of 1.
+    // ImageJ omits a distance of 1 between slices.
     if (stack.spacing[2] == 0 && stack.spacing[0] > 0) stack.spacing[2] = 1;
     unify_units(stack, units);
-    // The origin is given in voxels, as the position of the voxel at world 0.
+    // ImageJ's origin is the position, in voxels, of the world's point 0.
     const std::array<std::string, 3> origin{value("xorigin"), value("yorigin"), value("zorigin")};
     for (int a = 0; a < 3; ++a)
         if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
@@ -160,7 +161,7 @@ void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     }
     if (json.contains("unit") && json.at("unit").is_string())
         stack.unit = normal_unit(json.at("unit").get<std::string>());
-    // Without a resolution tifffile writes 1/1.
+    // tifffile writes the resolution 1/1 if it is not known.
     if (facts.resolution[0] != 1.0F && facts.resolution_unit == 1) read_resolution(facts, stack);
 }
 
@@ -214,8 +215,8 @@ double ome_unit_in_metres(const std::string& text) {
     return 0;
 }
 
-/// The unit of all axes if they agree, otherwise micrometres. The spacing of an axis with a unit that the schema does
-/// not define is unknown; lengths in a "reference frame" or in pixels have no unit.
+/// Sets the unit: that of the axes if it is the same for all, otherwise the micrometre. An axis whose unit the schema
+/// does not define has no spacing; lengths in "reference frame" or "pixel" have no unit.
 void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     const bool alike = texts[0] == texts[1] && texts[1] == texts[2];
     if (alike && (texts[0] == "reference frame" || texts[0] == "pixel")) return;
@@ -233,7 +234,7 @@ void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     }
 }
 
-/// A <TiffData> element, which states which pages hold which planes.
+/// A <TiffData> element, which assigns planes to pages.
 struct TiffData {
     std::string ifd, plane_count, file;  ///< as written; empty if absent
     std::uint64_t z = 0, c = 0, t = 0;
@@ -255,7 +256,7 @@ OmePixels parse_ome(const std::string& xml) {
     while (tags.next(tag)) {
         if (tag.closing) continue;
         if (tag.name == "BinaryOnly") ome.metadata_file = tag.value("MetadataFile");
-        // Some writers omit <Image>.
+        // Only <Pixels> of the first <Image>, or before any <Image>, is used: some writers omit <Image>.
         if (tag.name == "Image") ++ome.images;
         if (ome.images > 1) continue;
         if (tag.name == "Pixels" && ome.pixels.name.empty()) ome.pixels = tag;
@@ -311,7 +312,8 @@ public:
     }
 
 private:
-    /// A single name that is not this file's means that the file has been renamed.
+    /// Assigns names of files to file numbers. If all planes are in one file of another name that does not exist, this
+    /// file has been renamed, so the name refers to it.
     void name_files(const std::vector<TiffData>& data) {
         const std::string own = fs::path(facts_.path).filename().string();
         numbers_[""] = numbers_[own] = 0;
@@ -365,9 +367,9 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
         const std::string key = std::string("PhysicalSize") + "XYZ"[a];
         stack.spacing[a] = to_length(value(key));
         const std::string unit = value(key + "Unit");
-        units[a] = unit.empty() ? "\xC2\xB5m" : unit;  // the OME schema's default
+        units[a] = unit.empty() ? "\xC2\xB5m" : unit;  // micrometre, the default of the OME schema
     }
-    // An axis without a length needs no unit.
+    // An axis without a spacing gets the unit of another axis, so that it does not affect the common unit.
     for (int a = 0; a < 3; ++a)
         if (stack.spacing[a] == 0) units[a] = units[stack.spacing[0] > 0 ? 0 : stack.spacing[1] > 0 ? 1 : 2];
     read_ome_units(units, stack);
@@ -415,8 +417,8 @@ TiffStack describe_tiff(const TiffFacts& facts) {
     const bool in_order = stack.planes.empty();
     if (in_order && (stack.slices > kMaxPlanes || stack.channels > kMaxPlanes || stack.frames > kMaxPlanes ||
                      stack.slices * stack.channels * stack.frames != facts.pages)) {
-        // The description is outdated because a tool kept it while it changed the pages, so the number of pages is
-        // used.
+        // The description does not match the pages, for example because a program removed pages and kept the
+        // description. All pages are then slices.
         stack.slices = facts.pages;
         stack.channels = stack.frames = 1;
         stack.channel_names.clear();
@@ -453,7 +455,7 @@ void rename_axes(const std::string& path, const std::string& axes, TiffStack& st
                          "the file's axes of planes (" +
                              (list.empty() ? "none" : list) + ") before YX, such as ZCYX; got '" + axes + "'");
     if (stack.slices == 1) {
-        // Discards the default for a distance between slices that the file does not state.
+        // The planes become slices, whose distance is known only if the file states it; the default is discarded.
         const bool stated = std::any_of(stack.fields.begin(), stack.fields.end(), [](const auto& field) {
             return field.first == "spacing" || field.first == "PhysicalSizeZ";
         });

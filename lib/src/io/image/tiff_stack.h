@@ -10,7 +10,7 @@
 
 namespace covol::detail {
 
-/// How the pages of a TIFF, or of several, make up an image; from ImageJ's, OME's or tifffile's description.
+/// How the pages of one or several TIFFs form an image, according to the description by ImageJ, OME or tifffile.
 struct TiffStack {
     /// A page of one of the files; `page` counts the full-resolution directories.
     struct Plane {
@@ -27,9 +27,9 @@ struct TiffStack {
     std::string unit;
     std::vector<std::string> channel_names;
     std::vector<std::string> files;         ///< paths; the first is the file itself
-    std::vector<std::string> descriptions;  ///< paths of files with the OME description of this one
+    std::vector<std::string> descriptions;  ///< paths of files that contain the OME description of this file
     std::vector<Plane>
-        planes;  ///< if pages are not simply in order: slices * channels * frames of them; otherwise empty
+        planes;  ///< the slices * channels * frames planes; empty if these are the file's pages in their order
     std::vector<std::pair<std::string, std::string>> fields;  ///< the header fields that were used
     std::vector<std::string> warnings;
 
@@ -38,7 +38,7 @@ struct TiffStack {
     [[nodiscard]] Plane plane(std::uint64_t z, std::uint64_t c, std::uint64_t t) const;
 };
 
-/// The properties of the file itself.
+/// The properties of a TIFF that libtiff reports.
 struct TiffFacts {
     std::string path;
     std::string description;            ///< tag 270 of the first page
@@ -49,15 +49,16 @@ struct TiffFacts {
     std::function<std::uint64_t(const std::string& path)> count_pages;
 };
 
-/// Plain TIFFs state at most the resolution of a scanner, so their spacing remains unknown.
+/// Determines how the pages form an image. Without such a description, the spacing is unknown, because the resolution
+/// of plain TIFFs is that of a scanner or a screen.
 /// @throws Error InvalidInput, Io (a file of a set is missing).
 TiffStack describe_tiff(const TiffFacts& facts);
 
 /// The axes along which there is more than one plane, slowest first: "TC".
 std::string plane_axes(const TiffStack& stack);
 
-/// Renames the axes along which there is more than one plane, or treats all planes as slices.
-/// @param axes  slowest first, as "ZCYX" or "ZYX"; empty: as stated by the file
+/// Changes the meaning of the axes along which there is more than one plane, or treats all planes as slices.
+/// @param axes  slowest first, for example "ZCYX"; "ZYX": all planes are slices; empty: nothing is changed
 /// @throws Error InvalidInput.
 void rename_axes(const std::string& path, const std::string& axes, TiffStack& stack);
 

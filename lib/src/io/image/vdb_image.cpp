@@ -1,4 +1,4 @@
-// A float grid as an image.
+// Reads a float grid of a .vdb file as an image.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-// Limit for grids with a few distant voxels, whose bounding box is mostly background.
+// Maximum ratio of voxels in the bounding box to active voxels; exceeded by grids with a few distant voxels.
 constexpr std::uint64_t kSparsest = 10000;
 
 class VdbImage : public ImageFile {

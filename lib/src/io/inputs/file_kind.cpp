@@ -55,7 +55,7 @@ FileKind kind_of_file(const std::string& path) {
     if (end == ".nvdb")
         throw Error(Errc::Unsupported, path + ": NanoVDB files are for viewers and are not read; keep the .vdb");
     if (is_one_of(end, kPointEndings) || end == ".laz")
-        return FileKind::Points;  // LAZ is not supported, which its reader reports
+        return FileKind::Points;  // LAZ is not supported; the reader of points reports this
     if (end == ".dcm" && detail::dicom_class(path) == detail::kRtStructureSet) return FileKind::Points;
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;

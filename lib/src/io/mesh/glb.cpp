@@ -1,4 +1,4 @@
-// glTF 2.0 in one file.
+// Reader and writer of glTF 2.0 in one file (.glb).
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -16,9 +16,9 @@
 namespace covol::mesh_io {
 namespace {
 
-/// Reads glTF 2.0 in one file: the triangles of all meshes, placed by their nodes.
+/// Reads the triangles of all meshes of a .glb file, and translates them as their nodes state.
 class GlbReader {
-    static constexpr std::uint64_t kMaxReuse = 8;  // maximum number of times that data may be used
+    static constexpr std::uint64_t kMaxReuse = 8;  // maximum number of times that data may be used on average
 
 public:
     GlbReader(Source& source, std::string_view text) : source_(source), builder_(source), text_(text) {}
@@ -29,7 +29,7 @@ public:
         if (!required.empty()) unsupported("the extension " + required.dump().substr(0, 60));
         const std::vector<Vec3> translations = read_nodes();
         for (std::size_t n = 0; n < translations.size(); ++n) {
-            if (translations[n] != translation_) first_vertex_.clear();  // if data is used again, the positions differ
+            if (translations[n] != translation_) first_vertex_.clear();  // read vertices again
             translation_ = translations[n];
             for (const Json& primitive : member(list("meshes")[n], "primitives", Json::array())) add(primitive);
         }
@@ -85,8 +85,8 @@ private:
             source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
         return all[number.get<std::uint64_t>()];
     }
-    /// A length or a position in the binary chunk. It is limited to the chunk's size, so that sums of a few of them
-    /// cannot overflow.
+    /// An integer of a JSON object: a length, a position or a code. It is limited to the size of the binary chunk or to
+    /// 65536, whichever is larger, so that sums of a few of these numbers cannot overflow.
     std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
         const Json value = member(object, key, otherwise);
         if (!value.is_number_unsigned() ||
@@ -96,7 +96,7 @@ private:
         return value.get<std::uint64_t>();
     }
 
-    /// The translation of each mesh by its nodes, which is used in files whose coordinates are far from 0.
+    /// The translation of each mesh by its nodes. Files with coordinates far from 0 use translations.
     [[nodiscard]] std::vector<Vec3> read_nodes() const {
         std::vector<Vec3> translations(list("meshes").size(), Vec3{0, 0, 0});
         std::vector<bool> is_placed(translations.size(), false);
@@ -149,13 +149,15 @@ private:
         return result;
     }
 
-    /// Meshes may use the same data, but only a few times, because otherwise a small file could yield a huge mesh.
+    /// Counts the bytes that are read. Meshes may use the same data repeatedly, but the sum is limited, because a small
+    /// file could otherwise yield a huge mesh.
     void take(const Accessor& data, std::uint64_t width) {
         if (data.count * width > unread_) source_.fail("its meshes use the same data too often");
         unread_ -= data.count * width;
     }
 
-    /// @return the index of the accessor's first vertex, and their number; primitives may use the same accessor
+    /// Reads the vertices of an accessor unless they were read before: primitives may use the same accessor.
+    /// @return the index of the first vertex, and the number of vertices
     std::pair<std::uint64_t, std::uint64_t> vertices(const Json& number) {
         const Accessor data = accessor(number, "VEC3", 3);
         if (data.component != 5126) unsupported("a mesh whose positions are not floats");
@@ -166,7 +168,7 @@ private:
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
                 const Vec3 at{translation_[0] + p[0], translation_[1] + p[1], translation_[2] + p[2]};
-                builder_.vertex({at[0], -at[2], at[1]});  // from y up, as glTF prescribes, to z up
+                builder_.vertex({at[0], -at[2], at[1]});  // glTF prescribes that y points up; here, z does
             }
         }
         return {known->second, data.count};
@@ -197,7 +199,7 @@ private:
         const std::size_t width = data.component == 5121 ? 1 : data.component == 5123 ? 2 : 4;
         take(data, width);
         for (std::uint64_t n = 0; n < data.count; ++n) {
-            std::uint32_t vertex = 0;  // the machine is little-endian
+            std::uint32_t vertex = 0;  // smaller indices are copied to its first bytes: the machine is little-endian
             std::memcpy(&vertex, data.bytes.data() + n * data.stride, width);
             corner(vertex);
         }

@@ -33,27 +33,27 @@ public:
         mesh_.vertices.push_back(p);
     }
 
-    /// A vertex relative to the mesh's origin. If the first vertex is far from 0, the origin is a point with integer
-    /// coordinates near it. Numbers in single precision lose nothing, because their differences from the origin are
-    /// also in single precision.
+    /// Converts a position to a vertex relative to the mesh's origin. If the first vertex is far from 0, the origin is
+    /// a point near it with integer coordinates. Positions in single precision are not rounded, because their
+    /// differences from the origin are representable in single precision, too.
     std::array<float, 3> held(const Vec3& position) {
         if (vertex_count() == 0) mesh_.origin = choose_mesh_origin({position, position}, 1);
         return {float(position[0] - mesh_.origin[0]), float(position[1] - mesh_.origin[1]),
                 float(position[2] - mesh_.origin[2])};
     }
 
-    /// Triangles with a repeated corner have no area and are omitted.
+    /// Adds a face, cut into triangles. Triangles with a repeated corner have no area and are omitted.
     void face(const std::vector<std::uint32_t>& corners) override {
         if (corners.size() == 3) return triangle(corners[0], corners[1], corners[2]);
         for (const std::uint32_t v : corners)
-            if (v >= vertex_count()) {  // its vertex follows later
+            if (v >= vertex_count()) {  // the vertex may follow later in the file
                 waiting_.push_back(corners);
                 return;
             }
         polygon(corners);
     }
 
-    /// Checks the remaining faces: they may precede the vertices that they refer to.
+    /// Adds the polygons that preceded their vertices in the file, and checks the indices of all triangles.
     TriangleMesh finish() {
         for (const std::vector<std::uint32_t>& corners : waiting_) {
             for (const std::uint32_t v : corners) check(v);

@@ -12,7 +12,7 @@
 
 namespace covol::mesh_io {
 
-/// Counts in the file are checked against its size before they are passed to the receiver.
+/// The readers check counts in the file against the file's size before they pass them to the receiver.
 /// @param source  the file's text from its beginning; errors state the position in it
 /// @throws Error InvalidInput, Unsupported; and whatever the receiver throws.
 void read_ply(Source& source, Receiver& receiver);
@@ -28,9 +28,9 @@ void write_off(Output& out, const Prepared& in);
 void write_stl(Output& out, const Prepared& in);
 void write_glb(Output& out, const Prepared& in);
 
-/// The comments with their line breaks removed.
+/// Removes the line breaks within each comment.
 std::vector<std::string> one_line_each(std::vector<std::string> comments);
-/// A vertex or a mesh's origin, scaled, and rotated if the options require y up.
+/// Scales a vertex or a mesh's origin, and rotates it if the options require that y points up.
 template <typename Real>
 std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOptions& options) {
     std::array<Real, 3> p = vertex;
@@ -39,11 +39,11 @@ std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOpt
     return p;
 }
 
-/// Reports the origin of a mesh if the format cannot store it because it holds only single precision.
+/// Reports the origin of a mesh that is lost because the format stores only single precision.
 void report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
-/// The beginning of a PLY file, up to its vertices. @throws Error Unsupported (more vertices or triangles than its
-/// indices allow).
+/// write_ply_header() writes the beginning of a PLY file, up to its vertices. @throws Error Unsupported (more than
+/// 2^31 - 1 vertices or triangles).
 struct PlyCounts {
     std::uint64_t vertices, triangles;
 };
@@ -56,10 +56,10 @@ void write_stl_facet(Output& out, const std::array<std::array<float, 3>, 3>& cor
 /// @param first  the index of the mesh's first vertex in the file, from 1
 void write_obj_face(Output& out, const Face& triangle, std::uint64_t first);
 
-/// Writes one of several meshes in a file. @param first  the index of its first vertex in the file, from 1
+/// Writes one of several meshes of a file. @param first  the index of the mesh's first vertex in the file, from 1
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first);
 
-/// One mesh of a .glb file; without a name it has no material either.
+/// One mesh of a .glb file. If `named` is null, the mesh has no name and no material.
 struct GlbPart {
     const Prepared* in;
     const NamedMesh* named;

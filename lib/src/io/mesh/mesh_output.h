@@ -17,12 +17,12 @@ namespace covol::mesh_io {
 
 static_assert(std::endian::native == std::endian::little, "binary mesh files are written in the machine's byte order");
 
-/// A text or binary file that is being written: in memory, or to a file through a buffer.
+/// A text or binary file that is being written, in memory or to the disk through a buffer.
 class Output {
 public:
     Output() = default;
-    /// @throws Error Io if the file cannot be written; the same holds for all other functions. @param name  of the file
-    /// in error messages
+    /// @param name  of the file in error messages
+    /// @throws Error Io if the file cannot be written, as do all other functions.
     Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) {
         check();
     }
@@ -43,7 +43,7 @@ public:
     void pad(std::size_t multiple, char fill) {
         while ((flushed_ + data_.size()) % multiple != 0) data_ += fill;
     }
-    /// The contents of the buffer: everything, unless there is a file.
+    /// The contents of the buffer: all bytes if there is no file on the disk, otherwise those not written to it yet.
     [[nodiscard]] const std::string& data() const { return data_; }
     /// Number of bytes written so far.
     [[nodiscard]] std::uint64_t size() const { return flushed_ + data_.size(); }
@@ -85,7 +85,7 @@ Output& operator<<(Output& out, const std::array<Real, 3>& p) {
     return out << p[0] << " " << p[1] << " " << p[2];
 }
 
-/// Writes positions as a file stores them: in single precision, unless the mesh has an origin other than 0.
+/// Writes positions: in single precision if the mesh's origin is 0, otherwise in double precision with it added.
 class PositionWriter {
 public:
     explicit PositionWriter(const Vec3& origin) : origin_(origin) {}
@@ -101,7 +101,7 @@ private:
     Vec3 origin_;
 };
 
-/// Input of all formats: placed vertices, normals if there are any, and one-line comments.
+/// The input of all writers: scaled and rotated vertices, normals if there are any, and one-line comments.
 struct Prepared {
     const std::vector<std::array<std::uint32_t, 3>>& triangles;
     std::vector<std::array<float, 3>> vertices;

@@ -13,7 +13,7 @@
 
 namespace covol::mesh_io {
 
-/// A file in memory, read line by line or byte by byte. It keeps the position for messages.
+/// A file in memory that is read as lines or as bytes. Error messages state the line.
 class Source {
 public:
     /// @param reader  name of the function, which messages begin with; path and text must outlive this object
@@ -24,7 +24,7 @@ public:
     [[nodiscard]] std::size_t bytes_left() const { return lines_.rest().size(); }
     [[nodiscard]] std::string_view rest() const { return lines_.rest(); }
 
-    /// Blanks at both ends are removed.
+    /// The next line, without the blanks at both ends.
     std::string_view line() {
         std::string_view line;
         if (!lines_.next(line)) fail("unexpected end of the file");
@@ -39,7 +39,7 @@ public:
         return line;
     }
 
-    /// From here on messages do not name a line.
+    /// The next `count` bytes. After this call, messages do not state a line.
     std::string_view bytes(std::size_t count) {
         is_text_ = false;
         if (count > bytes_left()) fail("the file is truncated");
@@ -58,7 +58,7 @@ public:
         return *value;
     }
 
-    /// The first three numbers of the remaining line.
+    /// The first three numbers of `line`.
     Vec3 three_numbers(std::string_view line) {
         Vec3 p{};
         for (std::size_t a = 0; a < 3; ++a) {
@@ -88,8 +88,8 @@ private:
     bool is_text_ = true;
 };
 
-/// Receives the contents of a file in the order in which they are stored: read_mesh() makes triangles of them,
-/// read_points() a cloud. Contents that it does not want are only skipped, not checked.
+/// Receives the contents of a file in the order in which they are stored. read_mesh() builds triangles from them, and
+/// read_points() a cloud. Readers skip contents that the receiver does not want without checking them.
 class Receiver {
 public:
     virtual ~Receiver() = default;
@@ -98,9 +98,9 @@ public:
     /// Announces the maximum number of vertices; the file is large enough for them.
     virtual void expect_vertices(std::size_t count, bool with_normals) = 0;
     virtual void vertex(const Vec3& position) = 0;
-    /// The normal of the first vertex that has none yet; of any length.
+    /// The normal, of any length, of the first vertex that has no normal yet.
     virtual void normal(const Vec3&) {}
-    /// Called if a face refers to a normal whose index differs from that of the vertex.
+    /// Called if a corner of a face has a normal whose index differs from the index of its vertex.
     virtual void mixed_normals() {}
     /// The corners may refer to vertices that follow later, or that do not exist.
     virtual void face(const std::vector<std::uint32_t>&) {}

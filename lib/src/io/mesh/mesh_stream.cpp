@@ -28,7 +28,7 @@ private:
     Output out_;
 };
 
-/// PLY and OBJ: the faces are kept in a temporary file until all vertices are written.
+/// Writes PLY and OBJ. The faces are stored in a temporary file until all vertices have been written.
 class IndexedStream : public MeshStream {
 public:
     IndexedStream(const std::string& path, const std::string& name, bool ply, const PlyCounts& counts,
@@ -68,7 +68,7 @@ public:
         faces_.close();
         std::ofstream whole(path_, std::ios::binary | std::ios::app);
         std::ifstream faces(faces_file_, std::ios::binary);
-        // Inserting an empty stream buffer would set the error state.
+        // `<<` would set the error state if the temporary file were empty.
         if (faces.peek() != std::ifstream::traits_type::eof()) whole << faces.rdbuf();
         whole.close();
         if (!whole || faces.bad()) throw Error(Errc::Io, name_ + ": cannot be written");

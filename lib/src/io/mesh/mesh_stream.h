@@ -13,7 +13,7 @@ namespace covol::mesh_io {
 class MeshStream {
 public:
     /// @param path  to write to; a temporary file
-    /// @param name  of the file, whose extension gives the format: .ply, .stl or .obj
+    /// @param name  of the final file, whose extension determines the format: .ply, .stl or .obj
     /// @param origin  of the mesh; vertices are relative to it
     /// @throws Error Io, Unsupported (more than the format can hold).
     static std::unique_ptr<MeshStream> open(const std::string& path, const std::string& name, std::uint64_t vertices,

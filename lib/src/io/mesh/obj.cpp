@@ -11,7 +11,7 @@ using detail::next_word, detail::quote, detail::to_number;
 
 namespace {
 
-/// Whether a face refers to a normal whose index differs from that of the vertex.
+/// Whether a corner of a face has a normal whose index differs from the index of its vertex.
 bool mixes_normals(std::string_view corners) {
     for (std::string_view corner = next_word(corners); !corner.empty(); corner = next_word(corners)) {
         const std::size_t first = corner.find('/'), last = corner.rfind('/');
@@ -26,7 +26,7 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
     corners.clear();
     for (std::string_view word = next_word(line); !word.empty() && word[0] != '#'; word = next_word(line)) {
         const auto number = to_number<std::int64_t>(word.substr(0, word.find('/')));
-        // Indices count from 1, or from the end if they are negative.
+        // Positive indices count from 1; negative indices count backwards from the last vertex so far.
         if (!number || *number == 0) source.fail("expected the number of a vertex, got " + quote(word));
         corners.push_back(to_index(source, double(*number > 0 ? *number - 1 : count + *number)));
     }
@@ -34,7 +34,7 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
         source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
 }
 
-/// The next line, joined with its continuation lines after backslashes. @param joined  buffer for the result
+/// The next line. After a backslash at its end, the next line is appended to it. @param joined  buffer for the result
 std::string_view whole_line(Source& source, std::string& joined) {
     std::string_view line = source.line();
     if (!line.ends_with('\\') || line.starts_with('#')) return line;
@@ -46,7 +46,7 @@ std::string_view whole_line(Source& source, std::string& joined) {
     return joined.append(line);
 }
 
-/// A direction; 0 if the numbers do not define one.
+/// Reads a direction; {0, 0, 0} if there are fewer than three words. Words that are not numbers count as 0.
 Vec3 direction(std::string_view line) {
     Vec3 n{};
     for (double& c : n) {

@@ -1,4 +1,4 @@
-// OFF, as Geomview writes it with colours or normals beside the coordinates.
+// OFF in the variants of Geomview, in which colours or normals may follow the coordinates.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -12,12 +12,12 @@ using detail::lower, detail::next_word, detail::quote, detail::to_number, detail
 
 namespace {
 
-/// The rest of the line with the keyword, which may contain the counts.
+/// Reads the keyword, such as "OFF" or "COFF". @returns the remaining line, which may contain the counts
 std::string_view read_key(Source& source) {
     std::string_view line = source.content_line();
     const std::string_view key = next_word(line);
     if (!lower(key).ends_with("off")) source.fail("expected 'OFF' in the first line, got " + quote(key));
-    // A small n before OFF means n dimensions, a capital one normals.
+    // "nOFF" means n dimensions, and "NOFF" means normals.
     if (key.find('4') != std::string_view::npos || key.ends_with("nOFF"))
         source.unsupported("expected three coordinates, got " + quote(key));
     std::string_view rest = line;
@@ -25,13 +25,13 @@ std::string_view read_key(Source& source) {
     return trim(line);
 }
 
-/// @param min_bytes  minimum size of one of them in the file
+/// Reads the number of vertices or faces. @param min_bytes  minimum size of a vertex or a face in the file
 std::size_t read_count(const Source& source, std::string_view& line, const std::string& what, std::size_t min_bytes) {
     const std::string_view word = next_word(line);
     const auto count = to_number(word);
     if (!count)
         source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
-    // One more is accepted here: the error is then reported at the end of the file.
+    // The limit is increased by one, for a last line without a line end; if data is missing, reading it fails later.
     if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / min_bytes + 1))
         source.fail("the file is truncated: a file of this size cannot contain " + quote(word) + " " + what);
     return std::size_t(*count);

@@ -1,4 +1,4 @@
-// PLY: ASCII and both byte orders; the file may hold other elements and properties besides the mesh.
+// PLY in ASCII and in both binary byte orders. Elements and properties that do not belong to the mesh are skipped.
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -21,7 +21,7 @@ enum class PlyType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
 struct PlyProperty {
     std::string name;  ///< in lower case
     PlyType type = PlyType::Float;
-    std::optional<PlyType> count;  ///< type of a list's length
+    std::optional<PlyType> count;  ///< type of the length if the property is a list
 };
 struct PlyElement {
     std::string name;
@@ -98,7 +98,8 @@ public:
     }
 
 private:
-    /// Position of a property in the current row: its first word, or its first byte, after the length of a list.
+    /// Position of a property in the current row: the index of its first word (ASCII) or byte (binary), in a list after
+    /// the length, and the number of its entries.
     struct Place {
         std::size_t at = 0, count = 1;
     };
@@ -151,7 +152,7 @@ private:
         elements_.back().properties.push_back(property);
     }
 
-    /// Rejects counts that exceed the remaining file, before any memory is allocated.
+    /// Rejects elements whose rows do not fit into the remaining file, before any memory is allocated.
     /// @param wanted  as in for_each_row()
     void check_size(const PlyElement& element, std::size_t wanted) const {
         std::uint64_t minimum = 0, room = source_.bytes_left();
@@ -173,8 +174,8 @@ private:
     }
 
     /// Calls visit() for each row; value() and values() then refer to that row.
-    /// @param wanted  number of properties, from the first, that every line of an ASCII file must have; a row that
-    ///                lacks later ones is accepted unless it is the last, because then the file is truncated
+    /// @param wanted  number of properties that every line of an ASCII file must have. Later properties may be missing;
+    ///                but if a list in the last line is incomplete, the file is truncated
     template <typename Visit>
     void for_each_row(const PlyElement& element, std::size_t wanted, const Visit& visit) {
         if (element.properties.empty()) return;
@@ -226,7 +227,7 @@ private:
         }
     }
 
-    /// Reads rows of a constant size; check_size() has checked that the file holds them.
+    /// Reads binary rows of constant size; check_size() has checked that the file contains them.
     template <typename Visit>
     void for_each_record(const PlyElement& element, const Visit& visit) {
         std::size_t bytes = 0;
@@ -252,7 +253,8 @@ private:
         source_.bytes(at);
     }
 
-    /// @return the size of the row; 0 if it exceeds the remaining bytes
+    /// Sets the positions of the properties in a binary row with lists. @return the size of the row in bytes; 0 if it
+    /// exceeds `left`, the number of remaining bytes
     std::size_t find_bytes(const PlyElement& element, std::size_t left) {
         std::size_t at = 0;
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
@@ -274,7 +276,7 @@ private:
         return at;
     }
 
-    /// The value of an entry of a property; nothing if the word is not a number.
+    /// The value of an entry of property p in the current row; nothing if the word is not a number.
     [[nodiscard]] std::optional<double> find_value(const PlyElement& element, std::size_t p,
                                                    std::size_t entry = 0) const {
         const PlyType type = element.properties[p].type;

@@ -14,7 +14,7 @@
 namespace covol::mesh_io {
 namespace {
 
-/// STL repeats a vertex in each of its triangles; equal positions are merged.
+/// Builds a mesh from separate triangles: STL stores a vertex once per triangle, so equal positions are merged.
 class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
@@ -89,7 +89,7 @@ void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<st
     if (triangles > std::numeric_limits<std::uint32_t>::max())
         throw Error(Errc::Unsupported, "STL holds at most 2^32 - 1 triangles, the mesh has " +
                                            std::to_string(triangles) + "; decimate it or use larger voxels");
-    // A header that begins with "solid" would be taken for ASCII.
+    // The header must not begin with "solid", because readers would take the file for ASCII.
     std::array<char, 80> header{};
     const std::string text = "covol" + (comments.empty() ? std::string() : ": " + comments.front());
     std::copy_n(text.begin(), std::min(text.size(), header.size()), header.begin());

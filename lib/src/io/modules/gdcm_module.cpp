@@ -6,7 +6,7 @@
 namespace covol::detail {
 namespace {
 
-/// Suppresses GDCM's own messages, which it would print, while this object exists.
+/// Prevents GDCM from printing messages while this object exists.
 class QuietGdcm {
 public:
     QuietGdcm() : warning_(gdcm::Trace::GetWarningFlag()), error_(gdcm::Trace::GetErrorFlag()) { set(false, false); }

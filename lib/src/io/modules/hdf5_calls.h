@@ -4,8 +4,8 @@
 #include "io/modules/modules.h"
 
 // Wrappers with the names of the HDF5 library's functions. In namespace covol::detail, name lookup finds them before
-// the functions themselves, which are in a module that may not be loaded yet. A call to a function that is missing in
-// this list causes an error when a program is linked.
+// the functions, which are in a module that is loaded by the first call. If a function that is missing in this list is
+// called, linking a program fails.
 // clang-format off
 #define COVOL_HDF5_FUNCTIONS(X) \
     X(H5open) X(H5check_version) X(H5Aclose) X(H5Aexists_by_name) X(H5Aget_space) X(H5Aget_type) \

@@ -10,8 +10,8 @@
 
 namespace covol::detail {
 
-/// Suppresses ITK's own warnings, which it would print, while this object exists. Its visibility makes it unique across
-/// modules, so that they share one count of the existing objects.
+/// Prevents ITK from printing warnings while this object exists. With default visibility, there is one class for all
+/// modules, so that they use the same count of existing objects (WhileAny).
 class __attribute__((visibility("default"))) QuietItk {
 public:
     QuietItk() { itk::Object::SetGlobalWarningDisplay(false); }
@@ -23,8 +23,8 @@ private:
     bool before_ = itk::Object::GetGlobalWarningDisplay();
 };
 
-/// Runs one call into ITK. Meanwhile ITK's warnings, which it would print, are suppressed, and its multi-line
-/// exceptions are shortened to one line.
+/// Calls a function of ITK. ITK prints no warnings meanwhile, and its exceptions, which have several lines, are
+/// converted to errors of one line.
 template <typename Call>
 void with_itk(const std::string& unusable, Call&& call) {
     const WhileAny<QuietItk> quiet;
@@ -64,7 +64,7 @@ inline PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase&
     }
 }
 
-/// One of ITK's readers. It is constructed directly, because a static library has no registered factories.
+/// A reader of ITK, of the class Io. ITK's factories are not used, because a static library does not register them.
 template <typename Io>
 class ItkIo : public ItkReader {
 public:

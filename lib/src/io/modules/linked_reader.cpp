@@ -1,4 +1,5 @@
-// For a static library: covol-reader is in a folder next to the program's, in which the library's folder would be, too.
+// For a static library: covol-reader is in ../lib/covol-VERSION relative to the program's folder, if it exists there,
+// otherwise in the folder that the build has set.
 #include <filesystem>
 
 #include "covol/version.h"

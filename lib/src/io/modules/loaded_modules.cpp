@@ -24,8 +24,7 @@ fs::path folder_of_modules() {
 
 fs::path path_of_module(const std::string& name) { return folder_of_modules() / (name + ".so"); }
 
-/// Loads a module, which stays loaded until the program ends, because the libraries that it uses have threads and
-/// handlers.
+/// Loads a module. It is never unloaded, because the libraries that it uses start threads and register handlers.
 template <typename Module>
 const Module& load(const std::string& name, const char* formats) {
     const fs::path path = path_of_module(name);

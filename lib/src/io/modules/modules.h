@@ -6,12 +6,12 @@
 
 #include "covol/image.h"
 
-// Libraries that are loaded when a file first needs them: ITK, GDCM and HDF5 depend on sixty others, and loading those
-// takes as long as a small job. Each is wrapped by a module, a shared library that does not depend on the rest of
-// covol. If covol is static, and in the tests, the modules are linked instead.
+// ITK, GDCM and HDF5 are loaded when a file first needs them, because they depend on about sixty other libraries, whose
+// loading takes as long as a small computation. Each is wrapped by a module, a shared library that does not depend on
+// the other parts of covol. If covol is a static library, and in the tests, the modules are linked instead.
 namespace covol::detail {
 
-/// Description of an image by ITK; lists have one entry for each dimension.
+/// The header of an image as ITK reports it; lists have one entry for each dimension.
 struct ItkHeader {
     PixelType type = PixelType::UInt8;  ///< type of one component
     unsigned components = 1;
@@ -19,7 +19,7 @@ struct ItkHeader {
     std::vector<std::uint64_t> size;
     std::vector<double> spacing, origin;
     std::vector<std::vector<double>> axes;  ///< directions, one for each dimension
-    std::int64_t bytes = 0;                 ///< of all pixels
+    std::int64_t bytes = 0;                 ///< size of all pixels
     double slope = 1, intercept = 0;        ///< rescaling that is applied to a DICOM file's pixels when they are read
 };
 
@@ -43,11 +43,11 @@ protected:
 /// @throws Error InvalidInput with the message `unusable`; Unsupported (types).
 using OpenWithItk = std::unique_ptr<ItkReader>(const std::string& path, const std::string& unusable);
 
-/// ITK without its heavier readers.
+/// ITK's readers of NRRD and MetaImage, which depend on few libraries.
 struct ItkModule {
     OpenWithItk *open_nrrd, *open_meta;
 };
-/// DICOM by ITK's GDCM.
+/// ITK's reader of DICOM, which uses GDCM.
 struct GdcmModule {
     OpenWithItk* open;
 };
@@ -57,7 +57,8 @@ struct Hdf5Module {
     const struct Hdf5Calls* calls;
 };
 
-/// Loaded by the first call; safe to call from several threads. @throws Error Io (it cannot be loaded).
+/// The modules, each loaded by the first call of its function; safe to call from several threads. @throws Error Io (the
+/// module cannot be loaded).
 const ItkModule& itk_module();
 const GdcmModule& gdcm_module();
 const Hdf5Module& hdf5_module();

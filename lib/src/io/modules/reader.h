@@ -15,28 +15,28 @@ namespace covol::detail {
 /// Path of covol-reader. @throws Error Io if it cannot be determined.
 std::string reader_program();
 
-/// Short descriptions of what the parts are for.
+/// The formats that the modules read, for messages.
 inline constexpr const char *kOfItk = "NRRD and MetaImage", *kOfGdcm = "compressed DICOM", *kOfHdf5 = "HDF5";
 
-/// Whether covol-reader exists and may be executed.
+/// Checks whether covol-reader exists and may be executed; `problem` of the result is empty if so.
 ReaderPart check_reader_program();
 
-/// The task of covol-reader for a file. A Piece's detail is the beginning of the message if ITK or GDCM cannot read the
-/// file, or the name of the dataset in an HDF5 file.
+/// What covol-reader does with a file. Piece::detail is the beginning of the error message of ITK or GDCM, or the name
+/// of the dataset in an HDF5 file.
 enum class ReaderTask : std::uint32_t {
     ItkHeader,
     ItkPixels,
     GdcmHeader,
     GdcmPixels,
-    Hdf5,  ///< the header and one voxel
+    Hdf5,  ///< reads the header and one voxel
 };
 
 /// An ItkHeader of fixed size, for shared memory.
 class FlatHeader {
 public:
-    /// @returns whether the number of dimensions fits
+    /// Copies `header`. @returns false, without copying, if it has too many dimensions
     [[nodiscard]] bool take(const ItkHeader& header);
-    /// Nothing if the program has not written one.
+    /// The header; nothing if its type or number of dimensions is invalid, as in memory that was not written to.
     [[nodiscard]] std::optional<ItkHeader> header() const;
 
 private:
@@ -57,7 +57,7 @@ std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const 
 /// The decoded pixels of several files.
 class DecodedPixels {
 public:
-    /// Decodes them, several at once.
+    /// Decodes the files, several at once.
     /// @param files  each with the number of bytes of its pixels, in the type that its header states
     /// @throws Error InvalidInput, Unsupported, Io, Cancelled; std::bad_alloc.
     DecodedPixels(ReaderTask task, std::vector<Piece> files, const RunContext& run);
@@ -65,12 +65,12 @@ public:
     [[nodiscard]] char* of(std::size_t n) const { return memory_.data() + begin_[n]; }
 
 private:
-    std::vector<std::uint64_t> begin_;  ///< followed by the end of the last
+    std::vector<std::uint64_t> begin_;  ///< position of each file's pixels in memory_, and the end of the last
     SharedMemory memory_;
 };
 
-/// Tries to read an HDF5 file in covol-reader. @throws Error InvalidInput (the library crashes), the error of reading
-/// it, Io.
+/// Tries to read an HDF5 file in covol-reader. @throws Error InvalidInput (the library crashes), Io, or the error that
+/// reading the file causes.
 void try_hdf5(const std::string& path, const std::string& inside);
 
 }  // namespace covol::detail

@@ -13,7 +13,7 @@ namespace covol::detail {
 /// request is decoded once.
 class ChunkCache {
 public:
-    /// The voxels of a chunk, as read by ChunkSource::read(); they exist as long as anything refers to them.
+    /// The voxels of a chunk, as read by ChunkSource::read(). They remain valid after the cache has evicted the chunk.
     using Chunk = std::shared_ptr<const char[]>;
 
     /// @param max_bytes  of all chunks together; a larger chunk is kept until the next one is decoded
@@ -26,7 +26,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const;  ///< size of all chunks in the cache
     [[nodiscard]] std::uint64_t max_bytes() const noexcept { return max_bytes_; }
     [[nodiscard]] std::uint64_t decoded()
-        const;  ///< chunks so far, including those that were evicted and decoded again
+        const;  ///< number of chunks decoded so far; a chunk that was evicted counts again
 
 private:
     struct Key {
@@ -37,7 +37,7 @@ private:
     struct Hash {
         [[nodiscard]] std::size_t operator()(const Key& key) const noexcept;
     };
-    /// Locked while the chunk is decoded.
+    /// A chunk; the mutex is locked while it is decoded.
     struct Slot {
         std::mutex mutex;
         Chunk voxels;
@@ -56,7 +56,7 @@ private:
     mutable std::mutex mutex_;
     std::list<Key> order_;  ///< most recently used first
     std::unordered_map<Key, Entry, Hash> entries_;
-    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< one chunk for all those that a file does not have
+    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< a chunk of fill values per source
     std::uint64_t bytes_ = 0, decoded_ = 0;
 };
 

@@ -15,7 +15,7 @@
 namespace covol::detail {
 namespace {
 
-/// Copies `part` from a contiguous chunk into the contiguous `box`.
+/// Copies the voxels of `part` from a chunk to `out`, which holds the voxels of `box`; both are stored i fastest.
 void copy_part(const VoxelBox& part, const void* chunk, const Index3& chunk_size, const VoxelBox& box, void* out,
                std::uint64_t width) {
     const Index3 n = box.size();
@@ -195,7 +195,7 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
             for (std::int32_t j = around.min[1]; j <= around.max[1]; ++j)
                 for (std::int32_t i = around.min[0]; i <= around.max[0]; ++i) {
                     const std::uint64_t number = number_of({i, j, k});
-                    // neighbouring voxels are often in the same chunk
+                    // This skips most repetitions: consecutive boxes are often in the same chunk.
                     if ((missing.empty() || missing.back() != number) && !is_there(number)) missing.push_back(number);
                 }
     }
@@ -212,7 +212,7 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
         if (!joins) groups.emplace_back();
         groups.back().push_back(number);
     }
-    // Progress is reported by the calling thread between batches.
+    // The calling thread reports the progress after each batch.
     const auto batch = std::size_t(tbb::this_task_arena::max_concurrency()) * (source_->in_layers() ? 2 : 32);
     for (std::size_t first = 0; first < groups.size(); first += batch) {
         run.check();
@@ -252,7 +252,7 @@ void ChunkedVoxels::copy(const VoxelBox& box, void* out) const {
 }
 
 double ChunkedVoxels::at(const Index3& voxel) const {
-    // Loops over voxels request many voxels of the same chunk in a row.
+    // The last chunk is remembered, because loops request many voxels of the same chunk one after another.
     struct Last {
         std::uint64_t serial = 0, number = 0;
         const void* voxels = nullptr;

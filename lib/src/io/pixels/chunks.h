@@ -7,11 +7,11 @@
 
 #include "io/pixels/raw_image.h"
 
-// Images that are stored in chunks: boxes of one size, each packed separately. Chunks of a Zarr store or an HDF5
-// dataset, tiles or strips of a TIFF.
+// Images that are stored in chunks, which are boxes of equal size that can be decoded separately: chunks of a Zarr
+// store or an HDF5 dataset, tiles or strips of a TIFF.
 namespace covol::detail {
 
-/// One channel and frame of such an image.
+/// One channel and frame of an image that is stored in chunks.
 class ChunkSource {
 public:
     ChunkSource(const ChunkSource&) = delete;
@@ -29,10 +29,10 @@ public:
     /// Writes a chunk of fill values.
     void fill(void* out) const;
 
-    /// Whether decoding all chunks with the same k costs little more than decoding one of them: see
-    /// ChunkedVoxels::load().
+    /// Whether decoding all chunks with the same k takes little longer than decoding one of them. ChunkedVoxels::load()
+    /// then decodes them together.
     [[nodiscard]] virtual bool in_layers() const noexcept { return false; }
-    /// Decodes chunks with the same k, each to its own destination.
+    /// Decodes chunks that have the same k: chunks[n] to out[n].
     virtual void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const;
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
@@ -50,7 +50,7 @@ private:
     Index3 size_, chunk_size_;
 };
 
-/// The intersection of `box` with chunk c of this size.
+/// The intersection of `box` with a chunk; `size` is the size of a chunk.
 [[nodiscard]] VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size);
 /// The range of chunks that intersect the box.
 [[nodiscard]] VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size);
@@ -61,8 +61,8 @@ void require_finite(const ChunkSource& source, const VoxelBox& box, const void* 
 /// Maximum size of an unpacked chunk. Zarr's own codecs are limited to 2 GiB; the usual size is below 16 MiB.
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t(1) << 30;
 
-/// The chunks of a source, each decoded when its first voxel is requested, and kept. Those that the file does not have
-/// share one chunk of fill values. Thread-safe.
+/// The chunks of a source. A chunk is decoded when its first voxel is requested, and is kept in memory. All chunks that
+/// are missing in the file are represented by one chunk of fill values. Thread-safe.
 class ChunkedVoxels {
 public:
     explicit ChunkedVoxels(std::shared_ptr<const ChunkSource> source);
@@ -78,13 +78,12 @@ public:
     /// value that is NaN or infinite.
     void copy(const VoxelBox& box, void* out) const;
     [[nodiscard]] double at(const Index3& voxel) const;
-    /// Decodes the chunks that the boxes (of the image) need and that are not decoded yet, in the file's order and in
-    /// parallel; at() and copy() would decode one chunk after the other as they are requested. Changes nothing else.
-    /// Reports "image". @throws as copy, and Error Cancelled, InvalidOptions if the chunks need more than
-    /// run.memory_budget.
+    /// Decodes the chunks that intersect the boxes and are not decoded yet, in the file's order and in parallel. at()
+    /// and copy() have the same results without it, but decode one chunk after another. Reports "image".
+    /// @throws as copy(), and Error Cancelled, InvalidOptions if the chunks need more than run.memory_budget.
     void load(const std::vector<VoxelBox>& boxes, const RunContext& run) const;
-    /// The numbers of the chunks that were decoded so far, ascending; must not be called while other threads decode.
-    /// The result depends only on the requests, not on threads.
+    /// The numbers of the chunks that were requested so far, ascending. They depend only on the requests, not on the
+    /// number of threads. Must not be called while other threads decode chunks.
     [[nodiscard]] std::vector<std::uint64_t> read_chunks() const;
     /// The box of a chunk's voxels within the image.
     [[nodiscard]] VoxelBox box_of(std::uint64_t chunk) const noexcept;
@@ -108,7 +107,7 @@ private:
     mutable std::atomic<std::uint64_t> reads_{0};
 };
 
-/// The voxels of `box`: a small box is decoded immediately, the chunks of a large one when they are requested.
+/// The voxels of `box`. A small box is decoded immediately; the chunks of a large box are decoded on demand.
 [[nodiscard]] Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run);
 
 /// An image file in a format that always stores images in chunks.

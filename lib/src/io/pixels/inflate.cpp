@@ -46,7 +46,7 @@ void Inflater::step() {
         if (stream_.avail_in == 0) good_ = false;
     }
     const int status = good_ ? inflate(&stream_, Z_NO_FLUSH) : Z_OK;
-    // a gzip file may be several streams in a row
+    // A gzip file may contain several streams, one after another.
     if (status == Z_STREAM_END)
         good_ = inflateReset(&stream_) == Z_OK;
     else if (status != Z_OK && status != Z_BUF_ERROR) {
@@ -76,7 +76,8 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
     places_.push_back(std::move(begin));
     std::uint64_t packed = 0, done = 0, reported = 0;
     bool first = true, ended = false;
-    // After the last byte, one more step verifies the checksum; a missing checksum is accepted.
+    // After the last byte, zlib continues to the end of the stream, which verifies the checksum; the checksum may be
+    // missing.
     while (done < unpacked || (to_the_end && !ended)) {
         if (stream.avail_in == 0) {
             run.check();
@@ -102,7 +103,7 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
         } else if (status != Z_OK && status != Z_BUF_ERROR) {
             throw damaged();
         }
-        if (all_there && done > unpacked) return;  // more data follows: the end of the stream is elsewhere
+        if (all_there && done > unpacked) return;  // more data follows, so there is no checksum here
         const bool at_block = (stream.data_type & 128) != 0 && (stream.data_type & 64) == 0 && status == Z_OK;
         if (at_block && done >= places_.back().unpacked + gap) {
             Place place;

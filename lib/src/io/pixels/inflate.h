@@ -8,7 +8,7 @@
 
 #include "covol/run.h"
 
-// Streams compressed by gzip or zlib, one or several in a row.
+// Decompression of gzip and zlib streams; several streams may follow one another.
 namespace covol::detail {
 
 /// Decompresses a stream in a file sequentially.
@@ -19,9 +19,9 @@ public:
     Inflater(const Inflater&) = delete;
     Inflater& operator=(const Inflater&) = delete;
 
-    /// Fills `out`; returns false if the stream ends before, or is damaged.
+    /// Reads `count` unpacked bytes; returns false if the stream has fewer, or is damaged.
     bool read(char* out, std::uint64_t count);
-    /// False only if there is a checksum after the last byte that was read and it is wrong.
+    /// Returns false only if a checksum follows the last byte that was read, and is wrong.
     bool checksum_fits();
 
 private:
@@ -34,15 +34,16 @@ private:
     bool damaged_ = false;
 };
 
-/// Positions at which decompression of a stream can begin, each with the preceding 32 KiB that the compressed bytes
-/// refer to: M. Adler's zran.c, one of zlib's examples. One position for every 8 MiB of unpacked bytes, at most 4096.
+/// Positions at which decompression of a stream can begin, each with the preceding 32 KiB of unpacked bytes, to which
+/// the following data may refer, as in M. Adler's zran.c, an example of zlib. They are at least 8 MiB of unpacked bytes
+/// apart; there are at most about 4096.
 class InflateIndex {
 public:
     struct Place {
         std::uint64_t unpacked = 0;  ///< number of unpacked bytes before it
-        std::uint64_t packed = 0;    ///< offset in the file of the first whole byte
+        std::uint64_t packed = 0;    ///< offset in the file of the first byte that belongs wholly to the following data
         int bits = 0;                ///< number of bits of the preceding byte that belong to the following data
-        bool at_header = false;      ///< the stream's beginning
+        bool at_header = false;      ///< this is the beginning of the stream, with its header
         std::vector<unsigned char> window;
     };
 
@@ -52,7 +53,7 @@ public:
                  const RunContext& run);
 
     [[nodiscard]] const std::string& path() const { return path_; }
-    /// The last position at or before an unpacked byte.
+    /// The last position at or before the unpacked byte with this index.
     [[nodiscard]] const Place& before(std::uint64_t unpacked) const;
     [[nodiscard]] std::size_t size() const { return places_.size(); }
     /// Size of a stream's trailer with the checksum, after which another stream may begin: 8 bytes for gzip, 4 for
@@ -65,7 +66,7 @@ private:
     std::vector<Place> places_;
 };
 
-/// Decompresses from any position.
+/// Decompresses a stream from any of its unpacked bytes on.
 class IndexedInflater {
 public:
     IndexedInflater(const InflateIndex& index, std::uint64_t begin);
@@ -86,7 +87,7 @@ private:
     std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
     std::vector<char> skipped_;
     z_stream stream_{};
-    bool raw_ = false;  ///< decodes without zlib's handling of header and checksum, after starting within the stream
+    bool raw_ = false;  ///< started within the stream, so zlib does not handle the header and checksum
     bool good_ = true;
 };
 

@@ -8,7 +8,7 @@
 // Fields of the NIfTI-1 header. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
 namespace covol::detail {
 
-/// Names of NIfTI's units, by their codes; 0: not stated.
+/// Names of NIfTI's units of length; the index is the code, and 0 means that the unit is not stated.
 constexpr std::array<const char*, 4> kNiftiUnits{"", "m", "mm", "um"};
 
 namespace nifti {
@@ -23,7 +23,7 @@ struct NiftiSpace {
     std::array<float, 12> sform{};            ///< the rows srow_x, y, z
 };
 
-/// The mapping of a file named .nii or .nii.gz; nothing for others, and for files that cannot be read.
+/// Reads the mapping of a .nii or .nii.gz file; nothing for other files, and for files that cannot be read.
 [[nodiscard]] std::optional<NiftiSpace> read_nifti_space(const std::string& path);
 
 }  // namespace covol::detail

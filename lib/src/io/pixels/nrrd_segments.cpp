@@ -15,7 +15,7 @@ std::vector<NrrdSegment> read_nrrd_segments(const std::string& path) {
     const std::string end = extension(path);
     std::error_code status;
     if ((end != ".nrrd" && end != ".nhdr") || !std::filesystem::is_regular_file(path, status)) return {};
-    std::map<std::string, NrrdSegment> found;  // by prefix, as "Segment3"
+    std::map<std::string, NrrdSegment> found;  // by the prefix of the keys, such as "Segment3"
     std::vector<std::string> order;
     std::ifstream file = open_regular_file(path);
     std::string line;

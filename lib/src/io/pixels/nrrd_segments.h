@@ -12,7 +12,8 @@ struct NrrdSegment {
     int label = 0, layer = 0;
 };
 
-/// SegmentN_ID, _Name, _LabelValue and _Layer of the header. Empty for other files, and for those that cannot be read.
+/// The segments as stated by SegmentN_ID, _Name, _LabelValue and _Layer in the header. Empty for other files, and for
+/// files that cannot be read.
 [[nodiscard]] std::vector<NrrdSegment> read_nrrd_segments(const std::string& path);
 
 /// Splits "FILE.seg.nrrd:name" into {"FILE.seg.nrrd", "name"}. The name is empty if none is given, or if there is a

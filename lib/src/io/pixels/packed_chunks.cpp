@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-// Bricks with few slices, because reading a single brick means decompressing its slices up to its last row.
+// Bricks have few slices, because all slices of a brick are decompressed, up to its last row, to read it.
 constexpr Index3 kBrick{64, 64, 16};
 
 class PackedChunks : public ChunkSource {

@@ -21,10 +21,10 @@
 namespace covol::detail {
 namespace {
 
-// The maximum ratio of Deflate is 1032 : 1, that of LZW about 2700 : 1; newer TIFF codecs exceed these on constant
-// slices.
+// Maximum ratio of unpacked to packed size that is accepted. Deflate reaches 1032 and LZW about 2700; newer codecs of
+// TIFF exceed these on constant slices.
 constexpr std::uint64_t kMaxCompression = 20000;
-// Smaller files are read: mapping them saves nothing, and reading detects disk errors here.
+// Minimum number of bytes that are mapped. Mapping fewer bytes saves little, and reading reports disk errors at once.
 constexpr std::uint64_t kMapFrom = std::uint64_t(256) << 20;
 
 struct Unit {
@@ -68,7 +68,7 @@ public:
     bool read(std::uint64_t count, char* out) {
         return packed_ ? inflater_->read(out, count) : bool(file_.read(out, static_cast<std::streamsize>(count)));
     }
-    /// False only if there is a checksum after the last byte that was read and it is wrong.
+    /// Returns false only if a checksum follows the last byte that was read, and is wrong.
     bool checksum_fits() { return !packed_ || inflater_->checksum_fits(); }
 
 private:
@@ -122,7 +122,7 @@ private:
         const std::uint64_t file_bytes = std::filesystem::file_size(place_.path, status);
         if (status) throw read_error(Errc::Io, path_, "its data file " + place_.path + " cannot be opened");
         const Index3& size = info_.geometry.size;
-        // in floating point, because sizes in a damaged header may overflow
+        // The product is computed in floating point, because integers might overflow if the header is damaged.
         const double wanted =
             double(size[0]) * size[1] * size[2] * double(components_) * info_.frames * double(place_.stored_bytes());
         const double there = place_.packed ? double(file_bytes) * kMaxCompression
@@ -139,7 +139,7 @@ private:
         return place_.skip + request.frame * frame_bytes_;
     }
 
-    /// Mapping is worthwhile only for a box that spans much of the file; one with few slices is read.
+    /// Whether the box is mapped: the pixels must be stored as they are needed, and its slices must be large enough.
     [[nodiscard]] bool is_mapped(const PixelRequest& request) const {
         const std::uint64_t slices = std::uint64_t(request.box.size()[2]);
         const bool aligned = (place_.file_offset + frame_begin(request)) % place_.stored_bytes() == 0;
@@ -147,7 +147,7 @@ private:
                is_worth_mapping(slices * slice_bytes_);
     }
 
-    /// A large compressed stream is not decompressed as a whole.
+    /// Whether the box is decompressed on demand, in chunks, because it is large.
     [[nodiscard]] bool is_in_chunks(const PixelRequest& request) const {
         return place_.packed && is_worth_mapping(ImageFile::bytes_to_hold(request));
     }
@@ -334,7 +334,7 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
                           "roi");
     };
     if (bytes > memory) throw refuse();
-    // malloc leaves the pages untouched until the reader fills them.
+    // malloc does not write to large blocks, so they occupy physical memory only when pixels are written.
     void* data = std::malloc(std::max<std::uint64_t>(bytes, 1));
     if (data == nullptr) throw refuse();
     return {data, std::free};

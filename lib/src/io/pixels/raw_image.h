@@ -21,10 +21,10 @@ struct Pixels {
     std::array<std::int64_t, 3> stride{1, 0, 0};  ///< in pixels
     bool mapped = false;
     std::shared_ptr<const ChunkedVoxels> chunks{};
-    std::optional<ChunkCount> chunk_count{};  ///< if the format has chunks
+    std::optional<ChunkCount> chunk_count{};  ///< empty if the image is not stored in chunks
 };
 
-/// The part of a file to read; it must exist.
+/// The part of an image that is read; it must be within the image.
 struct PixelRequest {
     VoxelBox box;
     std::uint64_t channel = 0;
@@ -42,12 +42,12 @@ public:
     [[nodiscard]] const ImageInfo& info() const noexcept { return info_; }
     /// Reads (or maps) the voxels. @throws Error InvalidInput (damaged, truncated), Unsupported (too large), Io.
     [[nodiscard]] virtual Pixels read(const PixelRequest& request, const RunContext& run) = 0;
-    /// Memory that read() allocates: all of the box, unless a format overrides it.
+    /// Number of bytes that read() allocates: the size of the whole box, unless a format overrides this.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
 
     /// The chunks of a channel and frame, each of which can be decoded separately; null if a file has none.
     [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const;
-    /// The coarser levels of a pyramid, finest first: names that can be read as images.
+    /// The coarser levels of a pyramid, finest first, as names that read_image() accepts.
     [[nodiscard]] virtual std::vector<std::string> coarser_levels() const { return {}; }
 
     /// Files that are read in addition to the given one, or the files of the given folder.
@@ -61,7 +61,7 @@ private:
     std::vector<std::string> files_;
 };
 
-/// Calls visit(T{}) with the C++ type of `type`.
+/// Calls visit(T{}), where T is the C++ type that corresponds to `type`.
 template <typename Visitor>
 decltype(auto) with_pixel_type(PixelType type, Visitor&& visit) {
     switch (type) {
@@ -81,7 +81,7 @@ inline std::uint64_t pixel_bytes(PixelType type) {
     return with_pixel_type(type, [](auto pixel) { return std::uint64_t(sizeof(pixel)); });
 }
 
-/// "512 x 512 x 58"
+/// The size as a text, such as "512 x 512 x 58".
 std::string size_text(const Index3& size);
 
 std::uint64_t voxel_count(const Index3& size);
@@ -101,20 +101,20 @@ Error not_finite(const std::string& path, const Index3& voxel);
 /// @throws Error InvalidInput unless the image has at least two voxels along each axis.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
-/// Allocates memory for so many pixels, after checking that a file of `file_bytes` can hold that many (0: unknown, the
-/// data is in another file) and that the machine can. @throws Error InvalidInput, Unsupported.
+/// Allocates memory for the pixels, after checking that a file of `file_bytes` can contain them (0: unknown, because
+/// they are in another file) and that the memory of the machine suffices. @throws Error InvalidInput, Unsupported.
 std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pixels, PixelType type,
                                       std::uint64_t file_bytes);
 
-/// Position of the pixels in a file, frame after frame, i fastest. They are read here instead of by ITK, whose readers
-/// silently fill in missing data of a truncated file, and read all of it; moreover, ITK's NIfTI reader takes the pixels
-/// of a.nii for a.nii.gz if both exist.
+/// Position of the pixels in a file, frame after frame, i fastest. ITK's readers are not used for them: they read the
+/// whole file, and report no error if a truncated file lacks pixels. Moreover, ITK's NIfTI reader uses the pixels of
+/// a.nii for a.nii.gz if both exist.
 struct PixelPlace {
     std::string path;
     std::uint64_t file_offset = 0;  ///< of the pixels, or of the packed stream
     std::uint64_t skip = 0;         ///< number of unpacked bytes before the pixels
     bool packed = false;            ///< gzip or zlib
-    bool swap = false;              ///< stored in the other byte order
+    bool swap = false;              ///< the byte order is not that of this machine
     bool half = false;              ///< 16-bit floats, converted to Float
     PixelType type = PixelType::UInt8;
     double slope = 1;  ///< pixel = slope * stored + intercept
@@ -125,7 +125,7 @@ struct PixelPlace {
     [[nodiscard]] bool as_stored() const { return !swap && !half && slope == 1 && intercept == 0; }
 };
 
-/// Reads `count` bytes at the beginning of the pixels; false if there are fewer, or if the compressed stream is
+/// Reads the first `count` bytes of the pixels; returns false if there are fewer, or if the compressed stream is
 /// damaged.
 bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out);
 
@@ -137,25 +137,26 @@ void convert_pixels(const PixelPlace& place, const void* stored, std::uint64_t s
 /// InvalidInput if the file is too short.
 std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place);
 
-/// Maps `bytes` of a file at `offset`, which must exist. @throws Error Io.
+/// Maps this number of bytes of a file at `offset`; they must exist. @throws Error Io.
 std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes);
 
-/// Whether so many bytes justify a mapping, or decoding on demand.
+/// Whether a part of this size is mapped or decoded on demand, not read as a whole.
 bool is_worth_mapping(std::uint64_t bytes);
 
-/// Advises the system that mapped pages will be read from beginning to end.
+/// Requests the operating system to read mapped pages in advance.
 void prefetch_pages(const void* begin, std::uint64_t bytes);
 
-/// Returns mapped pages to the system; they are read again when they are accessed.
+/// Releases the physical memory of mapped pages; they are read from the file again when they are accessed.
 void release_pages(const void* begin, std::uint64_t bytes);
 
 /// Reverses the bytes of each of `count` values of `width` bytes.
 void swap_bytes(void* data, std::uint64_t count, std::uint64_t width);
 
-/// "um" for every spelling of the micrometre, "mm", ...; the text itself if it is not a known unit.
+/// The usual symbol of a unit, for example "um" for every spelling of the micrometre; the text itself if it is not a
+/// known unit.
 std::string normal_unit(const std::string& text);
 
-/// Length of a unit in metres; 0 when unknown.
+/// Length in metres of a unit as returned by normal_unit(); 0 if the unit is unknown.
 double unit_in_metres(const std::string& normal_unit);
 
 }  // namespace covol::detail

@@ -9,10 +9,10 @@
 
 namespace covol::detail {
 
-/// The bytes of a file, with bounds checks.
+/// Reads numbers and parts from the bytes of a file, with bounds checks.
 class Bytes {
 public:
-    /// @param name  for messages; both must outlive this object
+    /// @param name  of the file, for messages; `data` and `name` must outlive this object
     Bytes(std::string_view data, const std::string& name, std::endian order)
         : data_(data), name_(name), swap_(order != std::endian::native) {}
 

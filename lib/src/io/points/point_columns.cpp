@@ -24,7 +24,7 @@ struct Line {
     std::string shape;
     std::vector<Vec3> points;
     std::vector<double> places;  ///< vertex-index of each point, if the file has one
-    std::string structure;       ///< if a column names it
+    std::string structure;       ///< name of the structure; empty if no column states it
 };
 
 /// Sorts the marks of a line by their vertex-index.
@@ -66,7 +66,7 @@ void append(PointTable& table, const std::string& path, Line& line, const Column
     if (columns.structure) name_structure(table, path, line.structure);
 }
 
-/// Collects the rows of each line, which need not be consecutive.
+/// Collects the points of each line of marks; their rows need not be consecutive.
 class LineCollector {
 public:
     explicit LineCollector(const Columns& columns) : columns_(columns) {}
@@ -108,7 +108,7 @@ Vec3 read_row(const std::string& path, std::size_t number, const std::vector<str
     return point;
 }
 
-/// A normal, not normalized; 0 if the fields do not define a direction.
+/// A normal of any length; {0, 0, 0} if the fields do not define a direction.
 Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::size_t, 3>& at) {
     Vec3 normal{0, 0, 0};
     for (std::size_t a = 0; a < 3; ++a) {
@@ -118,7 +118,7 @@ Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::s
     return std::isfinite(normal[0] + normal[1] + normal[2]) ? normal : Vec3{0, 0, 0};
 }
 
-/// None if the word is not the name of a kind.
+/// The kind of a mark; nothing if the field is not the name of a kind.
 std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::size_t column) {
     if (column >= fields.size()) return std::nullopt;
     const std::string word = lower(trim(fields[column]));
@@ -127,7 +127,7 @@ std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::s
     return std::nullopt;
 }
 
-/// Distinguishes normals from colours in columns without names.
+/// Whether all vectors have the length 1 or 0. In columns without names, these are normals; others may be colours.
 bool are_unit_vectors(const std::vector<Vec3>& all) {
     constexpr double kTolerance = 0.02;  // allows for two decimals
     return std::all_of(all.begin(), all.end(), [](const Vec3& n) {
@@ -136,7 +136,7 @@ bool are_unit_vectors(const std::vector<Vec3>& all) {
     });
 }
 
-/// Converts lengths from the header's units, or from the unit of each row, to the first unit that is named.
+/// Converts coordinates from the units that the header or each row states to the first unit that is stated.
 class RowUnits {
 public:
     explicit RowUnits(const Columns& columns) : columns_(columns) {
@@ -173,7 +173,7 @@ public:
     /// @returns whether the line is the header or the first row of numbers; `fields` then holds its fields.
     bool take(std::size_t number, string_view line, std::vector<string_view>& fields) {
         const string_view trimmed = trim(line);
-        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel's delimiter line
+        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // a line in which Excel states the delimiter
         for (const bool named : {true, false})
             for (const char candidate : named ? kDelimitersOfNames : kDelimitersOfNumbers) {
                 if (candidate != ' ' && trimmed.find(candidate) == string_view::npos) continue;
@@ -186,7 +186,7 @@ public:
         note(number, trimmed, fields);
         return false;
     }
-    /// @throws Error InvalidInput with the reason why the first line is not part of a table
+    /// @throws Error InvalidInput with the reason why the first line that was not accepted is not part of a table
     [[noreturn]] void refuse() const { fail(path_, line_, why_.empty() ? "expected points, got none" : why_); }
     [[nodiscard]] bool has_title() const { return title_ > 0; }
 
@@ -236,7 +236,7 @@ private:
         if (title_ > 0)
             columns.rule += ", below " + std::to_string(title_) + (title_ > 1 ? " lines" : " line") + " of title";
     }
-    /// Records a line that is neither header nor row.
+    /// Records a line that is neither the header nor a row of numbers, as a title or as the reason for an error.
     void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
         constexpr std::size_t kMaxTitle = 100;
         std::vector<string_view> fields = fields_;
@@ -247,7 +247,7 @@ private:
             }
         const bool has_number =
             std::any_of(fields.begin(), fields.end(), [](string_view f) { return table_number(f).has_value(); });
-        // .pts files begin with the number of points
+        // Formats such as .pts may begin with the number of points.
         if (counted_ && fields.size() == 1 && has_number && title_ == 0) return;
         if (why_.empty()) {
             line_ = number;
@@ -270,8 +270,8 @@ private:
     std::size_t line_ = 1, title_ = 0;
 };
 
-/// Whether a row after the header continues it with other names or units, as in TrackMate's three additional rows.
-/// Takes its units.
+/// Whether a row after the header is not data but repeats names or states units, as in TrackMate's three additional
+/// rows. Stores units in `columns`.
 bool continues_header(const std::vector<string_view>& fields, Columns& columns) {
     std::array<std::string, 3> units;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -324,7 +324,7 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
         units->apply(fields, point);
         if (columns.kind) {
             const std::optional<MarkKind> kind = read_kind(fields, *columns.kind);
-            if (!kind) {  // a column of the same name with another meaning
+            if (!kind) {  // the column "kind" has another meaning in this file
                 columns.kind.reset();
                 table.kinds.clear();
             } else {

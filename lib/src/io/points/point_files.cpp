@@ -48,7 +48,7 @@ PointTable parse_one_roi(const std::string& path, const std::string& bytes, cons
     return parse_roi(path, bytes, fs::path(path).stem().string(), by);
 }
 
-/// Adapts parsers of files that do not name structures.
+/// Adapts a parser to the common signature if its format does not name structures.
 template <PointTable (*parse)(const std::string&, const std::string&)>
 PointTable of_one(const std::string& path, const std::string& content, const std::string&) {
     return parse(path, content);

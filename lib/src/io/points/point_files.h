@@ -9,7 +9,7 @@
 
 namespace covol::detail {
 
-/// The contents of a point file: coordinates in the file's own order and space.
+/// The contents of a point file; the coordinates are in the file's own order and coordinate system.
 struct PointTable {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;
@@ -21,7 +21,7 @@ struct PointTable {
     std::string unit;                      ///< of lengths, as returned by normal_unit(); empty if not stated
     std::vector<std::string> structures;   ///< names of the marks' structures, in the file's order
     std::vector<std::uint32_t> structure;  ///< index of each point's structure; empty if they were not requested
-    std::string rule;                      ///< the columns or elements that were used, for users
+    std::string rule;                      ///< text for users: the columns or elements that were used
 };
 
 /// Chooses the reader by the file name's extension.
@@ -29,17 +29,18 @@ struct PointTable {
 /// @throws as read_points(), which calls this.
 PointTable read_point_table(const std::string& path, const std::string& structures_by = {});
 
-/// Assigns the points without a structure, which are the last ones of the table, to the structure of this name.
+/// Assigns the points at the end of the table that have no structure yet to the structure with this name.
 /// @throws Error InvalidInput (more structures than a label image can hold)
 void name_structure(PointTable& table, const std::string& path, const std::string& name);
 
-/// A unit vector; 0 for an invalid direction (NaN, zero length), which scanners write if the normal is unknown.
+/// Normalizes a normal. The result is {0, 0, 0} for invalid directions (NaN, zero length), which scanners write if the
+/// normal is unknown.
 [[nodiscard]] Vec3 normal_of(const Vec3& given);
 
 /// Appends an ordered line of marks to a table.
 void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name);
 
-/// Samples centre + cos u + sin v with points about a voxel apart (all in voxels).
+/// Samples the ellipse centre + cos(t) u + sin(t) v with points about one voxel apart; all vectors are in voxels.
 [[nodiscard]] std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v);
 
 }  // namespace covol::detail

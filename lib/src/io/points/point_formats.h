@@ -3,14 +3,14 @@
 
 #include "io/points/point_files.h"
 
-/// One reader for each family of point files. Each parses the whole file; `path` is for messages. @throws Error
-/// InvalidInput, Unsupported.
+/// One reader for each family of point files. Each parses the whole contents of a file; `path` is used in messages.
+/// @throws Error InvalidInput, Unsupported.
 namespace covol::detail {
 
 /// XYZ, CSV, TSV: one point per line, columns by name if there is a header. Lists of marks written by Fiji, napari or
 /// by hand are recognized by their columns.
 /// @param blanks_only  columns are separated by runs of blanks and tabs, unless there are commas or semicolons
-/// @param structures_by  the column that names each row's structure; empty: none
+/// @param structures_by  the column that names each row's structure; empty: structures are ignored
 PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only,
                          const std::string& structures_by = {});
 
@@ -18,7 +18,7 @@ PointTable parse_obj(const std::string& path, const std::string& text);
 PointTable parse_off(const std::string& path, const std::string& text);
 PointTable parse_ply(const std::string& path, const std::string& bytes);
 
-/// A selection of Fiji (ImageJ), or a ZIP of several as saved by its ROI Manager.
+/// A selection (ROI) of Fiji (ImageJ), or a ZIP archive of several selections as saved by the ROI Manager.
 /// @param name  of the selection, if the file has none
 /// @param structures_by  "group" of a selection, "counter" of a multi-point's points, or empty
 PointTable parse_roi(const std::string& path, const std::string& bytes, const std::string& name,
@@ -32,7 +32,7 @@ PointTable parse_cell_counter(const std::string& path, const std::string& text, 
 /// @param structures_by  "label" of each point, "node" (the markup's own name; not for .fcsv), or empty
 PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by = {});
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by = {});
-/// Output of c3d -landmarks-to-spheres: x y z label, in RAS; a label that is a word may come first.
+/// Landmarks as for c3d -landmarks-to-spheres: lines "x y z label", in RAS; a label that is a word may come first.
 PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// .csl, sections of bodies in planes of any direction. A header "CSLC" and the numbers of planes and labels are
 /// followed by each plane: its number, the counts of its vertices and contours, A B C D of A x + B y + C z + D = 0, the
@@ -41,8 +41,8 @@ PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// @param structures_by  "label": each label is a structure; empty: there may be only one
 PointTable parse_sections(const std::string& path, const std::string& text, const std::string& structures_by = {});
 
-/// DICOM RT structure sets: contours of ROIs in mm, LPS. Holes that are joined to their outline by keyholes become
-/// lines of their own.
+/// DICOM RT structure sets: contours of ROIs in mm, LPS. A hole that is joined to its outline by a keyhole, a channel
+/// of zero width, becomes a separate line.
 /// @param structures_by  "roi": each ROI is a structure; empty: there may be only one
 PointTable parse_rt_structures(const std::string& path, const std::string& bytes,
                                const std::string& structures_by = {});

@@ -25,7 +25,7 @@ public:
     void mixed_normals() override { mixed_normals_ = true; }
 
     [[nodiscard]] bool expects_vertices() const { return expects_vertices_; }
-    /// Keeps normals only if each point has its own.
+    /// Removes the normals unless each point has exactly one.
     void finish() {
         if (mixed_normals_ || table_.normals.size() != table_.points.size()) table_.normals.clear();
     }

@@ -28,7 +28,7 @@ struct PcdHeader {
     std::vector<PcdField> fields;
     std::uint64_t points = 0;
     std::optional<Vec3> viewpoint;
-    /// whether the points are rows of pixels: a camera's frame, with the camera at its origin unless stated otherwise
+    /// whether the points are rows of pixels of a camera, which is at 0 unless a viewpoint is stated
     bool is_organised = false;
     std::string data;
 
@@ -97,7 +97,7 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
     fail(path, "expected the line DATA, got the end; the file is truncated");
 }
 
-/// The columns of x, y, z, and of the normal if all three of its components exist.
+/// The indices of the fields x, y, z, and of the three fields of the normal if all of them exist.
 std::vector<std::size_t> pcd_columns(const std::string& path, const PcdHeader& header) {
     std::vector<std::size_t> at;
     for (const char* name : {"x", "y", "z", "normal_x", "normal_y", "normal_z"}) {
@@ -127,7 +127,7 @@ double pcd_value(const std::string& path, const char* data, const PcdField& fiel
                                        std::to_string(field.size) + " of " + field.type);
 }
 
-/// Marc Lehmann's LZF: literal runs and references into the output. False if damaged.
+/// Unpacks Marc Lehmann's LZF: runs of literal bytes, and references to earlier output. Returns false if it is damaged.
 bool lzf_decompress(string_view in, std::string& out) {
     std::size_t at = 0, done = 0;
     while (at < in.size()) {
@@ -149,12 +149,12 @@ bool lzf_decompress(string_view in, std::string& out) {
         back += static_cast<unsigned char>(in[at++]) + std::size_t(1);
         count += 2;
         if (back > done || count > out.size() - done) return false;
-        for (; count > 0; --count, ++done) out[done] = out[done - back];  // may overlap, so byte by byte
+        for (; count > 0; --count, ++done) out[done] = out[done - back];  // the ranges may overlap
     }
     return done == out.size();
 }
 
-/// Organised clouds hold NaN at pixels without a measurement.
+/// Adds a point unless a coordinate is NaN or infinite: organised clouds have NaN at pixels without a measurement.
 void add_valid(PointTable& table, const std::vector<double>& values, std::size_t& invalid) {
     if (!std::isfinite(values[0]) || !std::isfinite(values[1]) || !std::isfinite(values[2])) {
         ++invalid;
@@ -189,7 +189,7 @@ void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lin
     }
 }
 
-/// @param planar  all values of a field are stored contiguously
+/// @param planar  whether all values of a field are stored together, instead of all fields of a point
 void read_pcd_binary(const std::string& path, const PcdHeader& header, string_view data, bool planar, PointTable& table,
                      std::size_t& invalid) {
     const std::vector<std::size_t> at = pcd_columns(path, header);
@@ -215,7 +215,7 @@ void read_pcd_binary(const std::string& path, const PcdHeader& header, string_vi
 std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_view data) {
     const Bytes bytes(data, path, std::endian::little);
     const std::uint64_t packed = bytes.at<std::uint32_t>(0), size = bytes.at<std::uint32_t>(4);
-    constexpr std::uint64_t kLargestRatio = 264;  // for LZF: 3 bytes become 264
+    constexpr std::uint64_t kLargestRatio = 264;  // upper bound for LZF, in which 3 bytes encode at most 264
     const std::uint64_t stride = header.stride();
     if (size > kLargestRatio * packed || stride == 0 || size / stride < header.points)
         fail(path, std::to_string(packed) + " packed bytes cannot hold " + std::to_string(header.points) + " points");
@@ -226,8 +226,8 @@ std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_
 
 // ---------------------------------------------------------------------------------------------- PTX
 
-/// The header of a scan: columns, rows, the scanner's position, its three axes, and a matrix by which row vectors are
-/// multiplied.
+/// The header of a scan: numbers of columns and rows, the scanner's position and axes, and a 4 x 4 matrix. A point is
+/// multiplied, as a row vector, by the matrix.
 struct PtxHeader {
     std::uint64_t columns = 0, rows = 0;
     Vec3 scanner{};
@@ -241,7 +241,7 @@ struct PtxHeader {
     }
 };
 
-/// Number of numbers in each line of a header.
+/// How many numbers each of the ten lines of a header has.
 constexpr std::array<std::size_t, 10> kPtxNumbers{1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
 
 PtxHeader read_ptx_header(const std::string& path, Lines& lines) {
@@ -331,7 +331,7 @@ bool is_ptx(const std::string& text) {
         for (const string_view word : words)
             if (!to_number(word)) return false;
     }
-    // The matrix of a rigid motion ends with 1.
+    // The last number of the matrix is 1 for a rigid motion.
     return to_number(words[3]) == 1.0;
 }
 
@@ -353,7 +353,7 @@ PointTable parse_ptx(const std::string& path, const std::string& text) {
             if (words.size() < 3) fail(path, lines.number(), "expected 3 numbers, got " + quote(line));
             Vec3 point{};
             for (std::size_t a = 0; a < 3; ++a) point[a] = to_coordinate(path, lines.number(), words[a]);
-            // Points without a return are stored as 0.
+            // A direction from which no reflection returned is stored as the point 0 0 0.
             if (point == Vec3{0, 0, 0})
                 ++empty;
             else

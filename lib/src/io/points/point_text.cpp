@@ -34,7 +34,8 @@ void append_utf8(std::string& text, std::uint32_t code) {
     }
 }
 
-/// Which byte of each pair is zero in nearly all of a text of Latin letters and digits; -1 if neither.
+/// The index (0 or 1) of the byte that is 0 in nearly all pairs of bytes while the other never is, as in UTF-16 text of
+/// Latin letters and digits; -1 if there is none.
 int zero_byte(string_view text) {
     constexpr std::size_t kMaxChecked = 400;
     std::size_t zeros[2] = {0, 0}, pairs = 0;
@@ -93,11 +94,11 @@ std::string to_utf8(string_view text) {
 std::optional<double> table_number(string_view field) {
     if (const auto plain = to_number(field)) return plain;
     std::string text(field);
-    constexpr string_view kMinus = "\xE2\x88\x92";  // U+2212
+    constexpr string_view kMinus = "\xE2\x88\x92";  // U+2212, the minus sign
     if (text.starts_with(kMinus)) text.replace(0, kMinus.size(), "-");
     const std::size_t comma = text.rfind(','), point = text.rfind('.');
     if (comma != std::string::npos) {
-        // in "1," the comma separates columns
+        // A comma without a digit after it, as in "1,", separates columns.
         const bool between = comma > 0 && comma + 1 < text.size() && is_digit(text[comma + 1]);
         if (!between) return std::nullopt;
         const bool is_decimal = text.find(',') == comma && (point == std::string::npos || point < comma);

@@ -19,8 +19,8 @@ namespace covol::detail {
 /// Converts UTF-16 in either byte order, with or without a byte order mark, to UTF-8; other texts are unchanged.
 [[nodiscard]] std::string to_utf8(std::string_view text);
 
-/// A number with a decimal point or a decimal comma. If both occur, the last one is the decimal mark, and the others
-/// separate thousands.
+/// Parses a number with a decimal point or a decimal comma. If points and commas occur, the last of them is the decimal
+/// mark, and the others separate thousands. Nothing if the field is not a number.
 [[nodiscard]] std::optional<double> table_number(std::string_view field);
 
 /// Delimiters of tables, in the order in which they are tried: names may contain blanks, numbers may contain commas.
@@ -29,7 +29,7 @@ inline constexpr std::string_view kDelimitersOfNames = ";\t, ", kDelimitersOfNum
 /// Whether the first three of the fields are numbers.
 [[nodiscard]] bool begins_with_numbers(const std::vector<std::string_view>& fields);
 
-/// The unit of length that a column's name or a field means: "um" for "(micron)"; empty if it is none.
+/// Converts a unit of length in a column's name or a field: "(micron)" to "um". Empty if it is not a unit of length.
 [[nodiscard]] std::string unit_of_length(std::string_view text);
 
 }  // namespace covol::detail

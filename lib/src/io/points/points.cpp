@@ -44,7 +44,7 @@ void append_row(std::string& text, const Vec3& p, char separator) {
     text += '\n';
 }
 
-/// The lines of a comment, each after `prefix`.
+/// The comment with `prefix` before each of its lines.
 std::string comment_lines(const std::string& comment, const std::string& prefix) {
     std::string text;
     std::istringstream lines(comment);
@@ -77,7 +77,7 @@ std::vector<detail::PointTable> parts_of(detail::PointTable table) {
         if (!normals.empty()) part.normals.push_back(normals[n]);
         if (!kinds.empty()) part.kinds.push_back(kinds[n]);
     }
-    for (MarkLine line : lines) {  // all of a line's points are of one structure
+    for (MarkLine line : lines) {  // all points of a line belong to the same structure
         if (line.begin >= line.end) continue;
         detail::PointTable& part = parts[structure[line.begin]];
         line.end = place[line.begin] + (line.end - line.begin);

@@ -13,7 +13,7 @@
 namespace covol {
 namespace {
 
-/// One way to interpret the file.
+/// A possible interpretation of the coordinates of a file.
 struct Reading {
     ReadPointsOptions options;
     int changes = 0;     ///< number of differences from the current reading
@@ -24,7 +24,7 @@ struct Reading {
 constexpr std::array<double, 15> kScales{1.0,  1e3, 1e-3, 1e6, 1e-6, 10,   0.1,     100,
                                          0.01, 1e4, 1e-4, 1e5, 1e-5, 25.4, 1 / 25.4};
 
-/// 0: no factor, 1: between neighbouring units such as micrometre and millimetre, 2: two such steps, 3: others.
+/// How unusual a factor is. 0: the factor is 1; 1: 1000 or 1/1000; 2: 10^6 or 10^-6; 3: any other factor.
 int rank_of_scale(double scale) {
     for (const auto& [factor, rank] : {std::pair(1.0, 0), {1e3, 1}, {1e-3, 1}, {1e6, 2}, {1e-6, 2}})
         if (std::abs(scale / factor - 1) < 1e-9) return rank;
@@ -41,7 +41,7 @@ const char* advice_of(PointSpace space) {
     }
 }
 
-/// Describes the mistake for messages.
+/// Describes for messages how the reading differs from the current reading.
 std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
     std::string text;
     const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -77,8 +77,8 @@ public:
         return "points from " + text_of(bounding_box(world_)) + ", image from " + text_of(geometry_.world_box());
     }
 
-    /// The readings with the fewest changes that put every point inside. Other units have the lowest priority, because
-    /// any points fit if they are scaled down enough.
+    /// The readings with the fewest changes that put every point inside the image. Readings with other units have the
+    /// lowest priority, because all points are inside if they are scaled down enough.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
         const auto rank = [&](const Reading& r) {
@@ -106,8 +106,8 @@ public:
 
     [[nodiscard]] std::string name(const Reading& reading) const { return name_of(reading, now_); }
 
-    /// Clicked marks are on slices and often on voxel centres. A reading is more plausible if it puts all marks on
-    /// voxel centres along more axes than the current one does.
+    /// The most plausible reading, if it is more plausible than the current one: it puts all marks on voxel centres
+    /// along more axes. Marks that were set with the mouse are on slices and often on voxel centres.
     [[nodiscard]] std::vector<Reading> more_plausible() const {
         constexpr std::size_t kMinPoints = 8;  // fewer may be on voxel centres by chance
         if (world_.size() < kMinPoints || cloud_.stated || now_.scale != 1) return {};
@@ -115,7 +115,7 @@ public:
         std::vector<Reading> best;
         int maximum = axes;
         for (const Reading& reading : others()) {
-            // Slice numbers that count channels are integers for any marks.
+            // Readings with more channels are excluded, because their slice numbers are rounded to integers.
             if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
                 reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
@@ -151,15 +151,15 @@ private:
                            [&](const Vec3& p) { return is_inside(place(reading.options, p)); });
     }
 
-    /// The box of the points in the image's voxels.
+    /// The bounding box of the points in voxels of the image.
     [[nodiscard]] WorldBox index_box(const Reading& reading) const {
         std::vector<Vec3> index;
         for (const Vec3& p : cloud_.points) index.push_back(geometry_.world_to_index(place(reading.options, p)));
         return bounding_box(index);
     }
 
-    /// Whether the points are scaled down so much that fitting means nothing. Unusual factors have to pass a stricter
-    /// test.
+    /// Whether the points are scaled down so much that being inside the image is no evidence for the reading. The limit
+    /// is stricter for unusual factors.
     [[nodiscard]] bool is_too_small(const Reading& reading, int rank) const {
         constexpr std::size_t kMinPoints = 8;
         const bool is_odd = rank > 2;
@@ -171,13 +171,13 @@ private:
         return true;
     }
 
-    /// Coordinates below 1, as in a small image in millimetres, all fit into the first voxel.
+    /// Whether all points are within the size of one voxel, as if small lengths were taken for voxels.
     [[nodiscard]] bool is_in_one_voxel(const Reading& reading) const {
         return cloud_.points.size() > 1 && longest_side(index_box(reading)) < 1;
     }
 
-    /// Number of axes along which all points are on voxel centres. Axes along which they all have the same position do
-    /// not count.
+    /// Number of axes along which all points are on voxel centres, without axes along which all points have the same
+    /// position.
     [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
         constexpr double kTolerance = 0.01;  // voxels
         std::array<bool, 3> on{true, true, true}, differ{false, false, false};
@@ -202,7 +202,7 @@ private:
     /// All other readings, fewest changes first.
     [[nodiscard]] std::vector<Reading> others() const {
         std::vector<Reading> list;
-        if (now_.channels != 1) return list;  // a slice number with channels cannot be inverted
+        if (now_.channels != 1) return list;  // undo() cannot invert slice numbers that count channels
         const bool lengths = !in_voxels(now_);
         const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
         for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras,

@@ -30,7 +30,7 @@ bool means_voxels(const std::string& unit) {
 
 namespace {
 
-/// The columns of a header by name; for repeated names, the first.
+/// Finds the columns of a header by their names; of columns with the same name, the first.
 class Header {
 public:
     explicit Header(const std::vector<string_view>& fields) : fields_(fields) {
@@ -48,8 +48,8 @@ public:
         const auto found = units_.find(name);
         return found != units_.end() && means_voxels(found->second);
     }
-    /// The unit of length at the end of a column's name. Without brackets "m" and "in" are ignored, because "x_m" may
-    /// be a mean, and "x in" an input.
+    /// The unit of length at the end of a column's name. "m" and "in" count only in brackets, because "x_m" may be a
+    /// mean, and "x in" an input.
     [[nodiscard]] std::string length_unit(const std::string& name) const {
         const auto found = units_.find(name);
         if (found == units_.end()) return {};
@@ -58,7 +58,7 @@ public:
         if (!in_brackets && (found->second == "m" || found->second == "in")) return {};
         return unit_of_length(found->second);
     }
-    /// "columns X, Y, Z": the columns with the names in the file.
+    /// A text with the names of columns as in the file: "columns X, Y, Z".
     [[nodiscard]] std::string names(const std::array<std::size_t, 3>& at) const {
         std::string text = "columns";
         for (std::size_t a = 0; a < 3; ++a) text += (a == 0 ? " " : ", ") + std::string(fields_[at[a]]);
@@ -71,7 +71,7 @@ private:
     std::map<std::string, std::string> units_;
 };
 
-/// napari's layers of points and shapes: (t,) z, y, x in voxels.
+/// Recognizes tables of napari's points and shapes: the last three axes are z, y, x in voxels.
 std::optional<Columns> find_napari(const Header& header) {
     std::vector<std::size_t> axes;
     while (const auto axis = header.find("axis-" + std::to_string(axes.size()))) axes.push_back(*axis);
@@ -122,7 +122,7 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
         columns.order = PointOrder::XYZ;  // the names are unambiguous
         if (slices) columns.rule += ", slices from 0";
     } else if (slices) {
-        // Fiji's Results: slices count from 1; X and Y are in the image's unit if it has one
+        // Fiji's Results tables: slices count from 1; X and Y are in the unit of the image, if it has one.
         columns.space = PointSpace::Slices;
         columns.order = PointOrder::XYZ;
         columns.slice_from_one = true;

@@ -18,11 +18,11 @@ struct Columns {
     PointOrder order = PointOrder::Unstated;
     bool slice_from_one = false;  ///< the third column counts slices from 1
     std::optional<std::array<std::size_t, 3>> normal;
-    bool normal_is_assumed = false;        ///< the columns have no names, so the meaning is an assumption
+    bool normal_is_assumed = false;        ///< `normal` is an assumption, because the columns have no names
     std::vector<std::size_t> line;         ///< rows with equal values in these columns form one line
     std::optional<std::size_t> shape;      ///< napari's shape-type
     std::optional<std::size_t> vertex;     ///< position of a mark in its line
-    bool closed = true;                    ///< default for lines without a shape
+    bool closed = true;                    ///< whether lines are closed that have no shape-type
     std::array<std::string, 3> unit{};     ///< of each coordinate, if a header names a unit of length
     std::optional<std::size_t> kind;       ///< kind of each mark: surface, inside or outside
     std::optional<std::size_t> row_unit;   ///< the column that names each row's unit
@@ -45,7 +45,8 @@ struct ColumnName {
 [[nodiscard]] ColumnName parse_name(std::string_view text);
 [[nodiscard]] bool means_voxels(const std::string& unit);
 
-/// Nothing if the fields name neither x, y and z (or slice), nor napari's axes.
+/// Finds the columns that the fields of a header name. Nothing if these are neither x, y and z (or slice) nor napari's
+/// axes.
 [[nodiscard]] std::optional<Columns> find_columns(const std::vector<std::string_view>& fields);
 
 }  // namespace covol::detail

@@ -39,7 +39,7 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
 }
 
-/// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}: the meaning of the planes of a TIFF whose description is wrong.
+/// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}. The letters replace the description of a TIFF's planes.
 std::pair<std::string, std::string> split_axes(const std::string& given) {
     const std::size_t colon = given.rfind(':');
     std::error_code status;
@@ -49,8 +49,8 @@ std::pair<std::string, std::string> split_axes(const std::string& given) {
     return {path, given.substr(colon + 1)};
 }
 
-/// On damaged files the HDF5 library may access memory outside its buffers, so the file is read in a separate program
-/// first. The library also keeps objects of damaged headers, which this process then never loads.
+/// Opens an HDF5 file after trying it in a separate program, because on damaged files the HDF5 library may access
+/// memory outside of its buffers, and keeps objects of damaged headers in memory.
 std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
     detail::try_hdf5(name.path, name.inside);
     return detail::open_either_hdf5(name);
@@ -77,7 +77,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
     const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".ics" || end == ".npy" || end == ".vdb";
-    // The extensions of slices are often numbers.
+    // DICOM files are also recognized by their contents, because their extensions are often numbers.
     const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
     if (!marked && !known)
         throw read_error(Errc::Unsupported, path,
@@ -105,7 +105,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
              ": 1 is used instead, so lengths, volumes and shapes may be wrong; set it with `spacing = sx,sy,sz`");
 }
 
-/// Applies the user's corrections, and makes the last checks.
+/// The file's information with the corrections that `options` contains, after the final checks.
 ImageInfo corrected_info(const std::string& path, const ImageFile& file, const ReadImageOptions& options,
                          const RunContext& run) {
     ImageInfo info = file.info();
@@ -121,7 +121,7 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
     return info;
 }
 
-/// The index along channels or frames that the caller chose, or 0 if there is only one.
+/// The index of the channel or frame that the caller has chosen; 0 if there is only one.
 std::uint64_t choose(const std::string& path, const std::string& what, const std::optional<int>& wanted, int count,
                      const std::vector<std::string>& names, const std::string& advice = {}) {
     if (!wanted && count == 1) return 0;
@@ -155,7 +155,7 @@ PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const
 ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options, std::uint64_t max_bytes,
                               const RunContext& run) {
     ImageLevels whole(image);
-    if (image.view()) return whole;  // it is in memory, or mapped
+    if (image.view()) return whole;  // all voxels are in memory or mapped
     RunContext quiet = run;          // warnings have already been reported when the image was read
     quiet.log = nullptr;
     const auto chunks_of = [&](const std::string& path, ImageGeometry& geometry) {
@@ -218,7 +218,7 @@ ImageInfo read_image_info(const std::string& path, const ReadImageOptions& optio
 }
 
 std::vector<std::string> list_image_files(const std::string& path, const RunContext& run) {
-    // BigDataViewer's description; the HDF5 file itself is not opened for that.
+    // An HDF5 file is not opened. Its list contains the XML file of BigDataViewer, which exists only for that layout.
     if (const auto hdf5 = detail::split_hdf5_name(path))
         return {fs::path(hdf5->path).replace_extension(".xml").string()};
     return open_image(path, {}, run)->files();

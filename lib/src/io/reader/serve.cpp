@@ -43,7 +43,7 @@ void try_voxel(const PieceAtWork& piece) {
         try {
             (void)file->read({{{0, 0, 0}, {0, 0, 0}}}, alone);
         } catch (const Error&) {
-            // The voxel cannot be read, but other channels or frames might be.
+            // This voxel cannot be read, but other channels or frames may be readable.
         }
     });
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Reads a study's guesses and keeps the last few. Solvers call it from several threads.
+/// Reads the guesses of a study, and keeps the most recent ones in memory. Solvers call it from several threads.
 class GuessReader {
 public:
     GuessReader(std::string folder, const ImageGeometry& image) : folder_(std::move(folder)), image_(image) {}

@@ -25,7 +25,7 @@ constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif, .ome.tif, .
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
-/// Voxels that are all in memory.
+/// An image whose voxels are all in memory.
 class DenseSource : public PixelSource {
 public:
     DenseSource(const ImageGeometry& geometry, PixelType type, bool labels, const void* values, Metadata metadata = {})
@@ -80,8 +80,8 @@ double moved_by_rounding(const ImageGeometry& geometry) {
     return maximum;
 }
 
-/// NIfTI-1 stores single precision, which is insufficient far from 0. @throws Error Unsupported if voxels would be
-/// displaced by more than half a voxel
+/// Warns if single precision, in which NIfTI-1 stores positions, is too coarse because the image is far from 0. @throws
+/// Error Unsupported if voxels would be displaced by more than half a voxel
 void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
     constexpr double kMaxReported = 0.01, kMax = 0.5;  // voxels
     const double moved = moved_by_rounding(geometry);

@@ -11,21 +11,21 @@
 
 #include "covol/image_stream.h"
 
-// Boxes of voxels, packed in parallel and written in their order.
+// Blocks (boxes of voxels), which are packed in parallel and written in order.
 namespace covol::detail {
 
 /// How a block's bytes are packed.
 enum class BlockPacking {
     None,
-    Gzip,   ///< deflated and aligned to bytes, so that consecutive blocks form one stream; with the CRC-32
-    Adler,  ///< the same with the Adler-32
-    Zlib    ///< each a complete zlib stream
+    Gzip,   ///< deflated, ends at a byte, so that consecutive blocks form one stream; `check` is the CRC-32
+    Adler,  ///< as Gzip, but `check` is the Adler-32
+    Zlib    ///< each block is a complete zlib stream
 };
 
 struct PackedBlock {
     std::string bytes;
     std::uint32_t check = 0;     ///< checksum of the unpacked bytes
-    std::uint64_t unpacked = 0;  ///< bytes
+    std::uint64_t unpacked = 0;  ///< unpacked size in bytes
     bool is_zero = false;        ///< whether all bytes are 0
 };
 
@@ -45,7 +45,7 @@ public:
     void pack_all(std::uint64_t count, const std::function<BlockPlace(std::uint64_t)>& place,
                   const std::function<void(std::uint64_t, const PackedBlock&)>& take, const RunContext& run);
 
-    /// Packs other bytes in the same way as voxels.
+    /// Packs bytes that are not voxels in the same way.
     [[nodiscard]] PackedBlock packed(const std::string& bytes) const;
 
 private:
@@ -55,15 +55,16 @@ private:
     const PixelSource& source_;
     const BlockPacking packing_;
     std::mutex lock_;
-    std::map<std::pair<double, std::uint64_t>, Shared> uniform_;  // by value and bytes
+    std::map<std::pair<double, std::uint64_t>, Shared> uniform_;  // packed uniform blocks by value and size in bytes
 };
 
-/// Spreads the contiguous voxels of a box over a larger lattice; the remaining voxels become 0. Both i fastest.
+/// Moves the contiguous voxels of a box to their places in a larger lattice; the other voxels become 0. In both, i is
+/// fastest.
 /// @param values  as many bytes as the lattice has; initially the box's voxels, followed by zeros
 /// @param width  bytes of a voxel
 void pad_rows(const Index3& size, const Index3& stored, std::uint64_t width, char* values);
 
-/// Sets `count` values of a type to one value.
+/// Sets `count` values of this type to `value`.
 void fill_value(PixelType type, double value, std::uint64_t count, void* out);
 
 }  // namespace covol::detail

@@ -51,7 +51,7 @@ std::string to_slicer(const std::vector<NamedMark>& marks, const ImageGeometry& 
     return file.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-/// Big-endian, as in Java.
+/// Writes a number at the position `at`, big-endian as in Java.
 template <typename T>
 void put(std::string& bytes, std::size_t at, T value) {
     using Bits = std::conditional_t<sizeof(T) == 1, std::uint8_t,
@@ -60,9 +60,10 @@ void put(std::string& bytes, std::size_t at, T value) {
     for (std::size_t n = 0; n < sizeof(T); ++n) bytes[at + n] = char(bits >> (8 * (sizeof(T) - 1 - n)) & 255);
 }
 
-/// Layout: ij/io/RoiEncoder.java of ImageJ 1.53. Coordinates are ImageJ's pixels; for points, centres are at integers.
+/// A multi-point ROI with the layout of ij/io/RoiEncoder.java of ImageJ 1.53. Coordinates are in pixels; for points,
+/// pixel centres have integer coordinates.
 std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks) {
-    constexpr std::size_t kMax = 65535;  // a 16-bit count
+    constexpr std::size_t kMax = 65535;  // the number of points is stored in 16 bits
     if (marks.size() > kMax)
         throw Error(Errc::Unsupported, path + ": a multi-point of Fiji has at most 65535 points, got " +
                                            std::to_string(marks.size()) + "; write .csv or .mrk.json");
@@ -84,14 +85,14 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
     std::string bytes(counters + 4 * n, '\0');
     bytes.replace(0, 4, "Iout");
     put<std::int16_t>(bytes, 4, 227);
-    put<std::uint8_t>(bytes, 6, 10);  // points
+    put<std::uint8_t>(bytes, 6, 10);  // type: points
     const auto left = std::int16_t(std::floor(low[0])), top = std::int16_t(std::floor(low[1]));
     put<std::int16_t>(bytes, 8, top);
     put<std::int16_t>(bytes, 10, left);
     put<std::int16_t>(bytes, 12, std::int16_t(std::ceil(high[1]) + 1));
     put<std::int16_t>(bytes, 14, std::int16_t(std::ceil(high[0]) + 1));
     put<std::uint16_t>(bytes, 16, std::uint16_t(n));
-    put<std::int16_t>(bytes, 50, 128);  // sub-pixel coordinates are stored, too
+    put<std::int16_t>(bytes, 50, 128);  // option: sub-pixel coordinates are stored, too
     put<std::uint32_t>(bytes, 60, std::uint32_t(second));
     put<std::uint32_t>(bytes, second + 48, std::uint32_t(counters));
     for (std::size_t m = 0; m < n; ++m) {
@@ -100,7 +101,7 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
         put<std::int16_t>(bytes, 64 + 2 * n + 2 * m, std::int16_t(std::lround(y) - top));
         put<float>(bytes, reals + 4 * m, float(x));
         put<float>(bytes, reals + 4 * n + 4 * m, float(y));
-        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // the slice, and counter 0
+        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // slice from 1, counter 0
     }
     return bytes;
 }

@@ -24,7 +24,7 @@ std::string joined(const Numbers& numbers, const char* between) {
     return text;
 }
 
-/// Column `a` of the direction.
+/// The direction of axis `a`: a column of the matrix.
 Vec3 axis_of(const ImageGeometry& g, std::size_t a) {
     return {g.direction[0][a], g.direction[1][a], g.direction[2][a]};
 }
@@ -81,7 +81,7 @@ std::string nrrd_header(const PixelSource& source, bool pack) {
         "\nspace directions: " + directions + "\nkinds: domain domain domain\n";
     if (pixel_bytes(source.type()) > 1) text += "endian: little\n";
     text += std::string("encoding: ") + (pack ? "gzip" : "raw") + "\nspace origin: (" + joined(g.origin, ",") + ")\n";
-    // After "space", as the format requires.
+    // NRRD requires this line after "space".
     const std::string unit = "\"" + quoted(g.unit) + "\"";
     if (!g.unit.empty()) text += "space units: " + unit + " " + unit + " " + unit + "\n";
     for (const auto& [key, value] : source.metadata()) text += escaped(key) + ":=" + escaped(value) + "\n";
@@ -93,7 +93,7 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     std::string matrix;
     for (std::size_t a = 0; a < 3; ++a) matrix += (a == 0 ? "" : " ") + joined(axis_of(g, a), " ");
     std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n";
-    // Padded to the maximum width, because the size is known only later and then overwritten.
+    // The number is padded to the maximum width, because it is known only at the end and then overwritten.
     std::string count = std::to_string(packed_bytes);
     constexpr std::size_t kWidest = 20;
     count.insert(0, kWidest - count.size(), ' ');
@@ -137,7 +137,7 @@ bool is_sheared(const Matrix3& direction) {
     return maximum > 1e-3;
 }
 
-/// Whether the form that readers use of an input's header describes the same lattice as this header.
+/// Whether the sform or qform of the input, whichever readers use, describes the same lattice as the new header.
 bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
     constexpr double kRounding = 1e-3;  // relative to the spacing, and for quaternions
     const auto own = [&](std::size_t at, std::size_t n) {
@@ -165,7 +165,9 @@ bool still_holds(const NiftiSpace& space, const std::string& header, double spac
     return space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3);
 }
 
-/// The 348 bytes of NIfTI-1 and four more; the world is RAS. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
+/// The 348 bytes of a NIfTI-1 header and four zeros, which mean that there is no extension; the world is RAS.
+/// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
+/// @param like  path of the input, whose codes and forms are kept if they describe the same lattice
 std::string nifti_header(const std::string& path, const PixelSource& source, const std::string& like) {
     const ImageGeometry& g = source.geometry();
     for (const std::int32_t n : g.size)
@@ -218,7 +220,8 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     return header;
 }
 
-/// NumPy's format 1.0, axes z, y, x. https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+/// The header of NumPy's format 1.0 for an array with the axes z, y, x.
+/// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
 std::string npy_header(const PixelSource& source) {
     const Index3 n = source.geometry().size;
     std::string dictionary = std::string("{'descr': '") + names_of(source.type()).numpy +
@@ -231,7 +234,8 @@ std::string npy_header(const PixelSource& source) {
     return std::string("\x93NUMPY\x01\x00", 8) + char(length & 0xFF) + char(length >> 8) + dictionary + "\n";
 }
 
-/// A file that is written sequentially; zeros are skipped, which leaves holes if the file system supports them.
+/// A file that is written sequentially. add_zeros() skips zeros, which saves disk space if the file system supports
+/// sparse files.
 class GrowingFile {
 public:
     explicit GrowingFile(const std::string& path) : path_(path), file_(path, std::ios::binary | std::ios::trunc) {
@@ -265,7 +269,8 @@ private:
 class Layers {
 public:
     Layers(const Index3& size, std::uint64_t pixel) : size_(size) {
-        // Small enough for many blocks to be uniform, large enough for the cost of starting a block to be negligible.
+        // Size of a block in bytes: so small that many blocks are uniform, and so large that the time to start packing
+        // a block is negligible.
         constexpr std::uint64_t kBlock = 1U << 18;
         const std::uint64_t row = std::uint64_t(size[0]) * pixel, slice = row * std::uint64_t(size[1]);
         slices_ = std::int32_t(std::clamp<std::uint64_t>(kBlock / slice, 1, std::uint64_t(size[2])));
@@ -295,7 +300,7 @@ std::string bytes_of(std::uint32_t value, bool big_endian) {
     return bytes;
 }
 
-/// @param before  bytes at the beginning of the packed stream
+/// Writes all voxels. @param before  bytes that precede the voxels in the packed stream
 void add_voxels(GrowingFile& file, const PixelSource& source, BlockPacking packing, const RunContext& run,
                 const std::string& before = {}) {
     const Layers layers(source.geometry().size, pixel_bytes(source.type()));
@@ -319,13 +324,13 @@ void add_voxels(GrowingFile& file, const PixelSource& source, BlockPacking packi
     packer.pack_all(
         layers.count(), [&](std::uint64_t n) { return layers.place(n); },
         [&](std::uint64_t, const PackedBlock& block) { add(block); }, run);
-    // An empty last block of the deflate format.
+    // The blocks do not end the Deflate stream, so an empty last block follows.
     if (gzip || adler) file.add(std::string("\x03\x00", 2));
     if (gzip) file.add(bytes_of(std::uint32_t(check), false) + bytes_of(std::uint32_t(unpacked), false));
     if (adler) file.add(bytes_of(std::uint32_t(check), true));
 }
 
-/// The header and the blank line after it, padded to `length` bytes by a comment.
+/// The header, padded to `length` bytes by a comment, with the blank line that ends it.
 std::string filled(std::string header, std::size_t length) {
     header += "#";
     header.resize(length - 2, ' ');
@@ -339,7 +344,7 @@ void write_nrrd(GrowingFile& file, const PixelSource& source, bool pack, const R
         file.add(widest + "\n");
         return add_voxels(file, source, packing, run);
     }
-    // Extents of segments are known only after all voxels, so the header is overwritten in the end.
+    // The extents of segments are known only after all voxels are written, so the header is overwritten at the end.
     constexpr std::size_t kShortestComment = 2, kBlank = 1;
     const std::size_t length = widest.size() + kShortestComment + kBlank;
     file.add(filled(widest, length));

@@ -12,17 +12,17 @@
 namespace covol::detail {
 namespace {
 
-/// The resolution that TIFF stores for a spacing: libtiff uses single precision.
+/// The resolution that is stored for a spacing, rounded to single precision as in libtiff.
 double resolution(double spacing) { return double(float(1.0 / spacing)); }
 
-/// @param range  values that ImageJ displays as black and white; without it, masks of 1 would appear black on a scale
-/// to 255
+/// @param range  the values that ImageJ displays as black and as white; without it, masks with values 0 and 1 appear
+/// black, because 255 is white
 std::string imagej_description(const ImageGeometry& geometry, const std::optional<std::array<double, 2>>& range) {
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
     if (geometry.spacing_known) description += "spacing=" + shortest(geometry.spacing[2]) + "\n";
-    // ImageJ's origin is the position in voxels of the point 0, here in voxels of the spacing that it will read.
+    // ImageJ's origin is the position of the world's point 0 in voxels of the rounded spacing that ImageJ will read.
     for (std::size_t a = 0; a < 3; ++a) {
         const double per_length = a < 2 ? resolution(geometry.spacing[a]) : 1 / geometry.spacing[a];
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)
@@ -53,7 +53,7 @@ struct PageParts {
 };
 
 PageParts parts_of(const Index3& size, std::uint64_t pixel, bool big) {
-    // ImageJ opens neither tiles nor BigTIFF.
+    // Tiles are used only for BigTIFF, because ImageJ opens neither tiles nor BigTIFF.
     constexpr std::int32_t kTile = 256;
     constexpr std::uint64_t kStrip = 1U << 18;
     if (big) return {size, {kTile, kTile, 1}, true};

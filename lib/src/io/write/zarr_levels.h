@@ -3,13 +3,13 @@
 
 #include "covol/image.h"
 
-// The levels of a pyramid, each half the size of the previous one.
+// The levels of a pyramid. Along each axis, a level has half as many voxels as the previous level, or as many.
 namespace covol::detail {
 
 struct PyramidLevel {
     Index3 size;
     Index3 factor{1, 1, 1};  ///< voxels of the previous level for one voxel of this level: 1 or 2 along each axis
-    Index3 scale{1, 1, 1};   ///< the same relative to the finest level
+    Index3 scale{1, 1, 1};   ///< voxels of the finest level for one voxel of this level
 };
 
 /// The levels from the image down to one chunk. An axis is not halved while its spacing is at least twice the finest
@@ -20,10 +20,11 @@ struct PyramidLevel {
 /// The box of the finest level that corresponds to a box of this level.
 [[nodiscard]] VoxelBox finest_box(const PyramidLevel& level, const VoxelBox& box, const Index3& finest);
 
-/// Combines `factor` fine voxels into one: the most frequent value (for ties, the one that occurs first), or the mean.
+/// Combines boxes of `factor` fine voxels into one voxel each: the most frequent value (of several, the one that occurs
+/// first), or the mean.
 /// @param fine    the fine voxels, of `fine_size`, i fastest
 /// @param coarse  the result, a lattice of `coarse_size`
-/// @param first   position of the first voxel in it
+/// @param first   position in `coarse` of the voxel that the first fine voxels are combined into
 void coarsen(PixelType type, bool most_frequent, const Index3& factor, const void* fine, const Index3& fine_size,
              void* coarse, const Index3& first, const Index3& coarse_size);
 

@@ -49,7 +49,7 @@ std::string dtype_of(PixelType type) {
     });
 }
 
-/// OME-Zarr's name of a unit, from UDUNITS; empty if there is none.
+/// The name of a unit in OME-Zarr, which uses the names of UDUNITS; empty if there is none.
 std::string unit_name(const std::string& unit) {
     static constexpr std::array<std::array<const char*, 2>, 8> kNames{{{"pm", "picometer"},
                                                                        {"angstrom", "angstrom"},
@@ -64,7 +64,7 @@ std::string unit_name(const std::string& unit) {
     return {};
 }
 
-/// The numbers of i, j, k in the order z, y, x.
+/// A list of three numbers along i, j, k, in the order z, y, x.
 template <typename Numbers>
 Json reversed(const Numbers& n) {
     return Json::array({n[2], n[1], n[0]});
@@ -194,7 +194,7 @@ private:
         } else {
             gather(level, place, box, made.values);
         }
-        // A value other than zero has at least one byte other than zero.
+        // If all bytes are zero, all values are zero.
         if (made.values.find_first_not_of('\0') == std::string::npos) return {0.0, {}};
         std::string stored = made.values;
         stored.resize(voxel_count(chunk_) * width_);
@@ -227,7 +227,7 @@ private:
                 part.values.resize(voxel_count(fine.size()) * width_);
                 fill_value(source_.type(), *part.uniform, voxel_count(fine.size()), part.values.data());
             }
-            // All chunks have the same size, so along an axis that is not halved, a chunk covers one finer chunk.
+            // Chunks have the same size in all levels, so a chunk covers one or two finer chunks along each axis.
             Index3 first{};
             for (int a = 0; a < 3; ++a) first[a] = fine.min[a] / factor[a] - box.min[a];
             coarsen(source_.type(), source_.is_labels(), factor, part.values.data(), fine.size(), values.data(), first,
@@ -288,7 +288,7 @@ private:
     std::vector<PyramidLevel> levels_;
     std::atomic<std::uint64_t> done_ = 0;
     std::mutex lock_;
-    std::map<double, std::string> uniform_;  // chunks by value
+    std::map<double, std::string> uniform_;  // packed uniform chunks by value
 };
 
 }  // namespace

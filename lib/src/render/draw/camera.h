@@ -37,7 +37,8 @@ struct Camera {
     [[nodiscard]] Vec3 place(double x, double y) const;
 };
 
-/// A camera that shows the whole extent in `at`, with a margin of that fraction, enlarged by `zoom`.
+/// A camera that shows the whole extent in `at`, with a margin on each side that is this fraction of `at`, enlarged by
+/// `zoom`.
 [[nodiscard]] Camera frame(const Basis& basis, const Extent& extent, const Rect& at, double margin, double zoom);
 
 }  // namespace covol::figure

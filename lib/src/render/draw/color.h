@@ -25,7 +25,7 @@ inline Color to_color(const std::array<std::uint8_t, 3>& c) {
 inline constexpr Color kSkyBlue{0.337F, 0.706F, 0.914F}, kVermillion{0.835F, 0.369F, 0.0F}, kGreen{0.0F, 0.62F, 0.451F},
     kBlue{0.0F, 0.447F, 0.698F};
 
-/// Colours around and on top of the pictures.
+/// Colours of the background, of texts, and of less important texts.
 struct Theme {
     Color background, ink, faint;
 };

@@ -10,7 +10,7 @@ namespace covol::figure {
 namespace {
 
 constexpr double kLine = 1.45;   // distance between lines of the legend, in font sizes
-constexpr double kPatch = 0.75;  // patch of the legend, in font sizes
+constexpr double kPatch = 0.75;  // side of a square of the legend, in font sizes
 
 std::string shown_unit(const std::string& unit) {
     if (unit == "um" || unit == "micron" || unit == "microns" || unit == "micrometer" || unit == "micrometre")

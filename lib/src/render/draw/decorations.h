@@ -14,7 +14,7 @@ namespace covol::figure {
 /// "50 µm"; "50 units" if the unit is unknown.
 [[nodiscard]] std::string length_text(double length, const std::string& unit);
 
-/// A number with no more digits than it needs.
+/// A number with at most four decimals, fewer for larger numbers, and without trailing zeros.
 [[nodiscard]] std::string short_number(double value);
 
 struct BarStyle {
@@ -22,7 +22,7 @@ struct BarStyle {
     double text = 16;  ///< size of the font, pixels
     double rim = 0;    ///< width of a darker rim, pixels: for bars on images
 };
-/// A bar of a round length, about a fifth of `room`, with its text above; its right end and its lower edge are at x, y.
+/// A bar of a round length, 13 to 32 % of `available` (pixels), with its text above; its lower right corner is at x, y.
 void draw_scale_bar(Canvas& canvas, double x, double y, double available, double pixel, const std::string& unit,
                     const BarStyle& style);
 
@@ -34,11 +34,11 @@ void draw_axes(Canvas& canvas, double x, double y, double length, const Basis& b
 struct LegendEntry {
     std::string name;
     Color color;
-    bool is_mark = false;  ///< a dot, else a patch
+    bool is_mark = false;  ///< drawn as a dot; otherwise as a square
 };
-/// Its width and height in pixels.
+/// The legend's width and height in pixels.
 [[nodiscard]] std::array<double, 2> legend_size(const std::vector<LegendEntry>& entries, double text);
-/// @param x, y  its upper left corner
+/// @param x, y  the legend's upper left corner
 void draw_legend(Canvas& canvas, double x, double y, const std::vector<LegendEntry>& entries, double text,
                  const Color& ink);
 

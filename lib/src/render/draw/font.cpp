@@ -10,13 +10,13 @@
 namespace covol::figure {
 namespace {
 
-constexpr double kUnits = 512;  // per size of the font
+constexpr double kUnits = 512;  // units of the outlines per font size
 constexpr std::uint32_t kUnknown = 0xfffd;
 
 using Place = std::array<double, 2>;
 struct Glyph {
     double advance = 0;
-    std::vector<std::array<Place, 2>> sides;  // of its outline, which is closed; units of the font
+    std::vector<std::array<Place, 2>> sides;  // of its closed outlines, units of the font
 };
 
 class Reader {
@@ -99,7 +99,7 @@ std::vector<std::uint32_t> code_points(const std::string& utf8) {
     return codes;
 }
 
-/// The fractions of the pixels of a box that letters cover.
+/// The fraction of each pixel of a box that letters cover.
 class Coverage {
 public:
     Coverage(int x, int y, int width, int height)
@@ -143,7 +143,7 @@ private:
         for (int x = int(std::floor(x0)); x <= int(std::floor(x1)); ++x) {
             const double low = std::max(x0, double(x)), high = std::min(x1, double(x + 1));
             const double part = span > 1e-12 ? height * std::max(0.0, high - low) / span : height;
-            const double rest = part * (x + 1 - 0.5 * (low + high));  // covers the rest of this cell
+            const double rest = part * (x + 1 - 0.5 * (low + high));  // covers this cell to its right end
             const int cell = std::clamp(x, 0, width_);
             float* const cells = cells_.data() + std::size_t(row) * (width_ + 2) + cell;
             cells[0] += float(rest);

@@ -15,7 +15,7 @@ enum class Align { Left, Center, Right };
 struct TextStyle {
     double size = 16;  ///< of the font, pixels
     Color color{0, 0, 0};
-    Align align = Align::Left;  ///< position of x in the text
+    Align align = Align::Left;  ///< which part of the text is at x
     double halo = 0;            ///< width of a rim around the letters, pixels: for text on images
     Color halo_color{0, 0, 0};
 };

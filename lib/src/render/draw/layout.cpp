@@ -97,7 +97,7 @@ Split split(const Rect& available, double aspect, int rim, const std::vector<Til
                 best = {view, parts, way};
                 is_beside = beside;
             }
-    // The space that the parts leave on their side is given to the view.
+    // Moves the parts to the far side and enlarges the view by the space that they leave.
     int& corner = is_beside ? best.parts.bounds.x : best.parts.bounds.y;
     const int moved =
         (is_beside ? available.right() - best.parts.bounds.width : available.bottom() - best.parts.bounds.height) -

@@ -7,7 +7,7 @@
 
 namespace covol::figure {
 
-/// A part whose sides are known before its scale.
+/// The size of a part of a figure, before a scale is chosen.
 struct Cell {
     double width = 1, height = 1;  ///< world units
 };
@@ -15,7 +15,7 @@ struct Cell {
 /// Columns of parts at one scale, each filled from the top.
 struct Tiling {
     std::vector<std::vector<Cell>> columns;
-    /// Pixel positions, column by column, and the scale at which the tiling fits into `room`, centred.
+    /// Pixel positions, column by column, and the scale at which the tiling fits into `available`, centred.
     struct Placed {
         std::vector<Rect> at;
         Rect bounds;
@@ -34,9 +34,9 @@ struct Tiling {
 struct Split {
     Rect view;
     Tiling::Placed parts;
-    int way = 0;  ///< index among those given
+    int way = 0;  ///< index of the chosen tiling among those given
 };
-/// The split that leaves the smallest part of `room` empty; the view gets somewhat more than the parts.
+/// The split of `available` in which view and parts are largest and leave little empty; the view has more weight.
 /// @param aspect  width of the view's content divided by its height
 /// @param rim     pixels below the view's content, for a scale bar
 [[nodiscard]] Split split(const Rect& available, double aspect, int rim, const std::vector<Tiling>& ways, int gap);

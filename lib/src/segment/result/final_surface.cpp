@@ -75,7 +75,8 @@ struct Maker {
         take_mesh();
     }
 
-    /// Replaces level set and mesh by those of another closed mesh, unless these have more pieces and handles.
+    /// Replaces level set and mesh by those of another closed mesh. If these have more pieces and handles, their
+    /// topology is constrained to that of the previous surface.
     void replace_by(const TriangleMesh& mesh) {
         const int before = complexity(measure(made.mesh));
         const FloatGridPtr rough = made.level_set;
@@ -89,7 +90,7 @@ struct Maker {
     /// A surface that is defined by points alone may have holes between them.
     [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
 
-    /// The mesh trimmed where points are missing, or with these parts replaced; none if the mesh stays closed.
+    /// The mesh trimmed where points are missing, or with these parts replaced; none if the mesh is kept unchanged.
     std::optional<TreatedHoles> treated_holes(double distance, double slack) const {
         const auto trimmed = [&] { return trim_holes(made.mesh, made.distance_to_points, distance, slack, run()); };
         switch (options().holes.policy) {
@@ -103,8 +104,8 @@ struct Maker {
             TreatedHoles open = trimmed();
             double rims = 0;
             for (const BoundaryLoop& loop : open.report.loops) rims += loop.length;
-            // The part that closes a sheet is at least as large as the sheet itself. Points along curves support strips
-            // and no sheet.
+            // The part that closes a sheet is at least as large as the sheet itself. Points along curves support no
+            // sheet but narrow strips, whose area is small relative to the length of their rims.
             const bool is_sheet = measure(open.mesh).area > 2 * distance * rims;
             if (is_sheet && open.report.fraction > 0.5) return open;
         } catch (const Error& error) {
@@ -176,7 +177,7 @@ struct Maker {
     void make_and_measure_mesh() {
         take_mesh();
         if (may_have_holes()) treat_holes();
-        // Parts of both run on a single thread.
+        // Both at the same time, because parts of each run on a single thread.
         tbb::parallel_invoke([&] { made.measures = measure(made.mesh); },
                              [&] {
                                  if (!points.empty()) made.mark_distances = detail::distances_to(made.mesh, made.marks);

@@ -93,10 +93,10 @@ private:
                  "there, or give a position outside the body (`outside`)");
     }
 
-    /// Noise fills space within its range. If the nearest points lie on sheets although the smoothing was that for
-    /// noise, the points are folds: the deviation of twelve neighbouring points from a quadric is 0.11 to 0.247 of
-    /// their reach in folds, 0.26 or more if the noise is as large as the distance between nearest points, and 0.33 if
-    /// they fill a ball.
+    /// Noise scatters points in all directions within its range. If the nearest points lie on sheets although the
+    /// surface was smoothed for noise, the points are folds: the deviation of twelve neighbouring points from a quadric
+    /// is 0.11 to 0.247 of their reach in folds, 0.26 or more if the noise is as large as the distance between nearest
+    /// points, and 0.33 if they fill a ball.
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
@@ -107,7 +107,7 @@ private:
                  "): folds or walls that are only two or three points apart are lost; sample more densely there");
     }
 
-    /// Values are processed in single precision.
+    /// Image values are processed in single precision, which may not resolve small differences of large values.
     void find_lost_precision() {
         const auto [low, high] = problem_.image->percentiles(0.01, 0.99);
         const double largest = std::max(std::abs(low), std::abs(high));
@@ -124,7 +124,7 @@ private:
 
     [[nodiscard]] Normals normals_at_marks() const {
         const std::size_t every = std::max<std::size_t>(1, marks_.size() / kCommon.sample);
-        std::vector<Vec3> beside;  // two samples for each mark and axis, before and behind
+        std::vector<Vec3> beside;  // two positions for each mark and axis, half a voxel to either side
         for (std::size_t n = 0; n < marks_.size(); n += every)
             for (int a = 0; a < 3; ++a)
                 for (const double step : {-0.5, 0.5}) beside.emplace_back(marks_[n])[std::size_t(a)] += step * h_;

@@ -12,7 +12,7 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr int kRefinement = 2;  // of the voxel size, from level to level: SegmentOptions::coarse_levels
+constexpr int kRefinement = 2;  // factor of the voxel size from one level to the next: SegmentOptions::coarse_levels
 
 bool is_large(const Domain& d) {
     int minimum = d.max[0] - d.min[0];
@@ -20,7 +20,8 @@ bool is_large(const Domain& d) {
     return minimum >= kFlow.min_coarsened;
 }
 
-/// Automatic if the way to the surface may be long. Tagging and a previous result start close to it.
+/// The requested number of levels; by default one for a sphere or box in a large domain that was not grown, because
+/// such a start may be far from the surface, and none for other starts.
 int levels_of(const SegmentOptions& options, const StartFacts& start) {
     if (options.coarse_levels) return *options.coarse_levels;
     const bool is_rough = is_any<SphereStart, BoxStart>(options.start);
@@ -32,15 +33,16 @@ EvolveOptions coarsened(EvolveOptions flow, double h) {
     flow.tolerance = std::max(flow.tolerance, kFlow.rough_tolerance);
     if (flow.tau)
         *flow.tau *= kRefinement;
-    else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // otherwise it grows automatically
+    else if (uses_image(flow) && flow.image_yields.value_or(0) == 0)  // otherwise the time step grows automatically
         flow.tau = kFlow.rough_tau * h;
     if (const double range = flow.attraction_range.value_or(0); range > 0)
         flow.attraction_range = std::max(range, kHalfWidthVoxels * h);
     return flow;
 }
 
-// On the coarse level two edges closer than a few voxels merge, so that the fine level has to approach from the side of
-// the start: from as far as the clamped values of the band, which must not change their sign, allow.
+// Moves the coarse result back towards the start: edges that are a few voxels apart merge on the coarse level, and the
+// fine level has to reach them from the start's side. Clamped values of the band must not change sign, which limits the
+// distance.
 void step_back(FloatGrid& u, const FloatGrid& start, double h) {
     const auto back = static_cast<float>((kHalfWidthVoxels - 1) * h);
     const auto start_at = start.getConstAccessor();
@@ -49,11 +51,11 @@ void step_back(FloatGrid& u, const FloatGrid& start, double h) {
 }
 
 EdgeOptions coarsened(EdgeOptions edge, double h) {
-    edge.sigma = std::max(edge.sigma.value_or(0), 0.5 * h);  // what is finer than a voxel is not sampled
+    edge.sigma = std::max(edge.sigma.value_or(0), 0.5 * h);  // details finer than a voxel are not sampled
     return edge;
 }
 
-/// `start` in voxels of h; u is null if nothing of it remains at that size.
+/// `start` on a lattice of voxel size h; u is null if nothing of it remains at that size.
 StartSurface coarsened(const Problem& problem, const StartSurface& start, double h) {
     StartSurface coarse;
     StartFacts& facts = coarse.facts;

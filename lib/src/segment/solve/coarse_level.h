@@ -1,6 +1,6 @@
 #pragma once
-// Coarse to fine: the way from the start is long in voxels of h. In voxels of 2h a step costs a quarter and goes twice
-// as far; at h only the remaining way from the surface of the coarse level is computed.
+// Coarse to fine: a start far from the result needs many steps on voxels of size h. On voxels of size 2h a step costs a
+// quarter and moves the surface twice as far; on the fine lattice the flow continues from that result.
 #include "segment/solve/flow.h"
 
 namespace covol::pipeline {
@@ -8,7 +8,7 @@ namespace covol::pipeline {
 /// The end of the flow on coarse levels, as a start on the fine lattice.
 struct CoarsePass {
     int levels = 0;                                   ///< requested
-    FloatGridPtr u;                                   ///< null if there is none, or it is not usable, which is reported
+    FloatGridPtr u;                                   ///< null if no level was solved, or its surface vanished
     std::vector<SegmentReport::CoarseLevel> reports;  ///< the coarsest first
     StepReport report;
 };

@@ -42,7 +42,7 @@ bool covers(const FloatGrid& field, const FloatGrid& u) {
     return true;
 }
 
-/// The length of the diagonal of the box around both.
+/// The length of the diagonal of the box around both boxes.
 double diagonal(const WorldBox& a, const WorldBox& b) {
     double squares = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -64,8 +64,8 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     return slope;
 }
 
-/// Distance beside the marks at which the inner position still lies inside: in a thin body a larger one would lie
-/// beyond the opposite wall.
+/// The largest distance up to `reach` at which, for most marks, the position that far inside the wall lies inside the
+/// body: in a thin body it would otherwise lie beyond the opposite wall.
 double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                     double reach, double minimum) {
     for (; reach > minimum; reach *= 0.75) {
@@ -73,7 +73,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
             for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
-            inside += body.level(side) < -0.5 * reach;  // no other wall is closer than half of the way
+            inside += body.level(side) < -0.5 * reach;  // no wall is closer than half of this distance
         }
         if (2 * inside > places.size()) return reach;
     }
@@ -99,7 +99,7 @@ FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u,
     if (const double range = start.flow.attraction_range.value_or(0); range > 0)
         return find_distance(points, start.domain, range + slack, 0, report, run);
     const WorldBox all = start.domain.world_box();
-    // One voxel for each leaf of u, of which one position is measured.
+    // d is computed with one voxel for each leaf of u, and read at one position in each leaf.
     const double coarse_h = double(FloatGrid::TreeType::LeafNodeType::DIM) * h;
     const Domain coarse = make_domain(all, coarse_h);
     const FloatGridPtr d = compute_distance(points, coarse, {diagonal(all, bounding_box(points))}, run).grid;
@@ -140,7 +140,7 @@ EdgeChoice choose_edge_feature(const Problem& problem, const Choices& choices) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    // Three standard deviations from a mark, the smoothed image shows hardly anything of what is at the mark.
+    // Three standard deviations of the smoothing away from a mark, the values at the mark hardly affect the image.
     const double reach =
         reach_within(*body, places, normals, 3 * std::max(choices.edge.sigma.value_or(0), choices.h), choices.h);
     const MarkedFeature found = detect_feature(*problem.image, places, normals, reach);

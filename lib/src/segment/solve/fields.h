@@ -6,7 +6,7 @@ namespace covol::pipeline {
 
 inline constexpr double kTubeSlackVoxels = 2.0;  // the upwind scheme reads one voxel beyond the band
 
-/// Width of the band and of the neighbours that the scheme reads, world units.
+/// Half-width of the band, plus the voxels beyond it that the scheme reads, world units.
 [[nodiscard]] inline double band_slack(double h) { return (kHalfWidthVoxels + kTubeSlackVoxels) * h; }
 
 /// The distance to the points within `radius`, world units; its time is added to `report`.
@@ -15,17 +15,17 @@ inline constexpr double kTubeSlackVoxels = 2.0;  // the upwind scheme reads one 
 [[nodiscard]] FloatGridPtr find_distance(const std::vector<Vec3>& points, const Domain& domain, double radius,
                                          double reach, StepReport& report, const RunContext& run);
 
-/// The same as far as the flow from `start` needs it, null if no points attract. Beyond the attraction range d is not
-/// needed. Without a range it must reach from the start to the points: the surface moves down the gradient of d, so
-/// that the maximum of d on the start bounds all values that it meets.
+/// The distance to the points as far as the flow from `start` needs it; null if no points attract. With an attraction
+/// range, that is the range. Without one, it is the maximum of d on the start: the surface moves down the gradient of
+/// d, so that it meets no larger values.
 [[nodiscard]] FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u, StepReport& report,
                                                   const RunContext& run);
 
-/// The distance to the trusted marks, if they outweigh the points between the slices of contours and the image acts;
-/// otherwise null.
+/// The distance to the trusted marks, by which these outweigh the points between the slices of contours. Null unless
+/// there are contours and both points and image act, within an attraction range.
 [[nodiscard]] FloatGridPtr find_trusted_distance(const Problem& problem, const StartFacts& start, StepReport& report);
 
-/// How g is computed: the options as used, which fix its meaning.
+/// The options of the edge detector g, with the feature that was chosen.
 struct EdgeChoice {
     EdgeOptions options;
     StepReport report;
@@ -37,7 +37,7 @@ struct EdgeChoice {
 /// g on the band of a flow.
 struct Edges {
     FloatGridPtr grid;    ///< null if the image does not act
-    EdgeOptions options;  ///< later calls use the same K and range
+    EdgeOptions options;  ///< with the computed K and intensity range, which later calls use, too
     EdgeReport found;
     StepReport report;
 };
@@ -46,7 +46,7 @@ struct Edges {
 [[nodiscard]] Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGrid& u,
                                const EdgeOptions& options);
 
-/// g on the band of `u` if it has moved beyond the one of `edges`, else null.
+/// g on the band of `u` if that band has left the region of `edges`, else null.
 [[nodiscard]] FloatGridPtr extended_edges(const Problem& problem, const StartFacts& start, const FloatGrid& u,
                                           const Edges& edges);
 

@@ -86,8 +86,8 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     GuidanceOptions options;
     options.mark_precision = problem.options.mark_precision;
     options.weight = start.flow.rho;
-    // The image must not determine how wrong the body between contours is: at another border it would imply a large
-    // error.
+    // The range is not estimated from the image: if the image matched at the border of another structure, it would
+    // imply that the body between contours has a large error.
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     options.error_slope = start.inference.error_slope;

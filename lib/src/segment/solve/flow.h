@@ -1,15 +1,15 @@
 #pragma once
-// Evolves a start until it is steady, or moves one that is the surface already by the image alone.
+// Evolves a start until it is steady. A start that is already the surface is only moved by the image.
 #include <vector>
 
 #include "segment/solve/fields.h"
 
 namespace covol::pipeline {
 
-/// A steady level set, and how it was obtained.
+/// The level set after the flow, and how it was obtained.
 struct Solution {
     StartFacts start;  ///< the start that it was made from
-    FloatGridPtr u;    ///< for a cloud that does not flow its field, as in StartSurface::u
+    FloatGridPtr u;    ///< the level set; for a cloud that does not flow, its field as in StartSurface::u
     FloatGridPtr distance;
     Edges edges;
     EvolveReport solve;
@@ -29,14 +29,15 @@ struct Reached {
 };
 
 /// Evolves the start's level set, in place if it flows.
-/// @param reached  kept up to date, or null
+/// @param reached  receives the grids as they are made, or null
 [[nodiscard]] Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edge,
                             Reached* reached = nullptr);
 
 /// The report of a level set that does not move.
 [[nodiscard]] EvolveReport steady_report(const FloatGrid& u);
 
-/// Whether the flow lost a start that was good by itself.
+/// Whether the flow made a usable start worse: the surface vanished, a grown start lost more than half of its volume,
+/// or another start moved away from the trusted marks.
 [[nodiscard]] bool has_lost(const Solution& solution, const FloatGrid& start);
 
 /// Checks the result of the flow. @throws Error InvalidInput (the surface vanished).

@@ -46,7 +46,7 @@ Solution after(const Solution& earlier, Solution later) {
     return later;
 }
 
-/// Returns to a start that was good by itself, in place of a flow that lost it.
+/// Returns to a usable start, in place of a flow that made it worse: has_lost().
 /// @param u  of that start
 Solution start_instead(const Problem& problem, const Solution& lost, const FloatGridPtr& u, Reached* reached) {
     if (lost.start.origin == StartOrigin::Grown) {
@@ -74,7 +74,8 @@ Solution start_instead(const Problem& problem, const Solution& lost, const Float
     return after(lost, std::move(rested));
 }
 
-/// The start of minimum bending energy through the marks; none if it does not exist, or does not pass them better.
+/// The guess through the marks; none if it cannot be computed, or if the flow's surface did not vanish and the guess
+/// also misses the marks.
 std::optional<StartSurface> find_better_guess(const Problem& problem, const Choices& choices,
                                               const Solution& solution) {
     try {

@@ -44,8 +44,8 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     Vec3 side;
     for (int a = 0; a < 3; ++a) side[a] = box.max[a] - box.min[a];
     const double radius = 0.5 * std::hypot(side[0], side[1], side[2]);  // of the ball around the box
-    // Of n random points on a surface with this mean distance between nearest ones, the expected number that have a
-    // wider gap beside them is 1/n.
+    // In units of the mean distance between nearest points. Of n random points on a surface, the expected number that
+    // have a wider gap beside them is 1/n.
     const double gap = 2 * std::sqrt(2 * std::log(double(std::max<std::size_t>(points.size(), 2))) / std::numbers::pi);
     const double layer = std::min(gap * measure_spacing(points).mean, radius);
     text << (is_line   ? "the points lie on a line"

@@ -15,8 +15,8 @@
 namespace covol::pipeline {
 namespace {
 
-// In the holes of a scan nothing holds the surface, which would slide along the adjoining walls. It may sink by this
-// depth.
+// The obstacle of the flow, `depth` inside the start: in the holes of a scan no points hold the surface, which would
+// otherwise slide along the adjoining walls.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
     FloatGridPtr obstacle = start.deepCopy();
     for (auto leaf = obstacle->tree().beginLeaf(); leaf; ++leaf)

@@ -12,8 +12,8 @@
 namespace covol::pipeline {
 namespace {
 
-/// Continues a body that extends beyond the image a little: if it ended at the image's end, the flow would turn its
-/// wall to a right angle.
+/// Extends the domain on the sides where the body extends beyond it: if the body ended at the image's end, the flow
+/// would bend its wall until it is perpendicular to that end.
 Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     const WorldBox box = domain.world_box();
     const int layers = int(kCommon.beyond_voxels);
@@ -35,7 +35,7 @@ const char* why_tag(const Problem& problem, const std::vector<Vec3>& loose, doub
     const ContourSolid& body = *problem.body();
     for (const Vec3& seed : problem.options.exterior_seeds)
         if (body.level(seed) < 0) return "an exterior seed lies inside the contours";
-    // Maximum error of the body between slices, and beyond the last one.
+    // Maximum plausible error of the body: the attraction range, or the distance between slices if that is larger.
     const double far =
         std::max(kAttractionVoxels * h, problem.is_guided() ? problem.options.contours->slice_distance : 0.0);
     for (const Vec3& point : loose)

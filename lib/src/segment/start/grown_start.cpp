@@ -5,7 +5,7 @@
 
 namespace covol::pipeline {
 
-// Without edges nearby, curvature would close the start before it reaches any.
+// Without growth, curvature would make a start that has no edges nearby vanish before it reaches any.
 void grow_to_edges(const Problem& problem, const Choices& choices, StartSurface& start) {
     StartFacts& facts = start.facts;
     if (!problem.is_guided() || !uses_image(facts.flow) || uses_points(facts.flow)) return;

@@ -41,13 +41,13 @@ GuessOptions guess_options(const Problem& problem, double h, const std::vector<V
     options.inside = requested.inside;
     options.outside = requested.outside;
     options.outside.insert(options.outside.end(), requested.exterior_seeds.begin(), requested.exterior_seeds.end());
-    // Normals of a file may point inwards, or anywhere.
+    // Other normals from a file are not used, because they may point inwards or in any direction.
     if (requested.hints.is_outward && requested.hints.normals.size() == marks.size())
         options.normals = requested.hints.normals;
     return options;
 }
 
-/// Upper bound of the area: about that of a ball as large as the box.
+/// Estimate of the surface's area: the sum of three sides of the box, about the area of a ball that fills it.
 double largest_area(const WorldBox& box) {
     double area = 0;
     for (int a = 0; a < 3; ++a) {
@@ -57,7 +57,7 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
-/// Number of positions with a known side that lie on the wrong one.
+/// Number of seeds that lie on the wrong side of the surface.
 std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
     std::size_t wrong = 0;
     for (const double level : detail::levels_at(u, problem.options.inside)) wrong += level >= 0;
@@ -65,8 +65,8 @@ std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
     return wrong;
 }
 
-/// If the surface of minimum bending energy diverges between thin parts, the interpolation between the sections does
-/// not.
+/// Replaces the guess by the interpolation between the sections if this reduces the number of seeds on the wrong side:
+/// the surface of minimum bending energy may diverge between thin parts, the interpolation does not.
 void take_sections(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     StartFacts& facts = start.facts;
     const std::size_t before = count_wrong(problem, *start.u);
@@ -124,8 +124,8 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
     facts.domain = problem.domain(h, points, kStarts.margin_fraction * longest_side(box) + kCommon.beyond_voxels * h);
-    // A body that the image cuts is continued beyond it: at the image's end its wall would be closed, and the image
-    // would be evaluated at a cap. The clip at the end makes the cut.
+    // A body that the image cuts is continued beyond the image and clipped later: if it ended at the image's end, it
+    // would be closed by a cap there, and the image would be evaluated at that cap.
     if (problem.image != nullptr && !problem.options.roi)
         facts.domain = widened(facts.domain, int(kCommon.beyond_voxels));
     detail::require_band_memory(largest_area(box), h, "segment", run);

@@ -8,15 +8,15 @@
 
 namespace covol::pipeline {
 
-/// What the current level set was made from, which bounds its distance from the result.
+/// What the current level set was made from. This determines how far it may be from the result.
 enum class StartOrigin {
     Given,       ///< a sphere, a box, a file, seeds
-    Grown,       ///< one of these, grown to the image's edges
-    Guess,       ///< the surface through few marks
+    Grown,       ///< a start of kind Given, grown to the image's edges
+    Guess,       ///< the surface through few marks, or a given start that marks correct
     Corrected,   ///< the result of another tool, corrected by marks
-    Settled,     ///< a result that no mark corrects
+    Settled,     ///< a previous result that is kept, because there are no marks
     Cloud,       ///< the surface of a cloud: quadrics, and an indicator between them
-    Tagged,      ///< the tagged points (also closed, or as a solid)
+    Tagged,      ///< the surface from tagging, possibly closed by a ball
     Contours,    ///< the body between contours
     CoarseLevel  ///< the end of the flow on a coarser lattice
 };
@@ -25,14 +25,14 @@ enum class StartOrigin {
 struct StartFacts {
     StartOrigin origin = StartOrigin::Given;
     Domain domain;
-    MarkSets marks;                        ///< those that act from here on
-    EvolveOptions flow;                    ///< of the flow from here
-    std::optional<double> tag_distance;    ///< D, of points that were tagged
-    bool encloses = true;                  ///< likewise: whether they enclose something at that D
-    std::vector<Vec3> on_surface;          ///< of a guess: marks that do not lie in the cut at the image's end
+    MarkSets marks;                        ///< the marks that the following steps use
+    EvolveOptions flow;                    ///< options of the flow that follows
+    std::optional<double> tag_distance;    ///< D, if points were tagged
+    bool encloses = true;                  ///< of tagged points: whether they enclose something at D
+    std::vector<Vec3> on_surface;          ///< of a guess: its marks, without those in the cut at the image's end
     std::vector<char> border_inside;       ///< of a start that the caller specified: inside_on_border(); else empty
     CorrectionOptions correction_options;  ///< as used
-    std::shared_ptr<const GuessCorrection> correction;  ///< of the result of another tool
+    std::shared_ptr<const GuessCorrection> correction;  ///< of another tool's result, or null
     GuessReport guess;
     InferenceReport inference;  ///< of a guess in an image
     CloudReport cloud;
@@ -52,9 +52,9 @@ struct StartSurface {
     [[nodiscard]] double h() const { return facts.domain.voxel_size; }
 };
 
-/// Whether the start, possibly moved by the image, is the result: nothing moves it off the marks, and no curvature
-/// shrinks it. In stained sheets, which extend beside and across the border that contours mark, guidance by the profile
-/// alone fails; there the start flows with the edge detector for lines, with the body as the start.
+/// Whether the start, possibly moved by the image, is the result, so that no flow follows. The body between contours
+/// flows if the image has lines as edges: stained sheets can extend beside and across the marked border, and guidance
+/// by the intensity profile alone then fails.
 [[nodiscard]] inline bool is_final_start(const Problem& problem, const StartFacts& start, EdgeFeature feature) {
     if (start.origin == StartOrigin::Corrected || start.origin == StartOrigin::Settled) return true;
     if (!problem.is_guided() || !uses_points(start.flow)) return false;

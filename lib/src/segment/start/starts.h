@@ -1,5 +1,5 @@
 #pragma once
-// The eight kinds of start: the domain, u0 on its band, and the distance to the points if they act.
+// The kinds of start. Each gives the domain, the level set on its band, and the distance to the points if they attract.
 #include "segment/start/start_surface.h"
 
 namespace covol::pipeline {
@@ -40,16 +40,16 @@ void grow_to_edges(const Problem& problem, const Choices& choices, StartSurface&
 /// The domain of a start that flows: for a rotated image it extends a little beyond the image on all sides.
 [[nodiscard]] Domain choose_domain_of_flow(const Problem& problem, double h, const std::vector<Vec3>& points);
 
-/// Before it flows, a start in a rotated image is continued beyond the image's end, as it is at the domain's end in one
-/// that is not rotated.
+/// In a rotated image, continues a start beyond the image's end up to the domain's end, before it flows. Returns `u`
+/// unchanged in other images.
 [[nodiscard]] FloatGridPtr carried_beyond_turned_image(const Problem& problem, const Domain& domain, FloatGridPtr u);
 
-/// The body between closed contours, or the tagged points if there is none, or if it cannot be the only start.
+/// The body between closed contours; the tagged points if there is no such body, or if points or seeds contradict it.
 [[nodiscard]] StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& choices, MarkSets marks);
 
-/// From the points: the tagged surface, its closing if D is wide, or, for a scan that encloses nothing, a solid that
-/// carries the points.
-/// @param hole_seeds  in the holes of contours
+/// The surface from tagging, closed by a ball of radius D if D exceeds the band. A body that the image cuts off is
+/// continued beyond the image.
+/// @param hole_seeds  seeds in the holes of contours
 [[nodiscard]] StartSurface start_by_tagging(const Problem& problem, const Choices& choices, MarkSets marks,
                                             const std::vector<Vec3>& hole_seeds);
 

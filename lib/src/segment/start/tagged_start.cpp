@@ -27,8 +27,8 @@ void append(const std::vector<Vec3>& more, std::vector<Vec3>& all) { all.insert(
 struct Tagger {
     const Problem& problem;
     double h;
-    std::vector<Vec3> exterior;  ///< seeds that the caller declares to lie beyond D
-    std::vector<Vec3> outside;   ///< seeds that may lie arbitrarily close to the border
+    std::vector<Vec3> exterior;  ///< seeds that the caller declares to be farther than D from all points
+    std::vector<Vec3> outside;   ///< seeds that may lie arbitrarily close to the surface
 
     [[nodiscard]] std::vector<Vec3> all_seeds() const {
         std::vector<Vec3> seeds = exterior;
@@ -36,8 +36,8 @@ struct Tagger {
         return seeds;
     }
 
-    /// Seeds in holes narrower than D are not exterior; seeds of the exterior that the user gave are checked by
-    /// tag_interior().
+    /// The exterior seeds, which tag_interior() checks, and the outside seeds that are farther than D from the points.
+    /// Outside seeds in narrower holes are left out.
     [[nodiscard]] std::vector<Vec3> seeds_beyond(double D, const FloatGrid& distance, const Domain& domain) const {
         std::vector<Vec3> seeds = exterior;
         const auto d_at = distance.getConstAccessor();
@@ -73,7 +73,7 @@ Domain around(Domain domain, const std::vector<Vec3>& points, double margin) {
 
 /// A tagged body that extends beyond the image.
 struct CutBody {
-    std::vector<Vec3> beyond;  ///< the points that close it there
+    std::vector<Vec3> beyond;  ///< the points beyond the image that close it
     FloatGridPtr level_set;    ///< on a domain wider than the image
     BandReport band;
     TagDistanceChoice tag;
@@ -81,7 +81,7 @@ struct CutBody {
 };
 
 /// @param beyond  points outside the image that close the cloud there
-/// @return none if it encloses nothing even so
+/// @return none if the points enclose nothing even with `beyond`
 std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain,
                                 std::vector<Vec3> beyond, const char* how) {
     std::vector<Vec3> closed = points;
@@ -104,7 +104,7 @@ std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& p
     return body;
 }
 
-/// Whether the points enclose a body even if the image's end is treated as a hole wherever it cuts them.
+/// Whether the points enclose a body without further points beyond the image's end.
 bool encloses_alone(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain) {
     if (const std::optional<double>& D = tagger.problem.options.tag_distance)
         return !tagger.tag(points, domain, *D).report.leaks;
@@ -122,15 +122,16 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
                      "the marks' section on the image's end slices is continued beyond it");
         if (body) return body;
     }
-    // Farther from a face there would be a hole, which does not show that the face cuts the body.
+    // Only points near a face are mirrored: a wider gap beside a face is a hole, and does not show that it cuts the
+    // body.
     std::vector<Vec3> images = detail::mirrored(points, faces, kHoles.far * measure_spacing(points).median);
     if (images.empty() || encloses_alone(tagger, points, domain)) return {};
     return tag_with(tagger, points, domain, std::move(images),
                     "together with their mirror image beyond the image's end, the marks enclose a body");
 }
 
-/// Marks within the section on an end slice, and the points that continue them, show that the body extends beyond it;
-/// they do not lie on the surface.
+/// The marks and the points that continue them beyond the image, without those at an end slice that lie deep inside the
+/// body: these only show that the body extends beyond the image, and do not lie on the surface.
 /// @param beyond  the points that continue them
 MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
                   const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
@@ -155,8 +156,8 @@ MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSu
     return marks;
 }
 
-// Otherwise the flood would enter through the cut, or stop between a face and a surface that leaves the image at a
-// small angle.
+// Starts from a body that the image cuts off, if there is one. Without this, the flood would enter through the cut, or
+// stop between a face and a surface that leaves the image at a small angle.
 std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choices& choices, const MarkSets& marks) {
     const Problem& problem = tagger.problem;
     if (problem.image == nullptr || problem.options.roi) return {};
@@ -169,7 +170,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         const Domain domain = problem.domain(tagger.h, marks.attracting, 0);
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
-        // If it ended at the image's end, the flow would turn the wall to a right angle.
+        // If the body ended at the image's end, the flow would bend its wall until it is perpendicular to that end.
         facts.domain = widened(domain, int(kCommon.beyond_voxels));
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
@@ -237,8 +238,8 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     start.u = tagged.grid;
     if (tagged.report.leaks) remarks.warn(tagged.report.leak(), run);
     if (D <= band_slack(h)) return start;
-    // The tagged surface lies D outside the points, which is as far as the widest gap is large. Its closing by a ball
-    // of radius D touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
+    // The tagged surface lies D outside the points, which is far if a gap is wide. Its closing by a ball of radius D
+    // touches the points, needs a band of a few voxels instead of {d <= D + 3h}, and is closer to the result.
     if (const FloatGridPtr closed = close_by_ball(*start.u, D, run)) {
         start.u = closed;
         facts.flow.follow = true;

@@ -127,7 +127,7 @@ FrameChoice parse_frames(const std::string& flag, const std::string& text) {
 
 Named split_name(const std::string& text) {
     const std::size_t at = text.find('=');
-    // Folder names may contain '=', too; names of structures contain no slash.
+    // A path may contain '=', too: NAME= is assumed only if NAME has no slash and the whole text is no existing path.
     std::error_code status;
     const bool has_name =
         at != std::string::npos && at > 0 && text.find('/') >= at && !std::filesystem::exists(text, status);

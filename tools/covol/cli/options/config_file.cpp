@@ -56,7 +56,7 @@ private:
             while (peek() != '\n') ++at_;
     }
 
-    /// @return false at the end of the file
+    /// Skips blanks, comments and empty lines. @return false at the end of the file
     bool skip_to_content() {
         for (;; ++at_, ++line_) {
             skip_blanks();
@@ -74,7 +74,7 @@ private:
         if (peek() != '\n') fail("expected the end of the line, got '" + std::string(text_.substr(at_, 20)) + "'");
     }
 
-    /// [segment], [[segment]], ["segment"]
+    /// Reads the header of a section: [segment], [[segment]] or ["segment"].
     std::string section() {
         std::size_t brackets = 0;
         for (; peek() == '['; ++at_) ++brackets;
@@ -89,7 +89,7 @@ private:
     Entry entry() {
         Entry found{section_, peek() == '"' || peek() == '\'' ? quoted() : bare(" \t\r=#"), {}};
         if (found.name.empty()) fail("expected NAME = VALUE");
-        // segment.theta = 0.5
+        // A name outside of sections may be prefixed by its section, as in "segment.theta = 0.5".
         if (const std::size_t dot = found.name.find('.'); dot != std::string::npos && found.section.empty()) {
             found.section = found.name.substr(0, dot);
             found.name.erase(0, dot + 1);
@@ -130,7 +130,7 @@ private:
         return list;
     }
 
-    /// One or more on a line, separated by blanks or commas; one empty value if there is none.
+    /// The values up to the end of the line, separated by blanks or commas; one empty value if there is none.
     std::vector<std::string> values() {
         std::vector<std::string> list;
         for (; peek() != '\n' && peek() != '#'; skip_blanks()) {
@@ -164,7 +164,7 @@ private:
         return value;
     }
 
-    /// Called at a backslash; leaves the position at the last character of the escape sequence.
+    /// Decodes the escape sequence at the current position, a backslash; ends at the last character of the sequence.
     void escape(std::string& value) {
         constexpr std::string_view kNames = "btnfr\"\\", kMeanings = "\b\t\n\f\r\"\\";
         ++at_;
@@ -218,7 +218,7 @@ std::string all_of(std::istream& input) {
     return text;
 }
 
-/// A number or a Boolean, which TOML writes without quotes.
+/// Whether the value is a number or a Boolean, which TOML writes without quotes.
 bool is_plain(const std::string& value) {
     if (value == "true" || value == "false") return true;
     double number = 0;
@@ -227,7 +227,8 @@ bool is_plain(const std::string& value) {
     return digit && error == std::errc() && end == value.data() + value.size();
 }
 
-/// A basic string of TOML. Characters that a shell would interpret within double quotes are written as numeric escapes.
+/// The value as TOML: a basic string unless is_plain(). Characters that a shell would interpret within double quotes
+/// are written as numeric escapes.
 std::string toml_text(const std::string& value) {
     if (is_plain(value)) return value;
     std::string text = "\"";
@@ -260,7 +261,7 @@ std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const 
         if (!is_common) item.parents = {command};
         item.name = std::move(entry->name);
         item.inputs = std::move(entry->values);
-        // A list may be written as one line for each value.
+        // A list of values may be given by repeated lines with the same name.
         if (!items.empty() && items.back().name == item.name && items.back().parents == item.parents)
             items.back().inputs.insert(items.back().inputs.end(), item.inputs.begin(), item.inputs.end());
         else

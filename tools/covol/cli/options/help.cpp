@@ -10,10 +10,10 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kColumn = 30;  // at which texts begin
-constexpr std::size_t kWidth = 100;  // of a line
+constexpr std::size_t kColumn = 30;  // column in which descriptions begin
+constexpr std::size_t kWidth = 100;  // maximum length of a line
 
-// In the order of Group.
+// Indexed by Group.
 constexpr std::array kGroupNames{"Input", "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh", "Picture",
                                  "Start", "Domain", "Image edges",        "Flow",         "Numerics", "Help"};
 
@@ -62,7 +62,7 @@ std::string section(const std::string& title, const OptionList& options) {
     return text;
 }
 
-/// "covol segment IMAGE... -o OUT.vdb [OPTIONS]"
+/// The usage line, such as "Usage: covol segment IMAGE... -o OUT.vdb [OPTIONS]".
 std::string usage(const CLI::App& command, const std::string& name) {
     std::string text = "Usage: " + name;
     for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return o->get_positional(); }))
@@ -113,7 +113,7 @@ OptionHelp help_of(const CLI::Option& option) {
                                                        : option.get_type_name();
     help.text = option.get_description();
     help.default_value = option.get_default_str();
-    // The text of an automatic choice ends the description, in brackets.
+    // The description of an option with an automatic choice ends with the text of this choice, in brackets.
     const std::size_t bracket = help.text.rfind(" [");
     if (help.default_value.empty() && help.text.ends_with(']') && bracket != std::string::npos) {
         help.default_value = help.text.substr(bracket + 2, help.text.size() - bracket - 3);

@@ -10,18 +10,18 @@
 // Help of the commands: options in groups, either the most common ones or all.
 namespace covol::tool {
 
-/// Options that are added to `command` from here on belong to this group.
+/// Options that are added to `command` after this call belong to this group.
 void in_group(CLI::App& command, Group group);
 
-/// Groups are for the help only: CLI11 would sort the options of a configuration file by them.
+/// Puts all options into one group. Only the help needs groups; CLI11 would sort a configuration file by them.
 void forget_groups(CLI::App& command);
 
 /// An option as shown in the help.
 struct OptionHelp {
-    std::string names;          ///< "-o, --output"; empty for a positional
+    std::string names;          ///< "-o, --output"; empty for a positional argument
     std::string value;          ///< "OUT.vdb"; empty for a flag
-    std::string text;           ///< without the default
-    std::string default_value;  ///< value if the option is not given, a number or text; empty: none
+    std::string text;           ///< description without the default value
+    std::string default_value;  ///< value or text of the automatic choice if the option is not given; empty: none
     bool required = false;
 };
 [[nodiscard]] OptionHelp help_of(const CLI::Option& option);
@@ -29,8 +29,8 @@ struct OptionHelp {
 class Help : public CLI::FormatterBase {
 public:
     /// Selects the options that `--help` of this command shows besides the required ones; `--help-all` shows all.
-    /// Without this call both show all.
-    /// @param names  "--points", or the name of a positional
+    /// Without this call, both show all options.
+    /// @param names  names of options ("--points") or of positional arguments
     void show_first(const CLI::App& command, const std::vector<std::string>& names);
 
     [[nodiscard]] std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;

@@ -12,7 +12,7 @@
 namespace covol::tool {
 namespace {
 
-// Type names of values (docs/commands lists all options with their types; trust_test.Roles checks each).
+// Type names of option values by role. trust_test.Roles checks the roles of the options.
 constexpr std::array<std::string_view, 19> kSettings{
     "N",         "INT",          "UINT",       "FLOAT",        "NUMBER",         "LENGTH", "VOXELS",
     "LABEL",     "FACTOR",       "X,Y,Z",      "SX,SY,SZ",     "KIND",           "NAME",   "X0,Y0,Z0,X1,Y1,Z1",
@@ -27,7 +27,7 @@ bool contains(const List& list, std::string_view type) {
     return std::find(list.begin(), list.end(), type) != list.end();
 }
 
-/// "guided|paper"
+/// Whether the type name lists the allowed words, such as "guided|paper".
 bool is_choice(std::string_view type) {
     return !type.empty() && std::all_of(type.begin(), type.end(), [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '|';
@@ -43,7 +43,7 @@ bool is_flag(const CLI::Option& option) { return option.get_expected_max() == 0;
 void check_value(const CLI::Option& option, const std::string& name, const std::string& value,
                  const std::string& source) {
     if (value.empty() || value.find('\0') != std::string::npos) refuse(source, name, "expected a value, got none");
-    // CLI11 would split such a text into several values.
+    // CLI11 would split a text in brackets into several values.
     if (option.get_allow_extra_args() && value.front() == '[' && value.back() == ']')
         refuse(source, name, "expected one value, got the list " + value);
 }

@@ -10,7 +10,7 @@
 namespace covol::tool {
 namespace {
 
-/// Optimal string alignment distance.
+/// Optimal string alignment distance: the number of letters to insert, delete, replace or swap.
 std::size_t distance(const std::string& a, const std::string& b) {
     std::vector<std::size_t> before, last(b.size() + 1), row(b.size() + 1);
     std::iota(last.begin(), last.end(), std::size_t(0));

@@ -5,13 +5,13 @@
 
 namespace covol::tool {
 
-/// "--tag-distance" of the option "tag_distance".
+/// The flag of an option of the library: "--tag-distance" for "tag_distance".
 [[nodiscard]] std::string flag_of(const std::string& name);
 
 /// A message of the library with option names replaced by flags: "`tag_distance = 3`" becomes "--tag-distance 3".
 [[nodiscard]] std::string with_flags(const std::string& message);
 
-/// As require_valid(), with the flag of the first invalid option in front: "--edge-contrast: expected ...".
+/// Like require_valid(), but the message names the flag of the first invalid option: "--edge-contrast: expected ...".
 /// @throws Error InvalidOptions.
 template <typename Options>
 void require_valid_flags(const Options& options) {

@@ -3,7 +3,7 @@
 
 namespace covol::tool {
 
-/// "12 MiB", and from 1 GiB "1.5 GiB": the units of --memory-limit.
+/// The size as text: in MiB ("12 MiB"), or in GiB from 1 GiB on ("1.5 GiB").
 [[nodiscard]] std::string bytes_text(double bytes);
 
 }  // namespace covol::tool

@@ -12,7 +12,7 @@ Json parse_json(const std::string& text, const std::string& what) {
     constexpr int kMaxLevels = 32;
     try {
         return Json::parse(text, [&](int depth, Json::parse_event_t, const Json&) {
-            // The library copies and writes its values recursively.
+            // The depth is limited, because the library copies and writes values recursively.
             if (depth > kMaxLevels)
                 throw Error(Errc::InvalidInput,
                             what + ": expected JSON of at most " + std::to_string(kMaxLevels) + " levels");

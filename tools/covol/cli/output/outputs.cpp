@@ -54,7 +54,7 @@ void check_ending(const std::string& path, OutputKind kind) {
     }
 }
 
-/// The path is a device, a pipe or a stream, which a file must not replace.
+/// Whether the path is a device, a pipe or a stream, which must not be replaced by a file.
 bool is_special(const OutputPlace& place) {
     std::error_code status;
     return place.is_stream || (fs::exists(place.path, status) && !fs::is_regular_file(place.path, status) &&
@@ -63,7 +63,7 @@ bool is_special(const OutputPlace& place) {
 
 bool is_special(const std::string& path) {
     std::error_code status;
-    // Errors of files are reported when they are written.
+    // Other errors of the path are reported when the file is written.
     return fs::exists(path, status) && is_special(place_of_output(path));
 }
 
@@ -78,17 +78,17 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
     return false;
 }
 
-/// Headers that may name files anywhere.
+/// Whether the file may be a header that refers to files in any folder.
 bool may_refer_elsewhere(const std::string& path) {
     const std::string end = lower_extension(path);
     return end == ".nhdr" || end == ".nrrd" || end == ".mhd" || end == ".mha";
 }
 
-/// Opens something other than a regular file without blocking: a pipe without a reader is tried repeatedly.
+/// Opens a device, pipe or stream without blocking. A pipe without a reader is tried repeatedly until one opens it.
 int open_special(const std::string& path, const RunContext& run) {
     const OutputPlace place = place_of_output(path);
     std::error_code status;
-    // A stream of this process continues at its position, even if it is a file.
+    // A stream of this process is duplicated, so that writing continues at the stream's position, even if it is a file.
     if (place.is_stream && place.path.parent_path() == fs::canonical("/proc/self/fd", status))
         return ::dup(std::stoi(place.path.filename().string()));
     constexpr std::chrono::milliseconds kPause{20}, kUntilReported{1000};
@@ -145,7 +145,7 @@ const std::vector<std::string>& Outputs::files_of(const std::string& input, cons
         try {
             entry->second = list_image_files(input);
         } catch (const Error& error) {
-            // Not an image. If it is an image that cannot be read, the code that reads it reports the error.
+            // The input is not an image, or cannot be read. The error is reported when the input is read.
             if (error.code() == Errc::Cancelled) throw;
         }
     }
@@ -189,7 +189,7 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
     check_inputs(flag, path, target);
     if (::access(folder.c_str(), W_OK) != 0)
         throw Error(Errc::Io, flag + ": " + path + ": cannot write: no permission to write in " + folder.string());
-    // Checked before the computation rather than after it.
+    // Checked now, so that the run does not fail after the computation.
     wait_for_folder(folder, run_);
     if (std::find(checked_.begin(), checked_.end(), target.string()) != checked_.end())
         throw Error(Errc::InvalidOptions, flag + ": " + path + ": another output has the same name");
@@ -203,7 +203,7 @@ void Outputs::add(const std::string& path, std::function<void(const std::string&
 bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
     if (path.empty()) return false;
     check_inputs("output", path, place_of_output(path).path);
-    files_.write(path, write, run_);  // no other file is in it before write_queued()
+    files_.write(path, write, run_);  // files_ contains no other file before write_queued()
     files_.publish(run_);
     kept_.push_back(path);
     return true;

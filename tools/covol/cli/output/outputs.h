@@ -28,19 +28,19 @@ enum class OutputKind {
 /// complete. If one fails, the previous files stay unchanged.
 class Outputs {
 public:
-    /// Waiting for another program is reported through `run`, and can be cancelled. @param run  must outlive this
-    /// object
+    /// @param run  reports that the program waits for another one, and can cancel this; must outlive this object
     explicit Outputs(const RunContext& run) : run_(run) {}
 
     /// Adds files and folders that this run reads: no output may replace one of them, or a file that it refers to.
     void protect(const std::vector<std::string>& inputs);
 
-    /// Checks the ending, that the folder exists, is writable and is not locked, and that the output is not a file that
-    /// this run reads, another output, or anything but a regular file (a device; texts may go to one) or, for .zarr, a
-    /// Zarr store. An empty path is an output that was not requested. @throws Error InvalidOptions, Io, Cancelled.
+    /// Checks the ending of the name, that the folder exists, is writable and is not locked, and that the path is
+    /// neither an input nor another output. An existing path must be a regular file, for .zarr a Zarr store, and for
+    /// texts also a device. An empty path is an output that was not requested.
+    /// @throws Error InvalidOptions, Io, Cancelled.
     void check(const std::string& flag, const std::string& path, OutputKind kind);
 
-    /// Queues a file that write_queued() writes; does nothing for an empty path.
+    /// Queues an output for write_queued(); does nothing for an empty path.
     void add(const std::string& path, std::function<void(const std::string& path)> write);
 
     /// Writes a file at once; it stays even if the run fails later. @returns false for an empty path.
@@ -49,17 +49,17 @@ public:
 
     /// Writes the queued files, under temporary names. @throws what a writer throws.
     void write_queued();
-    /// A writer's message about its file, with the final path instead of the temporary one.
+    /// The message of a writer, in which temporary paths are replaced by final ones.
     [[nodiscard]] std::string shown(const std::string& line) const { return files_.shown(line); }
     /// Moves the files of write_queued() into place. @throws Error Io.
     void publish();
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
 
 private:
-    /// An existing folder is replaced if it is a Zarr store that contains no input.
+    /// Checks that an existing folder is a Zarr store that contains no input, because it will be replaced.
     void check_store(const std::string& flag, const std::string& path, const std::filesystem::path& target);
     void check_inputs(const std::string& flag, const std::string& path, const std::filesystem::path& target);
-    /// The files that an image's file refers to, if one of them may be in `folder`.
+    /// The files that the file of an image refers to; empty if none of them can be in `folder`.
     const std::vector<std::string>& files_of(const std::string& input, const std::filesystem::path& folder);
 
     struct Pending {
@@ -68,10 +68,10 @@ private:
     };
     const RunContext& run_;
     std::vector<std::string> inputs_;
-    std::map<std::string, std::vector<std::string>> files_of_;  ///< by input
+    std::map<std::string, std::vector<std::string>> files_of_;  ///< files_of() each input
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
-    std::vector<Pending> devices_;  ///< written last, because this cannot be undone
+    std::vector<Pending> devices_;  ///< outputs to devices and pipes; written last, because this cannot be undone
     FileSet files_;
     std::vector<std::string> written_;
     std::vector<std::string> kept_;
@@ -81,7 +81,7 @@ private:
 /// pipe, and waits for its reader. @throws Error Io, Cancelled.
 void write_text(const std::string& path, const std::string& text, const RunContext& run);
 
-/// To an open stream. @param name  for messages @throws Error Io, Cancelled.
+/// Writes the text to an open stream. @param name  of the stream, for messages @throws Error Io, Cancelled.
 void write_stream(int stream, const std::string& text, const std::string& name, const RunContext& run);
 
 }  // namespace covol::tool

@@ -6,8 +6,8 @@
 
 namespace covol::tool {
 
-/// Time and memory of a run from its report: a table of stages, then the solver's work. Nested stages (coarse levels)
-/// are included in the stage that they belong to.
+/// Lines of text with the time and memory of a run, from its report: a table of stages, then the solver's work. The
+/// time of a nested stage (a coarse level) is also included in the stage that contains it.
 [[nodiscard]] std::vector<std::string> profile_lines(const Json& report);
 
 }  // namespace covol::tool

@@ -10,7 +10,7 @@ namespace covol::tool {
 namespace {
 
 constexpr double kRedrawSeconds = 0.1;
-constexpr double kLineSeconds = 5.0;  // if stderr is a file: a line at this interval for longer stages
+constexpr double kLineSeconds = 5.0;  // interval between lines of a stage if stderr is not a terminal
 constexpr int kBarWidth = 30;
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
@@ -34,8 +34,8 @@ Progress::Progress(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO
 void Progress::update(const std::string& stage, double fraction) {
     if (quiet_) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
-    // A stage that begins again, for another structure or a finer level, gets another line; within one, the fraction
-    // never decreases.
+    // A stage that begins again, for another structure or a finer level, gets another line. Within a stage, the
+    // displayed fraction never decreases.
     const bool again = stage == stage_ && fraction_ >= 1 && fraction < 1;
     if (stage != stage_ || again) {
         clear();

@@ -13,9 +13,9 @@ public:
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
 
-    /// RunContext::progress.
+    /// Called through RunContext::progress.
     void update(const std::string& stage, double fraction);
-    /// A line of its own; erases the bar first.
+    /// Erases the bar, then prints a line.
     void line(const std::string& text);
     /// Erases the bar.
     void clear();
@@ -29,7 +29,7 @@ private:
     bool drawn_ = false;
     bool announced_ = false;
     std::string stage_, shown_stage_;
-    double fraction_ = 0;                ///< of the stage; never decreases
+    double fraction_ = 0;                ///< completed fraction of the stage; never decreases
     std::map<std::string, int> passes_;  ///< how often each stage began
     Clock::time_point begin_;
     Clock::time_point shown_;

@@ -17,12 +17,12 @@ namespace covol::tool {
 
 /// The parts of a name before and after {frame}; nullopt if it contains none.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> around_frame(const std::string& text);
-/// Whether the name has a number between these parts.
+/// Whether the name consists of these two parts with a number between them.
 [[nodiscard]] bool is_frame(const std::string& name, const std::pair<std::string, std::string>& parts);
-/// The files that match NAME=FILE_{frame}.csv, with any number, sorted.
+/// The files that match a text such as NAME=FILE_{frame}.csv with any number for {frame}, sorted.
 [[nodiscard]] std::vector<std::string> files_of_frames(const std::string& text);
 
-/// Replaces paths by file names, so that files that are passed on do not reveal folders.
+/// Replaces paths by file names, so that output files do not reveal the folders of this machine.
 [[nodiscard]] std::string without_folder(const std::string& text);
 [[nodiscard]] Json without_folders(const Json& options);
 

@@ -84,7 +84,7 @@ Json to_json(const CompareReport& r) {
             {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
-/// Values that were not needed, or that are chosen by the step that uses them, are null.
+/// An optional without a value becomes null: the value was not needed, or the step that uses it chooses it.
 template <typename T>
 static Json to_json_value(const T& value) {
     if constexpr (requires { *value, value.has_value(); })

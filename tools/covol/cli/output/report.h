@@ -14,7 +14,7 @@ namespace covol::tool {
 [[nodiscard]] Json to_json(const Vec3& v);
 [[nodiscard]] Json to_json(const WorldBox& box);
 [[nodiscard]] Json to_json(const ImageGeometry& geometry);
-/// For an image in chunks, after it has been read.
+/// How many chunks of an image were read.
 [[nodiscard]] Json to_json(const ChunkCount& chunks);
 [[nodiscard]] Json to_json(const Domain& domain);
 [[nodiscard]] Json to_json(const BandReport& report);
@@ -34,7 +34,7 @@ namespace covol::tool {
 /// The result in a few lines of text.
 [[nodiscard]] std::vector<std::string> summary(const SegmentReport& report);
 
-/// "{ mean, p95, max }" and the like as one line of text.
+/// The measurements as one line of text.
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
 [[nodiscard]] std::string one_line(const MeshDeviation& deviation);
 [[nodiscard]] std::string plain_mesh_line(std::uint64_t triangles);

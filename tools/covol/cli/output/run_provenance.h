@@ -14,22 +14,22 @@ namespace covol::tool {
 /// What output files state about the run that wrote them.
 class RunProvenance {
 public:
-    /// @param report  of the run; kept by reference, so it must outlive this object
+    /// @param command, report  of the run; kept by reference, so they must outlive this object
     RunProvenance(const CLI::App& command, std::vector<std::string> inputs, const Json& report)
         : command_(command), inputs_(std::move(inputs)), report_(report) {}
 
     /// The input files of the command line.
     [[nodiscard]] const std::vector<std::string>& inputs() const noexcept { return inputs_; }
-    /// Sets the meaning of lengths and positions in outputs: the image's unit and LPS; for points without an image,
-    /// their own.
+    /// Sets the unit of length and the coordinate system that outputs state: the image's unit and LPS; for points
+    /// without an image, no unit and no known coordinate system.
     void set_world(const ImageGeometry& geometry);
     void set_world_of_points();
-    /// The same from a grid that was read.
+    /// Copies the unit and the coordinate system from the metadata of a grid.
     void set_world(const FloatGrid& grid);
     /// Provenance for the metadata of .vdb files: version, options with file names but without folders, digests of the
-    /// inputs, the resolved options once they are known, the unit of length and the space.
+    /// inputs, the resolved options once they are known, the unit of length and the coordinate system.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
-    /// The same as comment lines for meshes and points.
+    /// The metadata() as comment lines for files of meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
     /// Identifies this run: version, command, options that change results, digests of the inputs.

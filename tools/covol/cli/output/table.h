@@ -11,9 +11,9 @@ public:
     Table& row();  ///< begins the next row
     Table& operator<<(const std::string& field);
     Table& operator<<(const char* field) { return *this << std::string(field); }
-    Table& operator<<(double number);  ///< an empty field if it is not finite
+    Table& operator<<(double number);  ///< adds an empty field if the number is not finite
     Table& operator<<(int number) { return *this << std::to_string(number); }
-    /// Adds the rows of another table, whose header is empty.
+    /// Adds the rows of another table, which must have an empty header.
     Table& add_rows(const Table& other);
     [[nodiscard]] std::string text() const { return text_ + "\n"; }
 

@@ -21,8 +21,8 @@ extern "C" void on_signal(int signal) {
     std::signal(signal, SIG_DFL);  // a second one ends the program at once
 }
 
-/// A page of a mapped file does not exist any more because another program truncated the file. Finished outputs stay;
-/// the next run removes the temporary files of this one.
+/// Called if a page of a mapped file does not exist any more, because another program truncated the file. Finished
+/// outputs are kept; the temporary files of this run are removed by the next one.
 extern "C" void on_bus_error(int) {
     constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
     static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
@@ -43,7 +43,7 @@ void catch_cancel_signals() { catch_signals(on_signal); }
 
 void catch_file_signals() {
     std::signal(SIGBUS, on_bus_error);
-    std::signal(SIGXFSZ, SIG_IGN);  // exceeding the limit of file sizes is an error of the write
+    std::signal(SIGXFSZ, SIG_IGN);  // if the limit of file sizes is exceeded, write() then returns an error
 }
 
 }  // namespace covol::tool

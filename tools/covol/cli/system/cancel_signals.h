@@ -4,16 +4,16 @@
 // Ctrl-C and other requests to end the program.
 namespace covol::tool {
 
-/// Set by a signal that requests termination, and by the memory guard: what a RunContext's `cancel` points to.
+/// Set by signals that request termination, and by the memory guard. RunContext::cancel points to it.
 [[nodiscard]] std::atomic<bool>& cancel_flag();
 /// Whether a signal requested termination.
 [[nodiscard]] bool is_interrupted();
-/// Ctrl-C is the regular end of this command, not an interruption.
+/// For commands that Ctrl-C ends in the regular way: clears cancel_flag() if a signal requested termination.
 void accept_interrupt();
 
 /// The first signal sets the flag, the second ends the program at once.
 void catch_cancel_signals();
-/// Handles signals of files that are truncated while they are read, or that exceed the limit of a file's size.
+/// Handles the signals for a file that is truncated while it is read, and for a file that exceeds the size limit.
 void catch_file_signals();
 
 }  // namespace covol::tool

@@ -18,11 +18,12 @@ namespace covol::tool {
 namespace fs = std::filesystem;
 namespace {
 
-/// @param alive  end of a pipe that is closed when the process that made the folder ends
+/// Waits until the process that made the folder ends, then removes the folder. @param alive  read end of a pipe whose
+/// other end is closed when that process ends
 [[noreturn]] void keep(const fs::path& folder, int alive) {
     for (const int stop : {SIGINT, SIGTERM, SIGHUP}) std::signal(stop, SIG_IGN);
     ::setsid();  // a new session: signals to the process group do not reach this process
-    // Inherited streams would keep their readers waiting, and an inherited lock would prevent others from clearing up.
+    // Open copies of inherited streams would keep their readers waiting, and inherited locks would stay locked.
     ::dup2(alive, STDIN_FILENO);
     ::close_range(STDIN_FILENO + 1, ~0U, 0);
     char nothing = 0;
@@ -64,7 +65,7 @@ int run_this_program(const std::vector<std::string>& words, const RunContext& ru
     std::vector<char*> argv;
     for (std::string& word : all) argv.push_back(word.data());
     argv.push_back(nullptr);
-    // Until exec the child has this process's signal handler, which would lose a signal.
+    // SIGTERM is blocked until the child has the default handler: the handler that it inherits would not end the child.
     sigset_t term, before;
     sigemptyset(&term);
     sigaddset(&term, SIGTERM);

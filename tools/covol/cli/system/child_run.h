@@ -7,11 +7,11 @@
 #include "covol/file_set.h"
 #include "covol/run.h"
 
-// Runs of this program within a run of it.
+// Runs this program as a child process.
 namespace covol::tool {
 
-/// A ScratchFolder that is removed even if this process is killed: a separate process does nothing else. If that one is
-/// killed, too, the next run that writes beside the folder removes it.
+/// A ScratchFolder that is removed even if this process is killed, by a child process that only waits for this. If the
+/// child process is killed, too, the next run that writes beside the folder removes it.
 class KeptFolder {
 public:
     /// @throws Error Io.
@@ -26,8 +26,8 @@ private:
     int cleaner_pid_ = 0, pipe_ = -1;
 };
 
-/// Runs this program with these arguments and waits for it. The child ends when this process does, for whatever reason.
-/// To be called by the thread that ends last. @return exit code @throws Error Io, Cancelled.
+/// Runs this program with these arguments and waits for it. The child is killed if the calling thread ends before it,
+/// so it does not outlive this process. @return exit code @throws Error Io, Cancelled.
 [[nodiscard]] int run_this_program(const std::vector<std::string>& words, const RunContext& run);
 
 }  // namespace covol::tool

@@ -17,14 +17,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The number that a file contains; nullopt if there is no such file, and for "max".
+/// The number that a file contains; nullopt if there is no such file, or if it contains "max" (no limit).
 std::optional<std::uint64_t> number_in(const fs::path& path) {
     std::uint64_t number = 0;
     if (std::ifstream(path) >> number) return number;
     return std::nullopt;
 }
 
-/// The number after a name in a file of lines "name number".
+/// The number after the name `wanted` in a file with lines of the form "name number".
 std::optional<std::uint64_t> named_number(const fs::path& path, const std::string& wanted) {
     std::ifstream file(path);
     std::string line;
@@ -37,7 +37,7 @@ std::optional<std::uint64_t> named_number(const fs::path& path, const std::strin
     return std::nullopt;
 }
 
-/// A path of mountinfo, in which blanks and backslashes are escaped ("\040").
+/// Decodes a path of mountinfo, in which blanks and backslashes are escaped ("\040").
 std::string unescaped(const std::string& text) {
     std::string path;
     for (std::size_t n = 0; n < text.size(); ++n) {
@@ -63,7 +63,7 @@ bool lists(const std::string& words, const std::string& wanted) {
 /// A hierarchy of control groups with a memory controller, as visible to this process.
 struct Hierarchy {
     bool is_v2 = false;
-    fs::path mount;  ///< its mount point
+    fs::path mount;  ///< the mount point of the hierarchy
     fs::path top;    ///< the group at the mount point
 };
 
@@ -72,7 +72,7 @@ std::vector<Hierarchy> hierarchies(const std::string& root) {
     std::ifstream file(root + "/proc/self/mountinfo");
     std::string line;
     while (std::getline(file, line)) {
-        // id parent device top mount options... - type source options
+        // fields of a line: id parent device top mount options... - type source options
         std::istringstream words(line);
         std::string id, parent, device, top, mount, word, type, source, options;
         words >> id >> parent >> device >> top >> mount;
@@ -85,7 +85,7 @@ std::vector<Hierarchy> hierarchies(const std::string& root) {
     return all;
 }
 
-/// The path of this process's group in that hierarchy, which begins with "/"; empty if it is in none.
+/// The path of the group of this process within the hierarchy, from "/" on; empty if it is in no group.
 std::string own_group(const std::string& root, bool is_v2) {
     std::ifstream file(root + "/proc/self/cgroup");
     std::string line;
@@ -99,8 +99,8 @@ std::string own_group(const std::string& root, bool is_v2) {
     return {};
 }
 
-/// Folders of the group and of all groups above it, beginning at the mount point. If the group lies outside of the
-/// mount, as in a cgroup namespace, the mount is all that is known.
+/// Folders of the group and of all groups that contain it, beginning at the mount point. If the group lies outside of
+/// the mount, as in a cgroup namespace, only the mount point is returned.
 std::vector<fs::path> group_folders(const Hierarchy& hierarchy, const std::string& group) {
     std::vector<fs::path> folders{hierarchy.mount};
     const fs::path below = fs::path(group).lexically_relative(hierarchy.top);
@@ -110,10 +110,10 @@ std::vector<fs::path> group_folders(const Hierarchy& hierarchy, const std::strin
     return folders;
 }
 
-/// Memory of the group's processes that is not reclaimed on demand.
+/// Memory of the group's processes, without file caches, which are reclaimed on demand.
 std::uint64_t used_by(const fs::path& folder, bool is_v2) {
     const std::uint64_t all = number_in(folder / (is_v2 ? "memory.current" : "memory.usage_in_bytes")).value_or(0);
-    const std::string prefix = is_v2 ? "" : "total_";  // v1: including groups below it
+    const std::string prefix = is_v2 ? "" : "total_";  // in v1, these values include the groups below
     std::uint64_t caches = 0;
     for (const char* name : {"inactive_file", "active_file"})
         caches += named_number(folder / "memory.stat", prefix + name).value_or(0);
@@ -126,7 +126,7 @@ std::optional<std::uint64_t> limit_of(const fs::path& folder, bool is_v2) {
     if (is_v2) {
         limits = {number_in(folder / "memory.max"), number_in(folder / "memory.high")};
     } else {
-        // The second also includes groups above the mount point.
+        // hierarchical_memory_limit also includes the limits of groups above the mount point.
         limits = {number_in(folder / "memory.limit_in_bytes"),
                   named_number(folder / "memory.stat", "hierarchical_memory_limit")};
     }
@@ -156,7 +156,7 @@ void add_groups(std::optional<FreeMemory>& minimum, const std::string& root) {
 }
 
 void add_limits(std::optional<FreeMemory>& minimum, const std::string& root) {
-    std::array<std::uint64_t, 6> pages{};  // all, resident, shared, text, libraries, data
+    std::array<std::uint64_t, 6> pages{};  // fields of statm: size, resident, shared, text, libraries, data
     std::ifstream statm(root + "/proc/self/statm");
     for (std::uint64_t& count : pages) statm >> count;
     const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));

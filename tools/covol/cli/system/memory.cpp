@@ -22,7 +22,7 @@ namespace {
 
 // New pages are allocated at some gigabytes per second; one check takes two microseconds.
 constexpr auto kInterval = std::chrono::milliseconds(1);
-constexpr std::uint64_t kSlack = 32;  // 1/32 of the limit, for runs that end by themselves
+constexpr std::uint64_t kSlack = 32;  // a cancelled run may exceed the limit by 1/32 before the process is ended
 constexpr std::uint64_t kUsablePercent = 80;
 
 /// Reads the number of pages of this process repeatedly.
@@ -35,7 +35,7 @@ public:
     PageCount(const PageCount&) = delete;
     PageCount& operator=(const PageCount&) = delete;
 
-    /// Bytes without mapped files; 0 if the system does not report them.
+    /// Resident memory without mapped files, bytes; 0 if the system does not report it.
     [[nodiscard]] std::uint64_t held() const {
         std::array<char, 128> text{};  // size resident shared ...
         if (file_ < 0 || ::pread(file_, text.data(), text.size() - 1, 0) <= 0) return 0;
@@ -55,7 +55,7 @@ private:
 std::uint64_t held_memory() { return PageCount().held(); }
 
 std::uint64_t peak_rss() {
-    // The system's own value, ru_maxrss, includes the memory of the process that started this program.
+    // Preferred to ru_maxrss, which may be that of the process that started this program.
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
         if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;

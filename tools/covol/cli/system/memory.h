@@ -9,9 +9,9 @@
 
 namespace covol::tool {
 
-/// Resident memory of this process, bytes.
-[[nodiscard]] std::uint64_t held_memory();  ///< without mapped files
-[[nodiscard]] std::uint64_t peak_rss();
+// Resident memory of this process, bytes.
+[[nodiscard]] std::uint64_t held_memory();  ///< at present, without mapped files
+[[nodiscard]] std::uint64_t peak_rss();     ///< maximum so far
 
 /// The maximum memory of a run.
 struct MemoryBound {
@@ -19,25 +19,25 @@ struct MemoryBound {
     std::string name;         ///< for messages: "--memory-limit 8G", or the free memory and what limits it
 };
 
-/// From the text of --memory-limit; if it is empty, four fifths of the memory that is free now, plus what this process
-/// has. The remaining fifth is for other processes and for the page cache.
+/// Parses the text of --memory-limit. If it is empty, the bound is the memory that this process has, plus 80 % of the
+/// free memory; the remaining 20 % are left to other processes and to the page cache.
 /// @throws Error InvalidOptions
 [[nodiscard]] MemoryBound choose_memory_bound(const std::string& given);
 
 /// Monitors the memory of this process (without mapped files, which the system can reclaim) and sets `cancel` when it
-/// exceeds the limit. If the memory keeps growing, in a library that does not support cancellation, the process is
+/// exceeds the limit. If it then grows further, for example in a library that cannot be cancelled, the process is
 /// ended.
 class MemoryGuard {
 public:
-    /// No guard if limit = 0 or if the system cannot create a thread. @param give_up  ends the process; called by the
-    /// guard's thread
+    /// Monitors nothing if limit = 0, or if the system cannot create a thread.
+    /// @param give_up  ends the process; called on the thread of the guard
     MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up);
     ~MemoryGuard();
     MemoryGuard(const MemoryGuard&) = delete;
     MemoryGuard& operator=(const MemoryGuard&) = delete;
     /// False if the system could not create a thread for it.
     [[nodiscard]] bool watches() const noexcept { return watches_; }
-    /// The limit was exceeded: the cancellation is due to this guard.
+    /// Whether the limit was exceeded, so that this guard has set `cancel`.
     [[nodiscard]] bool tripped() const noexcept { return tripped_; }
 
 private:

@@ -13,8 +13,8 @@ namespace covol::tool {
 void keep_standard_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
-            // open() returns the lowest free number, which is this stream's. The mode is the opposite one, so that
-            // every use is an error.
+            // open() returns the lowest free number, which is that of this stream. Input is opened for writing and
+            // output for reading, so that every use of the stream is an error.
             static_cast<void>(::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY));
 }
 
@@ -33,7 +33,7 @@ std::string too_few_files() {
 
 void catch_signals(void (*handler)(int)) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-        if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);  // as for nohup
+        if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);  // as with nohup
 }
 
 }  // namespace covol::tool

@@ -20,7 +20,7 @@
 namespace covol::tool {
 namespace {
 
-/// How many of `wanted` threads can exist at once in addition to the existing ones.
+/// How many threads, up to `wanted`, the system can create in addition to the existing ones.
 int count_possible(int wanted) {
     std::promise<void> all_there;
     const std::shared_future<void> end(all_there.get_future());
@@ -29,7 +29,7 @@ int count_possible(int wanted) {
     try {
         while (int(threads.size()) < wanted) threads.emplace_back([end] { end.wait(); });
     } catch (const std::system_error&) {
-        // The system's limit has been reached.
+        // The limit of the system has been reached.
     }
     all_there.set_value();
     for (std::thread& thread : threads) thread.join();
@@ -45,7 +45,7 @@ std::atomic<bool> may_have_files = false;
     ::_exit(code);
 }
 
-/// Reports a lack of threads or memory if no exception handler exists: in TBB, and in libraries that create threads
+/// Reports a lack of threads or memory if nothing catches the exception, as in TBB and in libraries that create threads
 /// when they are loaded.
 [[noreturn]] void on_terminate() {
     try {
@@ -74,9 +74,9 @@ ThreadCount limit_threads(int threads) {
     const auto maximum = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     ThreadCount count;
     count.wanted = threads > 0 ? std::min(threads, maximum) : maximum;
-    // One more than TBB creates: a reader tests files in a copy of the process.
+    // TBB creates one thread fewer than this. The other one is for the child process in which a reader tests files.
     count.possible = std::max(1, count_possible(count.wanted));
-    // Never destroyed: otherwise TBB would then create the threads.
+    // Never destroyed, because its limit ends with it: TBB would then create more threads.
     if (count.possible < count.wanted)
         static_cast<void>(
             new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(count.possible)));

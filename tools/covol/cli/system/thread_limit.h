@@ -3,13 +3,13 @@
 
 namespace covol::tool {
 
-/// Threads that work at once, including the calling one.
+/// Numbers of threads that work at the same time, including the calling one.
 struct ThreadCount {
     int wanted = 1, possible = 1;
 };
 
 /// Determines how many threads the system can create (ulimit -u, pids.max of a control group), and limits TBB to that
-/// number from here on: TBB creates threads in places where an exception may end the process.
+/// number from now on: if TBB cannot create a thread, the exception may end the process.
 /// @param threads  the maximum requested; 0: one for each core
 [[nodiscard]] ThreadCount limit_threads(int threads);
 
@@ -22,7 +22,7 @@ constexpr const char* kNoThread =
 /// Whether this was thrown because a thread cannot be created: by the standard library, or by TBB.
 [[nodiscard]] bool is_missing_thread(const std::exception& error);
 
-/// From here on there may be temporary files, which are removed if the process ends for lack of threads.
+/// After this call, temporary files are removed if the process ends because of a lack of threads or memory.
 void expect_temporary_files();
 
 }  // namespace covol::tool

@@ -8,8 +8,8 @@
 #include "io/points/point_text.h"
 #include "io/xml.h"
 
-// Layout: WriteXML.java of Fiji's plugin Cell Counter. MarkerX and MarkerY are pixels from 0, MarkerZ is the image of
-// the stack from 1, which in a hyperstack counts channels, too.
+// Layout: WriteXML.java of Fiji's plugin Cell Counter. MarkerX and MarkerY are pixels, counted from 0. MarkerZ is the
+// number of the plane in the stack, counted from 1; in a hyperstack, the channels of a slice are separate planes.
 namespace covol::detail {
 namespace {
 
@@ -81,10 +81,10 @@ private:
     const std::string& path_;
     bool by_type_;
     PointTable table_;
-    std::string type_;  ///< its name, or "type 1"
+    std::string type_;  ///< name of the current type of markers; without a name, for example "type 1"
     std::array<std::optional<double>, 3> at_{};
     bool has_markers_ = false;
-    int types_ = 0;  ///< with markers; the plugin also writes empty ones
+    int types_ = 0;  ///< number of types with markers; the plugin also writes types without any
 };
 
 }  // namespace

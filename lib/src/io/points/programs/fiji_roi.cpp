@@ -49,8 +49,8 @@ public:
         return version_ >= 228 && second_ != 0 ? bytes_.at<std::uint8_t>(second_ + 30) : 0;
     }
 
-    /// Adds its points to the table; false if it has none (a text, a picture). @param structures_by  "group", "counter"
-    /// or empty
+    /// Adds the points of the ROI to the table; returns false if it has none (a text, a picture).
+    /// @param structures_by  "group", "counter" or empty
     bool add_to(PointTable& table, const std::string& structures_by) const {
         if (!add_marks(table, structures_by == "counter")) return false;
         if (structures_by == "group") name_structure(table, path_, "group " + std::to_string(group()));
@@ -81,11 +81,11 @@ private:
         if (offset == 0 || length == 0) return;
         const std::string_view text = bytes_.part(offset, 2 * std::uint64_t(length));
         name_.clear();
-        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; characters outside ASCII are only indicated
+        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; other characters than ASCII become "?"
             name_ += text[n - 1] == 0 && static_cast<unsigned char>(text[n]) < 128 ? text[n] : '?';
     }
 
-    /// As ImageJ's getShort(): numbers far below zero are large coordinates that overflowed.
+    /// A 16-bit coordinate, as ImageJ's getShort() reads it: values below -5000 are large coordinates that overflowed.
     [[nodiscard]] double coordinate(std::uint64_t offset) const {
         const int value = bytes_.at<std::int16_t>(offset);
         return value < -5000 ? value + 65536 : value;
@@ -97,8 +97,8 @@ private:
         return value;
     }
 
-    /// The slice of the whole ROI from 0, none if it is on all slices. It is the z of a hyperstack, the position in a
-    /// stack, or part of the name that the ROI Manager assigned ("0012-0100-0200": slice, y, x).
+    /// The slice of the ROI, counted from 0; nothing if it is on all slices. It is stored as the z of a hyperstack, as
+    /// the position in a stack, or in the name that the ROI Manager assigned ("0012-0100-0200": slice, y, x).
     [[nodiscard]] std::optional<double> slice() const {
         if (second_ != 0) {
             const int channel = bytes_.at<std::int32_t>(second_ + 4), z = bytes_.at<std::int32_t>(second_ + 8),
@@ -127,7 +127,7 @@ private:
         return count != 0 || type_ != kPoint ? count : bytes_.at<std::uint32_t>(18);
     }
 
-    /// x, y as stored in the file.
+    /// The x and y of each vertex, as stored in the file.
     [[nodiscard]] std::vector<std::array<double, 2>> vertices() const {
         const std::uint64_t n = vertex_count();
         (void)bytes_.part(kHeader, (sub_pixel_ ? 12 : 4) * n);
@@ -186,7 +186,8 @@ private:
         add_line(table, {{real(18), real(22), z}, {real(26), real(30), z}}, false, name_);
     }
 
-    /// Segments as in java.awt.geom.PathIterator: the type, then 0 to 3 points. Curves are approximated by chords.
+    /// Adds the outlines of a composite ROI. Its segments are stored as in java.awt.geom.PathIterator: the type, then 0
+    /// to 3 points. Curves are approximated by chords.
     void add_composite(PointTable& table) const {
         const std::uint64_t count = bytes_.at<std::uint32_t>(36);
         (void)bytes_.part(kHeader, 4 * count);
@@ -200,7 +201,7 @@ private:
         };
         for (std::uint64_t n = 0; n < count;) {
             const double segment = real(kHeader + 4 * n++);
-            if (segment == 4) continue;  // close: every outline is closed anyway
+            if (segment == 4) continue;  // "close" has no effect: all outlines are closed
             if (segment != 0 && segment != 1 && segment != 2 && segment != 3)
                 fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " +
                                 std::to_string(segment));
@@ -211,7 +212,7 @@ private:
                 given.push_back({real(kHeader + 4 * n) - 0.5, real(kHeader + 4 * n + 4) - 0.5, z});
             if (segment == 0) finish();
             if (segment >= 2 && !line.empty()) {
-                // de Casteljau
+                // Points on the Bezier curve, computed by de Casteljau's algorithm.
                 given.insert(given.begin(), line.back());
                 for (int c = 1; c < kChords; ++c) {
                     std::vector<Vec3> control = given;
@@ -236,7 +237,7 @@ private:
     std::uint64_t second_ = 0;  ///< position of the second header; 0 if there is none
 };
 
-/// Collects ROIs and their kinds.
+/// Collects the points of several ROIs in a table, and the types of the ROIs for its rule.
 class RoiCollector {
 public:
     RoiCollector(const std::string& path, const std::string& structures_by)

@@ -38,7 +38,7 @@ Vec3 to_point(const std::string& path, const Json& position) {
 
 struct ControlPoints {
     std::vector<Vec3> points;
-    std::vector<std::string> labels;  ///< of each point, as typed by the user
+    std::vector<std::string> labels;  ///< the label of each point, as the user has entered it
 };
 
 ControlPoints control_points(const std::string& path, const Json& markup) {
@@ -63,7 +63,7 @@ PointTable read_markups(const std::string& path, const Json& file, const std::st
         const std::string type = markup.value("type", "Fiducial");
         auto [points, labels] = control_points(path, markup);
         if (points.empty() || type == "ROI" || type == "Plane") continue;
-        // LPS is Slicer's own default; if a file mixes both, the first one is used
+        // Slicer's default is LPS. If a file has both systems, points are converted to the first one.
         const PointSpace space = to_space(path, markup.value("coordinateSystem", "LPS"));
         if (table.space == PointSpace::Unstated) table.space = space;
         if (space != table.space) turn(points);
@@ -100,10 +100,10 @@ PointTable parse_markups(const std::string& path, const std::string& text, const
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
-    std::string system = "RAS";  // default of files without a system: before Slicer 4.11
+    std::string system = "RAS";  // files of Slicer before 4.11 state no system and use RAS
     bool stated = false;
     std::array<std::size_t, 3> at{1, 2, 3};
-    std::size_t label = 11;  // Slicer's default for files that do not name columns
+    std::size_t label = 11;  // index of the column with labels, unless the file names the columns
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEntrySignature = 0x02014b50, kLocalSignature = 0x04034b50;
 constexpr std::uint64_t kEndSize = 22, kEntrySize = 46, kLocalSize = 30;
-constexpr std::uint64_t kLargestRatio = 1032;  // for deflate
-// Outlines and their names are compressed to between a half and a tenth of their size.
+constexpr std::uint64_t kLargestRatio = 1032;  // maximum ratio of Deflate
+// Limits for the unpacked size of the archive. ROIs are usually compressed to between a half and a tenth of their size.
 constexpr std::uint64_t kLargestArchiveRatio = 16, kAlwaysAllowed = std::uint64_t(16) << 20;
 
 struct Entry {
