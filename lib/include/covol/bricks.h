@@ -12,21 +12,23 @@
 #include "covol/options_table.h"
 #include "covol/pipeline.h"
 
-// A computation in parts: the surface is solved brick by brick, on separate machines or one after the other, and
-// joined.
+// A computation in parts: the surface is computed brick by brick, on several machines or one brick after the other, and
+// the results are joined.
 //
-// A coarse solve of the whole domain gives every brick its start. A brick is solved together with some layers of its
-// neighbours; the outermost of these layers are fixed to the neighbours' last results (the alternating method of
-// Schwarz, 1870; for all bricks at once: Lions, On the Schwarz alternating method, 1988). Sweeps repeat until
-// neighbours agree where they meet. All bricks lie on one lattice and each leaf of it belongs to one of them, so that
-// the joined level set is a union of leaves; near a seam its values are the weighted mean of the two states.
+// A coarse solve of the whole domain gives every brick its start. A brick is solved together with some layers of voxels
+// of its neighbours; the outermost of these layers are fixed to the neighbours' last results (the alternating method of
+// Schwarz, 1870; for all bricks at once: Lions, On the Schwarz alternating method, 1988). Sweeps over the bricks are
+// repeated until the surfaces of neighbours agree in the layers that both have computed. All bricks lie on one lattice
+// and each of its leaves belongs to at most one brick, so that the joined level set is a union of leaves; near the
+// border of two bricks its values are the weighted mean of both results.
 namespace covol {
 
 struct BrickOptions {
-    std::int64_t max_voxels = 8'000'000;  ///< > 0: of the band in a brick, without its neighbours' layers
-    int overlap = 16;                     ///< voxels, a multiple of 8, 8 to 2^23: width of the neighbours' layers
-    double tolerance = 0.05;              ///< voxels, > 0: neighbours agree if their surfaces are closer than this
-    int max_sweeps = 4;                   ///< >= 1
+    /// > 0: maximum number of active voxels in a brick, without the layers of its neighbours
+    std::int64_t max_voxels = 8'000'000;
+    int overlap = 16;         ///< voxels, a multiple of 8, 8 to 2^23: width of the layers of the neighbours
+    double tolerance = 0.05;  ///< voxels, > 0: neighbours agree if their surfaces differ by less than this
+    int max_sweeps = 4;       ///< maximum number of sweeps over all bricks, >= 1
 };
 
 template <>
@@ -40,39 +42,40 @@ inline constexpr auto kOptions<BrickOptions> = std::tuple{
     Rule<BrickOptions>{"brick_overlap", "a multiple of 8", [](const BrickOptions& o) { return o.overlap % 8 == 0; }}};
 
 struct Brick {
-    VoxelBox core;  ///< voxels of the lattice that belong to it: whole leaves, cut off at the domain's end
-    std::int64_t active_voxels = 0;       ///< of the band in it, from the coarse solve
-    std::vector<std::size_t> neighbours;  ///< bricks whose cores come within `overlap` of its own
+    VoxelBox core;  ///< voxels of the lattice that belong to the brick: whole leaves, limited by the domain
+    std::int64_t active_voxels = 0;  ///< estimated from the coarse solve
+    /// indices of the bricks whose cores are within `overlap` voxels of this core
+    std::vector<std::size_t> neighbours;
 };
 
-/// What all bricks have in common.
+/// The data that all bricks have in common.
 struct BrickPlan {
     BrickOptions options;
-    Domain domain;        ///< of the whole
-    EdgeOptions edge;     ///< parameters of g, the same for all bricks
+    Domain domain;        ///< of all bricks together
+    EdgeOptions edge;     ///< parameters of the edge detector g, the same for all bricks
     FloatGridPtr coarse;  ///< a level set on a coarser lattice
     std::vector<Brick> bricks;
-    bool has_sweeps = true;  ///< false: each brick is solved once, independently of its neighbours
+    bool has_sweeps = true;  ///< false (clouds): each brick is solved once, independently of its neighbours
     [[nodiscard]] COVOL_API std::int64_t active_voxels() const;
 };
 
 struct SolvedBrick {
-    FloatGridPtr state;  ///< has no leaves if no surface passes through the brick
+    FloatGridPtr state;  ///< level set; without leaves if no surface passes through the brick
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
     std::int64_t active_voxels = 0;
     double seconds = 0;
 };
 
-/// The last state of a brick: the level set on the leaves of its core and one layer of leaves around it; null if there
-/// is none yet.
+/// Returns the last state of a brick, which is the level set on the leaves of its core and on one layer of leaves
+/// around it; null if the brick has not been solved yet.
 using BrickStates = std::function<FloatGridPtr(std::size_t brick)>;
 
-/// A segmentation or reconstruction that is computed in bricks: of points with an image that are tagged, of clouds, and
-/// of starts that flow; not of guesses and contours, whose surface depends on all marks at once.
+/// A segmentation or reconstruction that is computed in bricks: from tagged points, clouds, and given starts with a
+/// flow. Guesses and contours are not supported, because their surface depends on all marks at once.
 class BrickJob {
 public:
-    /// Makes the remaining automatic choices; for a cloud this includes its orientation.
+    /// Makes the automatic choices that `options` leaves open; for a cloud this includes its orientation.
     /// @throws Error as segment() and reconstruct(); Unsupported if the job cannot be done in bricks
     COVOL_API BrickJob(const Image& image, const std::vector<Vec3>& points, const SegmentOptions& options,
                        const RunContext& run);
@@ -81,15 +84,16 @@ public:
     BrickJob(const BrickJob&) = delete;
     BrickJob& operator=(const BrickJob&) = delete;
 
-    /// Solves the whole domain coarsely and splits it. @throws Error as segment() and reconstruct(), InvalidOptions.
+    /// Solves the whole domain on a coarse lattice and splits it into bricks. @throws Error as segment() and
+    /// reconstruct(), InvalidOptions.
     [[nodiscard]] COVOL_API BrickPlan plan(const BrickOptions& options) const;
-    /// One sweep of one brick, from its own and its neighbours' last states, or from the coarse solve if `states` has
-    /// none.
+    /// Solves one brick, starting from its own and its neighbours' last states, or from the coarse solve if `states`
+    /// has no state of the brick.
     /// @throws Error InvalidInput (a plan of a job with another voxel size)
     [[nodiscard]] COVOL_API SolvedBrick solve(const BrickPlan& plan, std::size_t brick,
                                               const BrickStates& states) const;
     /// Joins the states of all bricks and finishes the surface as segment() does.
-    /// @param without_mesh  as SegmentOptions::without_mesh, if that is not set already
+    /// @param without_mesh  true has the same effect as SegmentOptions::without_mesh
     /// @throws Error InvalidInput (no surface remains)
     [[nodiscard]] COVOL_API SegmentResult join(const BrickPlan& plan, const BrickStates& states,
                                                bool without_mesh = false) const;
@@ -99,7 +103,8 @@ private:
     std::unique_ptr<Parts> parts_;
 };
 
-/// The maximum distance, in voxels, between a brick's surface and those of its neighbours where both are known.
+/// The maximum distance, in voxels, between the surfaces of a brick and of its neighbours, in the voxels that the
+/// states of both contain.
 [[nodiscard]] COVOL_API double measure_seams(const BrickPlan& plan, std::size_t brick, const BrickStates& states);
 
 }  // namespace covol

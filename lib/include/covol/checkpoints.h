@@ -6,37 +6,38 @@
 
 namespace covol {
 
-/// Saves the states of a run's flows to disk at intervals: a run that was killed resumes from them and ends with
-/// bit-identical results. Each flow has a number, in the order of the calls of evolve(), which has to be the same in
-/// each run. What a run computes before a flow and between two flows (tags, distances, edges) is not saved but computed
-/// again.
+/// Saves the states of a run's flows to disk at intervals, so that a run that was killed can resume from them, with
+/// bit-identical results. Flows are numbered in the order of the calls of evolve(), which has to be the same in each
+/// run. Results of other steps (tagging, distances, edges) are not saved; a resumed run computes them again.
 ///
-/// Flow N is stored in flow-N.vdb (u, and the edges if the band has reached new ones; meant for viewing) and
-/// flow-N.state; both are put in place together.
+/// Flow N is stored in flow-N.vdb (u, and the edge grid if the band has reached new voxels; meant for viewing) and
+/// flow-N.state; both files are replaced together.
 class COVOL_API Checkpoints {
 public:
     /// @param folder  created if it does not exist
-    /// @param every   seconds between two states of a flow; 0: one after each step
-    /// @param job     identifies this run: version, options, digests of the inputs
+    /// @param every   seconds between two saved states of a flow; 0: a state is saved after each step
+    /// @param job     identifies the run by version, options and digests of the inputs
     /// @param resume  whether the run resumes from states in the folder
-    /// @throws Error Io; InvalidInput (states of another job; any states, if not `resume`).
+    /// @throws Error Io; InvalidInput (the folder contains states of another job, or any states although `resume` is
+    /// false).
     Checkpoints(const std::string& folder, double every, const std::string& job, bool resume);
     ~Checkpoints();
     Checkpoints(const Checkpoints&) = delete;
     Checkpoints& operator=(const Checkpoints&) = delete;
 
-    /// Whether the folder contained states.
+    /// Whether the folder contained states when this object was created.
     [[nodiscard]] bool had_states() const noexcept;
-    /// Called once the results are in place: removes the files written here, and the folder if nothing else is in it.
+    /// Removes the files of this object, and the folder if it is then empty; to be called when the results have been
+    /// saved.
     void remove() noexcept;
 
-    // For evolve():
-    /// The next flow's number, from 1.
+    // The following functions are for evolve() only.
+    /// Begins the next flow and returns its number, counted from 1.
     [[nodiscard]] int begin_flow();
-    /// "FOLDER/flow-03.vdb"
+    /// The path of a file of a flow, for example "FOLDER/flow-03.vdb".
     [[nodiscard]] std::string file(int flow, const char* ending) const;
     [[nodiscard]] bool is_due() const;
-    /// Called after a state was written.
+    /// Has to be called after a state was written; is_due() counts from there.
     void restart_clock();
 
 private:

@@ -14,17 +14,17 @@ struct HalfSpace {
     friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
 };
 
-/// The convex body at which a solid is clipped: the intersection of the half-spaces; empty if nothing is clipped. A
-/// domain consists of whole voxels and may extend up to half a voxel beyond the image; the clip is the image's exact
-/// end.
+/// The convex body to which a solid is clipped: the intersection of the half-spaces; an empty list clips nothing. It is
+/// needed because a domain consists of whole voxels and may therefore extend beyond the image.
 using Clip = std::vector<HalfSpace>;
 
 [[nodiscard]] COVOL_API Clip make_clip(const WorldBox& box);
-/// The image's own box, half a voxel beyond the outermost voxel centres; rotated as the image is.
+/// The box of the image's whole voxels, rotated like the image.
 [[nodiscard]] COVOL_API Clip make_clip(const ImageGeometry& geometry);
 
-/// Stores the clip as metadata ("covol_clip_0", ...). extract_surface() closes the solid there with a flat cap;
-/// extract_mesh() places caps that are parallel to the lattice exactly on it, with sharp edges; rasterize() ends there.
+/// Stores the clip as metadata ("covol_clip_0", ...). extract_surface() closes the solid at the clip's faces with flat
+/// caps; extract_mesh() places caps that are parallel to the lattice exactly on the faces, with sharp edges;
+/// rasterize() sets voxels beyond them to 0.
 COVOL_API void set_clip(FloatGrid& grid, const Clip& clip);
 /// The clip that set_clip() stored, or an empty one.
 [[nodiscard]] COVOL_API Clip clip_of(const FloatGrid& grid);

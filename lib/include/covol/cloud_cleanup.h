@@ -13,25 +13,28 @@ namespace covol {
 
 enum class CloudSmoothing {
     None,
-    Jets,  ///< each point moves to a quadric fitted to its neighbours (Cazals and Pouget 2005)
-    Wlop   ///< weighted locally optimal projection (Huang et al. 2009): also evens out the density, robust to outliers
+    Jets,  ///< each point is moved onto a quadric fitted to its neighbours (Cazals and Pouget 2005)
+    Wlop   ///< weighted locally optimal projection (Huang et al. 2009): creates fewer, evenly spread points; robust to
+           ///< outliers
 };
 template <>
 inline constexpr auto kWords<CloudSmoothing> = std::array{"none", "jets", "wlop"};
 
-/// What clean_cloud() does, in this order; by default only duplicates are removed.
+/// The steps of clean_cloud(), in the order in which they are applied; by default only duplicates are removed.
 struct CloudCleanupOptions {
     bool duplicates = true;  ///< Merges exact duplicates.
-    /// > 0: removes the points of find_isolated_points(), and points whose root mean square distance to `neighbours`
-    /// others exceeds this many times the cloud's mean of that distance, until no such points remain; >= 1.
+    /// 0: outliers are kept; >= 1: removes the points of find_isolated_points(), then, at most four times, all points
+    /// whose root mean square distance to their `neighbours` nearest points exceeds this factor times the mean distance
+    /// between neighbours in the cloud.
     double outlier_factor = 0;
-    double simplify = 0;  ///< > 0: keeps one point in each cell of a lattice of this edge, world units.
+    /// > 0: keeps one point in each cell of a lattice with cells of this edge length, world units.
+    double simplify = 0;
     CloudSmoothing smooth = CloudSmoothing::None;
-    double wlop_fraction = 0.25;  ///< Fraction of the points that WLOP creates, in (0,1].
+    double wlop_fraction = 0.25;  ///< Number of points that WLOP creates, as a fraction of its input, in (0,1].
     /// Radius of WLOP's neighbourhoods, world units, > 0; automatic: twice the mean distance of the new points
     /// to their eight neighbours.
     std::optional<double> wlop_radius;
-    int neighbours = 24;  ///< For outliers and jets, >= 6.
+    int neighbours = 24;  ///< Number of nearest neighbours used for outliers and jets, >= 6.
 
     /// Whether anything other than the removal of duplicates is requested.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }
@@ -56,19 +59,19 @@ inline constexpr auto kOptions<CloudCleanupOptions> =
                                          }}};
 
 struct CloudCleanupReport {
-    std::size_t given = 0;
-    std::size_t duplicates = 0;  ///< removed
-    std::size_t outliers = 0;    ///< removed
+    std::size_t given = 0;       ///< number of points before cleaning
+    std::size_t duplicates = 0;  ///< number of points removed as duplicates
+    std::size_t outliers = 0;    ///< number of points removed as outliers
     int outlier_passes = 0;
-    std::size_t simplified = 0;  ///< removed
-    std::size_t smoothed = 0;    ///< moved
-    double mean_shift = 0;       ///< by the jets, world units
-    double max_shift = 0;
-    std::size_t kept = 0;
+    std::size_t simplified = 0;  ///< number of points removed by `simplify`
+    std::size_t smoothed = 0;    ///< number of points that the jets moved or that WLOP created
+    double mean_shift = 0;       ///< mean distance by which the jets moved the points, world units
+    double max_shift = 0;        ///< maximum of that distance
+    std::size_t kept = 0;        ///< number of points after cleaning
 };
 
 /// Cleans a cloud with CGAL's point-set processing. The remaining points keep their order, except after WLOP, which
-/// creates new ones. The result is bit-identical for any number of threads. One line of the log states what was done.
+/// creates new points. The result is bit-identical for any number of threads. One log line summarises the changes.
 /// @param report  may be null
 /// @throws Error InvalidOptions, InvalidInput (a value that is not finite; no point remains), Numerical (CGAL fails),
 ///     Cancelled.

@@ -5,14 +5,14 @@
 
 namespace covol {
 
-/// Distinguishes inputs of the same name: "xxh128:HEX" of the file, as xxh128sum prints it; for a file above 64 MiB
-/// "xxh128-of-pieces:HEX", of 64 pieces of 1 MiB that are evenly spaced from its first byte to its last; for a folder,
-/// such as a Zarr store, "xxh128-of-metadata:HEX", of the .zarray, .zattrs, .zgroup and zarr.json in it, ordered by
-/// their paths.
+/// A digest of the content, which distinguishes inputs of the same name: "xxh128:HEX" of a file, as xxh128sum prints
+/// it; "xxh128-of-pieces:HEX" of a file above 64 MiB, from 64 evenly spaced pieces of 1 MiB, which include its first
+/// and last byte; "xxh128-of-metadata:HEX" of a folder such as a Zarr store, from its files .zarray, .zattrs, .zgroup
+/// and zarr.json, ordered by their paths.
 /// @throws Error Io.
 [[nodiscard]] COVOL_API std::string digest_of(const std::string& path);
 
-/// The digest of a file with these bytes.
+/// The digest that digest_of() returns for a file with these bytes.
 [[nodiscard]] COVOL_API std::string digest_of_bytes(const std::string& bytes);
 
 }  // namespace covol

@@ -9,7 +9,7 @@
 namespace covol {
 
 struct DistanceOptions {
-    double max_distance = 0.0;  ///< Radius of the tube, world units, > 0.
+    double max_distance = 0.0;  ///< Radius of the tube in which distances are computed, world units, > 0.
 };
 
 template <>
@@ -18,20 +18,20 @@ inline constexpr auto kOptions<DistanceOptions> = std::tuple{Option{
 
 struct DistanceReport {
     std::int64_t active_voxels = 0;
-    int rounds = 0;  ///< passes over the leaves until nothing changed
+    int rounds = 0;  ///< number of passes over the leaves until nothing changed
 };
 
 struct DistanceResult {
-    FloatGridPtr grid;  ///< "distance"; active where d <= max_distance, background = max_distance
+    FloatGridPtr grid;  ///< named "distance"; active where d <= max_distance, background = max_distance
     DistanceReport report;
 };
 
 /// Unsigned distance from voxel centres to the nearest point, in the tube d <= max_distance within the domain.
 ///
-/// Each voxel stores the index of its nearest known point; the index is swept through the tube in the 8 orderings of
-/// fast sweeping (Zhao 2005), leaf by leaf, so that every value is an exact distance to some point and almost always to
-/// the nearest one. Values do not depend on the number of threads.
-/// @param points  world positions, finite, at least one; points outside the domain count too.
+/// Each voxel stores the index of the nearest point found so far; these indices are passed to neighbouring voxels in
+/// the 8 orderings of fast sweeping (Zhao 2005), leaf by leaf. Every value is therefore the exact distance to some
+/// point, almost always to the nearest one. Values do not depend on the number of threads.
+/// @param points  world positions, finite, at least one; points outside the domain are included.
 /// @throws Error InvalidOptions, InvalidInput.
 [[nodiscard]] COVOL_API DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain,
                                                         const DistanceOptions& options, const RunContext& run = {});

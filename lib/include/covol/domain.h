@@ -14,14 +14,14 @@ struct WorldBox {
 };
 [[nodiscard]] COVOL_API double longest_side(const WorldBox& box);
 
-/// Half the width of narrow bands, and the clamp on initial values, in voxels: u0 is in [-3h, 3h].
+/// Half the width of narrow bands, and the clamp on initial values, in voxels: initial values are in [-3h, 3h].
 inline constexpr double kHalfWidthVoxels = 3.0;
 
 /// The computational domain: a box of isotropic voxels, aligned with the world's axes.
 ///
-/// Voxel (i,j,k) is a cube of edge h whose centre lies at origin + h * (i,j,k);
-/// the domain holds the voxels min <= (i,j,k) <= max, and its boundary is the outer faces of those.
-/// Every grid of one computation carries the transform (h, origin) and the box as metadata.
+/// Voxel (i,j,k) is a cube of edge h whose centre lies at origin + h * (i,j,k). The domain contains the voxels from
+/// `min` to `max`, inclusive; their outer faces are its boundary. set_domain() stores h and origin as the transform of
+/// a grid, and `min` and `max` as its metadata.
 struct Domain {
     double voxel_size = 1.0;  ///< h > 0, world units
     Vec3 origin{0, 0, 0};     ///< world position of the centre of voxel (0,0,0)
@@ -30,21 +30,21 @@ struct Domain {
 
     [[nodiscard]] COVOL_API Vec3 index_to_world(const Vec3& index) const;
     [[nodiscard]] COVOL_API Vec3 world_to_index(const Vec3& world) const;
-    /// From outer face to outer face.
+    /// The box between the domain's outer faces.
     [[nodiscard]] COVOL_API WorldBox world_box() const;
     [[nodiscard]] COVOL_API bool contains(const Vec3& world) const;
     [[nodiscard]] COVOL_API std::int64_t voxel_count() const;
     friend bool operator==(const Domain&, const Domain&) = default;
 };
 
-/// The smallest set of voxels of edge h whose union covers `box`, centred on it. A box that is a whole number of voxels
-/// is matched exactly, so that an isotropic image's voxels are the domain's voxels.
+/// The smallest box of voxels of edge h that covers `box`, centred on it. If the edges of `box` are multiples of h,
+/// both boxes are equal; the domain of an isotropic image therefore has the image's voxels.
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
 /// axis).
 [[nodiscard]] COVOL_API Domain make_domain(const WorldBox& box, double voxel_size);
 
-/// The voxels on the lattice of `lattice` whose union covers `box`, up to rounding; the extent of `lattice` itself is
-/// ignored. Boxes on one lattice share one transform, so that their grids can be joined voxel by voxel.
+/// The voxels that cover `box`, up to rounding, on the lattice given by voxel size and origin of `lattice`, whose
+/// extent is ignored. All such domains have the same transform, so that their grids can be joined voxel by voxel.
 /// @throws Error InvalidInput (an empty box, or one that reaches more than 2^23 voxels from voxel (0,0,0)).
 [[nodiscard]] COVOL_API Domain covering(const Domain& lattice, const WorldBox& box);
 
@@ -58,17 +58,17 @@ struct Domain {
 [[nodiscard]] COVOL_API Domain choose_domain(const WorldBox& box, double voxel_size,
                                              const std::optional<WorldBox>& image, const std::optional<Vec3>& origin);
 
-/// The same lattice with `layers` more voxels on every side.
+/// The domain with `layers` more voxels on every side, on the same lattice.
 [[nodiscard]] COVOL_API Domain widened(Domain domain, int layers);
 
-/// Box around the points, enlarged by `margin` (world units) on every side.
+/// The smallest box around the points, enlarged by `margin` (world units) on every side.
 [[nodiscard]] COVOL_API WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
 
 /// Sets the grid's transform and stores the box as metadata ("covol_domain_min", "covol_domain_max").
 COVOL_API void set_domain(FloatGrid& grid, const Domain& domain);
 
-/// The domain that set_domain stored. Without the metadata the box is the bounding box of the
-/// active voxels grown by one leaf (8 voxels), so that nothing touches its boundary.
+/// The domain that set_domain() stored. If the metadata are missing, the box is the bounding box of the active voxels,
+/// enlarged by 8 voxels on every side, so that the surface does not touch its boundary.
 /// @throws Error InvalidInput if the transform is not a uniform scale and a translation.
 [[nodiscard]] COVOL_API Domain domain_of(const FloatGrid& grid);
 

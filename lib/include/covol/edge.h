@@ -13,14 +13,14 @@
 
 namespace covol {
 
-/// The quantity s in g(s), Eq. (2), that defines an edge, of the image normalised to [0,1].
+/// The quantity s in the edge detector g(s), Eq. (2) of the paper, computed from the image normalised to [0,1].
 enum class EdgeFeature {
-    Automatic,   ///< detect_edges() uses Slope; segment() chooses by the image at the marks of contours, see
-                 ///< detect_feature()
-    Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, as in the paper
-    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, with no slope in the middle and one on
-                 ///< either side
-    DarkLine     ///< s = 1 - G_σ * I
+    Automatic,   ///< detect_edges() uses Slope; segment() chooses by the image at the marks of contours, if there
+                 ///< are any, see detect_feature()
+    Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter regions, as in the paper
+    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, which have no slope in the middle and one on
+                 ///< each side
+    DarkLine  ///< s = 1 - G_σ * I: dark sheets
 };
 template <>
 inline constexpr auto kWords<EdgeFeature> = std::array{"auto", "slope", "bright-line", "dark-line"};
@@ -30,12 +30,12 @@ inline constexpr auto kWords<EdgeFeature> = std::array{"auto", "slope", "bright-
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;
-    std::optional<double> sigma;          ///< σ >= 0, world units: presmoothing; automatic: 1 voxel
-    std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: see edge_contrast
+    std::optional<double> sigma;          ///< σ >= 0, world units: width of the presmoothing; automatic: 1 voxel
+    std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: from edge_contrast
     std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
                                           ///< the band
-    /// that percentile, in (0,1); automatic: 0.9 for slopes; for lines a third of the median, so that g depends on
-    /// relative brightness, as varying contrast requires
+    /// the percentile for the automatic edge_contrast, in (0,1); automatic: 0.9 for slopes; for lines, edge_contrast is
+    /// a third of the median of s, so that g depends on the brightness relative to the surroundings
     std::optional<double> contrast_percentile;
     /// intensities mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
     std::optional<std::array<double, 2>> intensities;
@@ -65,30 +65,30 @@ struct EdgeReport {
     double sigma = 0;          ///< world units
     double edge_k = 0;         ///< K as used
     double edge_contrast = 0;  ///< 1/sqrt(K)
-    double low = 0, high = 0;  ///< intensities as used
+    double low = 0, high = 0;  ///< intensities that were mapped to 0 and 1
 };
 
 struct EdgeResult {
-    FloatGridPtr grid;  ///< "edge": g in (0,1], active where the topology is, background 1
+    FloatGridPtr grid;  ///< named "edge": g in (0,1], active in the active voxels of `topology`, background 1
     EdgeReport report;
 };
 
 /// Edge detector g = 1/(1 + K s^2), Eq. (2), on the active voxels of `topology`.
-/// The image is sampled there and in a halo, normalised, smoothed by the implicit heat equation over time σ²/2, and
-/// |∇I| is the mean over the 24 tetrahedra of each voxel.
+/// The image is sampled in these voxels and some layers around them, normalised, and smoothed by the implicit heat
+/// equation over time σ²/2; |∇I| is the mean over the 24 tetrahedra into which each voxel is divided.
 /// @throws Error InvalidOptions, InvalidInput (no active voxel; the image is constant).
 [[nodiscard]] COVOL_API EdgeResult detect_edges(const Image& image, const FloatGrid& topology,
                                                 const EdgeOptions& options = {}, const RunContext& run = {});
 
-/// What the image shows at positions where people mark a border, averaged over many of them.
+/// The kind of edge that the image shows at marked positions, averaged over them.
 struct MarkedFeature {
     EdgeFeature feature = EdgeFeature::Slope;
-    double line = 0;  ///< brightness there, minus that of both sides; intensities
-    double step = 0;  ///< half the difference between outside and inside
+    double line = 0;  ///< intensity at the positions minus the mean of both sides
+    double step = 0;  ///< half the difference between the intensities outside and inside
 };
 
-/// A line if the marked positions differ from both of their sides by more than the sides differ from each other, and by
-/// more than three standard errors; else a slope.
+/// Finds a line if the intensity at the marked positions differs from both sides by more than the sides differ from
+/// each other, and by more than three standard errors; else a slope.
 /// @param places   positions, world units
 /// @param normals  outward unit vectors, one for each position
 /// @param reach    distance from a position at which its two sides are sampled, world units

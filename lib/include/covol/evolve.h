@@ -12,34 +12,37 @@
 
 namespace covol {
 
-/// Parameters that change the result of evolve(). Symbols and equation numbers are the paper's; lengths are in world
-/// units, the unit of the voxel size h; the flow's speed is 1 world unit per unit of time.
+/// Parameters that change the result of evolve(). Symbols and equation numbers are those of the paper; lengths, such as
+/// the voxel size h, are in world units; the flow's speed is 1 world unit per unit of time.
 struct EvolveOptions {
     double theta = 1.0;           ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
     double rho = 1.0;             ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
     std::optional<double> delta;  ///< δ >= 0: weight of curvature, Eq. (1), world units; automatic: 1 voxel
-    std::optional<double> tau;    ///< τ > 0: time step; automatic: h (one voxel at unit speed), and more while the
-                                  ///< surface moves slowly, unless only the image moves it
+    std::optional<double> tau;    ///< τ > 0: time step; automatic: h (one voxel at unit speed), and longer while the
+                                  ///< surface moves slowly, if rho is 0 or image_yields is above 0
     double epsilon = 1e-2;        ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
-    double edge_epsilon = 0.02;  ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the attraction fades out.
-    /// r, world units: the points attract fully up to r/2, not at all beyond r; 0: unlimited; automatic: unlimited, but
-    /// segment() chooses a value.
+    /// ε in |∇g|_ε, Eq. (20): change of g per voxel below which the attraction by edges fades out.
+    double edge_epsilon = 0.02;
+    /// r, world units: the points attract with full weight up to the distance r/2, and not at all beyond r; 0:
+    /// unlimited. Automatic: unlimited; segment() chooses a value.
     std::optional<double> attraction_range;
-    /// in [0,1]: fraction of ρ that fades out close to marks, with the taper of the attraction range; automatic: 0, but
-    /// segment() chooses a value.
+    /// in [0,1]: fraction by which ρ is reduced at marks; the reduction decreases with the distance from them like the
+    /// attraction of the points. Automatic: 0; segment() chooses a value.
     std::optional<double> image_yields;
-    /// in [0,1]: factor of θ where no trusted mark is near, with the same taper.
+    /// in [0,1]: factor of θ far from all trusted marks (EvolveFields::trusted); it increases to 1 towards them, with
+    /// the same dependence on the distance.
     double guess_weight = 1.0;
-    bool follow = false;  ///< the band follows the surface (starts other than tagging).
+    bool follow = false;  ///< the band moves with the surface; needed for starts other than tagging.
     int max_steps = 500;  ///< upper bound on time steps, >= 0
-    /// steady if the zero crossings move by less than tolerance * τ per step on average, or by less than that net of
-    /// oscillations, according to the voxels that changed sign over 10 steps
+    /// the flow is steady if the zero crossings move by less than tolerance * τ per step on average. It is also steady
+    /// if their net motion, which oscillations do not affect, is that small over 10 steps, or, with `follow`, over 3
+    /// steps.
     double tolerance = 2e-3;
     /// Residual at which a step's linear solve ends, relative to that of the previous u; automatic: 1e-3 if `tau` is
-    /// given, else 1e-2: only the steady state matters then, and the solver's error does not move it.
+    /// given, else 1e-2: then only the steady state matters, which the solver's error does not change.
     std::optional<double> solver_tolerance;
     [[nodiscard]] double solved_to() const { return solver_tolerance.value_or(tau ? 1e-3 : 1e-2); }
-    int max_sweeps = 200;  ///< maximum number of sweeps of one step
+    int max_sweeps = 200;  ///< maximum number of the linear solver's sweeps in one step
 };
 
 template <>
@@ -69,7 +72,7 @@ inline constexpr auto kOptions<EvolveOptions> = std::tuple{
            "relative residual at which the linear solver of a step stops", "0.001 with `tau`, else 0.01"},
     Option{"max_sweeps", &EvolveOptions::max_sweeps, at_least(1)}};
 
-/// Why evolve() returned. In every case u holds the last whole step.
+/// Why evolve() returned. In every case u is the result of the last complete step.
 enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
 [[nodiscard]] COVOL_API const char* to_string(StopReason reason);
 
@@ -80,38 +83,40 @@ enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
 struct EvolveReport {
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
-    double last_change = 0;      ///< as in EvolveOptions::tolerance, voxels
-    std::vector<float> changes;  ///< the same for each step
+    double last_change = 0;      ///< mean displacement of the zero crossings in the last step, voxels
+    std::vector<float> changes;  ///< that displacement for each step
     double sweeps_per_step = 0;
     std::int64_t leaf_visits = 0;        ///< leaves swept, over all steps and sweeps
-    std::int64_t leaf_visits_saved = 0;  ///< skipped visits to leaves that did not change
-    std::int64_t active_voxels = 0;      ///< at the end
+    std::int64_t leaf_visits_saved = 0;  ///< visits that were skipped because the leaf did not change
+    std::int64_t active_voxels = 0;      ///< after the last step
     std::int64_t leaf_count = 0;
     double seconds_assembly = 0;
     double seconds_sweeps = 0;
 };
 
-/// The fields that move the surface. Null if the weight is 0.
+/// The fields that move the surface; a field may be null if its weight is 0.
 struct EvolveFields {
-    const FloatGrid* distance = nullptr;  ///< d to the points, world units; the points do not act where it is inactive
-    const FloatGrid* edge = nullptr;      ///< g in (0,1]; the image does not act where it is inactive
-    /// d to those points that are marks and not part of the guess; the image only yields to these. No mark is near
-    /// where it is inactive; null: all points are trusted.
+    /// distance d to the points, world units; points have no effect in inactive voxels
+    const FloatGrid* distance = nullptr;
+    const FloatGrid* edge = nullptr;  ///< g in (0,1]; the image has no effect in inactive voxels
+    /// distance to the trusted points, which are marks and not interpolated; image_yields and guess_weight refer to
+    /// these. Inactive voxels count as far from them; null: all points are trusted.
     const FloatGrid* trusted = nullptr;
-    /// A level set that the surface may not recede behind: after each step u <= obstacle, world units, so that
-    /// {obstacle < 0} stays inside. Outside of its leaves its background applies; null: none.
+    /// An upper bound of u, world units: after each step u <= obstacle, so that {obstacle < 0} stays inside. Outside of
+    /// its leaves its background is the bound; null: no bound.
     const FloatGrid* obstacle = nullptr;
-    /// The same as a lower bound: u >= floor. Where both are equal, the surface is fixed.
+    /// A lower bound in the same form: u >= floor. If both bounds are equal in a voxel, u is fixed there.
     const FloatGrid* floor = nullptr;
-    /// With `follow`: called with u when its band has reached voxels where a field is not known yet, so that the caller
-    /// can extend the field (and may replace the pointers above through `fields`).
+    /// With `follow`: called with u when its band has reached voxels in which a field is not known yet, so that the
+    /// caller can extend the field (and may replace the pointers above through `fields`).
     std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;
-    /// Called with the edges that `extend` had made if the flow resumes from a saved state (RunContext::checkpoints).
+    /// Called when the flow resumes from a saved state (RunContext::checkpoints), with the edge grid of that state,
+    /// which `extend` had made.
     std::function<void(const FloatGridPtr& edge, EvolveFields& fields)> take_edge;
 };
 
-/// Moves the level set u to the boundary of the segment: the semi-implicit co-volume scheme with upwinding,
-/// Eqs. (14)-(22), on u's active voxels.
+/// Moves the level set u to the boundary of the segment by the semi-implicit co-volume scheme with upwinding, Eqs.
+/// (14)-(22), on u's active voxels.
 ///
 /// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
 /// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-// Forward declaration of OpenVDB's FloatGrid, so that covol's headers are cheap to include.
+// Forward declaration of OpenVDB's FloatGrid, so that covol's headers compile fast.
 // Include <openvdb/openvdb.h> to access the contents of a grid.
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
@@ -27,7 +27,7 @@ class LeafNode;
 
 namespace covol {
 
-/// openvdb::FloatGrid: 8^3 leaves, the type of every field in covol.
+/// The same type as openvdb::FloatGrid, with leaves of 8^3 voxels. All of covol's fields on voxels have this type.
 using FloatGrid = openvdb::Grid<openvdb::tree::Tree<openvdb::tree::RootNode<
     openvdb::tree::InternalNode<openvdb::tree::InternalNode<openvdb::tree::LeafNode<float, 3>, 4>, 5>>>>;
 using FloatGridPtr = std::shared_ptr<FloatGrid>;

@@ -14,14 +14,14 @@ namespace covol {
 
 /// Parameters that change the result of guide(); lengths in world units.
 struct GuidanceOptions {
-    /// standard deviation of a mark's position along each axis, >= 0; automatic: kUniformDeviation of a voxel of the
-    /// image
+    /// standard deviation of a mark's position along each axis, >= 0; automatic: kUniformDeviation times the image's
+    /// voxel
     std::optional<double> mark_precision;
-    /// distance from the guess within which the border is searched, >= 0, which is twice the assumed deviation of the
-    /// guess; automatic: from the distance to the marks, and as far as the image indicates
+    /// maximum distance from the guess within which the border is searched, >= 0: twice the assumed standard deviation
+    /// of the guess; automatic: from the distance to the marks
     std::optional<double> range;
-    /// error of the guess (rms) per distance from the nearest mark, >= 0, if it was measured; automatic: estimated from
-    /// the image, but an image that shows another border then makes the guess appear worse
+    /// upper limit of the root mean square error of the guess divided by the distance from the nearest mark, >= 0, if
+    /// it was measured; automatic: no limit; the estimate from the image is too large if the image shows another border
     std::optional<double> error_slope;
     double weight = 1;  ///< in [0,1]: weight of the image's evidence; 0 leaves the guess unchanged
 };
@@ -36,19 +36,20 @@ inline constexpr auto kOptions<GuidanceOptions> =
 /// What guide() found and did. The defaults mean that nothing ran.
 struct GuidanceReport {
     bool used = false;      ///< the image was used
-    std::string reason;     ///< why it was not used, as a message for the user
-    MarkedFeature feature;  ///< what the image shows at the marks
-    double inside = 0, border = 0,
-           outside = 0;  ///< median intensities two voxels inside of the marks, there, two voxels outside
-    double sigma = 0;    ///< presmoothing: the value that best predicted the marks
-    bool local = false;  ///< the profile was learnt locally
-    double gain = 0;     ///< what the image adds to the log-likelihood of a mark that was not used for learning, nats
-    /// distance from the true border of the one found by the image alone (rms, an upper estimate, at the marks)
+    std::string reason;     ///< why the image was not used, as a message for the user
+    MarkedFeature feature;  ///< the kind of edge that the image shows at the marks
+    /// median intensities at the marks (border), and two voxels inside and outside of them
+    double inside = 0, border = 0, outside = 0;
+    double sigma = 0;    ///< the width of the presmoothing with which the image predicted the marks best, world units
+    bool local = false;  ///< the intensity profile was estimated separately for different parts of the surface
+    double gain = 0;     ///< mean increase by the image of the log-likelihood of held-out marks, nats
+    /// estimated distance of the border that the image alone gives from the true border (rms at the marks; rather too
+    /// large)
     double image_error = 0;
-    double guess_error = 0;         ///< distance of the guess from the true border (rms, a lower estimate)
-    double confident_fraction = 0;  ///< of the area, where the image is more informative than the guess
-    double mean_offset = 0;         ///< by area, outward > 0
-    double max_offset = 0;          ///< of |offset|
+    double guess_error = 0;         ///< estimated distance of the guess from the true border (rms; rather too small)
+    double confident_fraction = 0;  ///< fraction of the area in which the image is more informative than the guess
+    double mean_offset = 0;         ///< mean over the area of the movement along the normals, outward > 0
+    double max_offset = 0;          ///< maximum of its absolute value
 };
 
 struct Guided {
@@ -56,18 +57,18 @@ struct Guided {
     GuidanceReport report;
 };
 
-/// Moves a guess, between the marks, to where the image shows the same border as at the marks.
+/// Moves the parts of a guess between the marks to positions at which the image shows the same border as at the marks.
 ///
-/// The distribution of brightness at each depth along the surface's normals is learnt at the marks, whatever form it
-/// has: a step, a line, or a border that its annotator draws beside the steepest slope. Elsewhere this makes each
-/// offset along the normal more or less likely, and a smooth random field about the guess combines these likelihoods.
-/// The error of such a field is measured at marks that the profile was not learnt from, as if the guess were no better
-/// there than between them; the guess and the field are then averaged according to their variances. If the image does
-/// not predict the marks, the guess is left unchanged.
+/// The distribution of brightness at each depth along the surface's normals is estimated at the marks; it may have any
+/// form, for example a step, a line, or a border drawn beside the steepest slope. At other positions it gives the
+/// likelihood of each offset along the normal, and a smooth random field about the guess combines these likelihoods.
+/// The error of this field is measured at held-out marks, with the deviation of the guess assumed to be the same at the
+/// marks as between them; the guess and the field are then averaged, weighted by their variances. If the image does not
+/// predict the marks, the guess is left unchanged.
 ///
 /// @param guess  level set, negative inside, on its domain's lattice
-/// @param marks  world positions; at least 8 near the guess, or the image is not used
-/// @return does not depend on the number of threads
+/// @param marks  world positions; the image is not used if fewer than 8 places of the guess have marks near them
+/// @return the result, which does not depend on the number of threads
 /// @throws Error InvalidOptions, InvalidInput (no surface in the domain), Cancelled.
 [[nodiscard]] COVOL_API Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
                                      const GuidanceOptions& options = {}, const RunContext& run = {});

@@ -10,22 +10,23 @@
 
 namespace covol {
 
-/// What happens to a surface where there are no points.
+/// How the parts of a surface without points are treated.
 enum class Holes {
-    Auto,   ///< Open if the points lie on sheets and cover less than half of the closed surface, else Close
-    Close,  ///< it continues smoothly
+    Auto,   ///< Open if the points lie on a sheet and more than half of the closed surface is hole, else Close
+    Close,  ///< the surface is closed smoothly there
     Open,   ///< the mesh ends there; the level set stays closed
-    Flat    ///< it is spanned by the flattest patch, in mesh and level set
+    Flat    ///< the surface of minimum area closes the hole, in mesh and level set
 };
 template <>
 inline constexpr auto kWords<Holes> = std::array{"auto", "close", "open", "flat"};
 
-/// Whether the policy needs a mesh, and not only a level set.
+/// Whether the policy requires a mesh in addition to the level set.
 [[nodiscard]] constexpr bool needs_mesh(Holes policy) { return policy == Holes::Open || policy == Holes::Flat; }
 
 struct HolesOptions {
     Holes policy = Holes::Auto;
-    /// world units, > 0: a hole is the surface that is farther from all points; automatic: choose_hole_distance()
+    /// world units, > 0: a hole is a part of the surface that is farther than this from all points; automatic:
+    /// choose_hole_distance()
     std::optional<double> distance;
 };
 
@@ -44,28 +45,30 @@ struct BoundaryLoop {
     std::size_t edges = 0;
     double length = 0;  ///< world units
 };
-/// Those of a mesh with boundary, the longest first. @pre manifold
+/// The boundary loops of a mesh, the longest first. @pre manifold
 [[nodiscard]] COVOL_API std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh);
 
 struct HolesReport {
     Holes policy = Holes::Close;  ///< what was done, never Auto
-    double distance = 0;          ///< as used
+    double distance = 0;          ///< the value of HolesOptions::distance that was used
     double fraction = 0;          ///< of the closed surface's area that was trimmed or flattened
-    double closed_volume = 0;     ///< only from segment(): of the level set, if the mesh is open and has none; else 0
-    std::size_t dropped_pieces = 0;   ///< between holes, too small to be kept
-    std::vector<BoundaryLoop> loops;  ///< of the holes
+    /// only from segment(): the volume of the mesh before it was trimmed; 0 if it was not trimmed
+    double closed_volume = 0;
+    std::size_t dropped_pieces = 0;   ///< number of pieces between holes that were removed because they were too small
+    std::vector<BoundaryLoop> loops;  ///< the rims of the holes
 };
 
-/// The distance beyond which points are missing: three spacings where points are sparse (95th percentile of the
-/// nearest-neighbour distance), at least three voxels. Points that are spread uniformly at random hardly ever have such
-/// a wide gap (one in 10^12 discs of that radius is empty).
+/// The automatic HolesOptions::distance: three times the spacing in sparse regions (from the 95th percentile of the
+/// nearest-neighbour distance), at least three voxels. Among uniformly random points such a wide gap is improbable: one
+/// in 10^12 discs of that radius is empty.
 [[nodiscard]] COVOL_API double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size);
 
 /// The distance of each vertex to the nearest point. @pre there is a point
 [[nodiscard]] COVOL_API std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points,
                                                              const RunContext& run = {});
 
-/// Fraction of the area that is farther than `distance` from every point, from the distances at the vertices.
+/// Fraction of the area whose triangles are farther than `distance` from every point.
+/// @param distances  at the vertices, from measure_distances()
 [[nodiscard]] COVOL_API double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
                                                        double distance);
 
@@ -74,21 +77,21 @@ struct TreatedHoles {
     HolesReport report;
 };
 
-/// Removes the surface that is farther than `distance` from all points, and everything closer than that to a removed
-/// position, so that the hole extends back to the points. The rim is therefore traced by a rolling ball of that radius,
-/// and as smooth as one. Triangles are cut along the rim, vertices close to it are moved onto it, and pieces smaller
-/// than the ball's disc are dropped.
+/// Removes the surface that is farther than `distance` from all points, and all surface closer than `distance` -
+/// `slack` to a position removed in this way, so that the hole extends back to the points. The rim is smooth, because
+/// it is the border of a union of balls of that radius. Triangles are cut along the rim, vertices close to it are moved
+/// onto it, and pieces with an area below that of a disc of radius `distance` are removed.
 /// @param mesh       closed, manifold, outward
-/// @param to_points  measure_distances()
+/// @param to_points  from measure_distances()
 /// @param slack      width of the surface that is kept beyond the last points, world units, < distance
 /// @return 2-manifold with boundary, outward; the mesh itself if there is no hole
 /// @throws Error InvalidInput if nothing remains.
 [[nodiscard]] COVOL_API TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                 double distance, double slack, const RunContext& run = {});
 
-/// The same cut, with the surface of minimum area in each hole in place of what was there (Pinkall and Polthier,
-/// Computing discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may intersect
-/// itself; a level set made from it does not.
+/// Cuts the same holes and closes each with a surface of minimum area (Pinkall and Polthier, Computing discrete minimal
+/// surfaces and their conjugates, Experimental Mathematics 2, 1993). The result may intersect itself; a level set made
+/// from it does not.
 [[nodiscard]] COVOL_API TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                    double distance, double slack, const RunContext& run = {});
 

@@ -20,10 +20,10 @@ struct NamedLabel {
     std::array<std::uint8_t, 3> color{187, 187, 187};  ///< red, green, blue
 };
 
-/// The voxels of an image that is written, one box at a time: only the boxes being compressed are in memory.
+/// The voxels of an image to be written, supplied box by box, so that only the boxes being compressed are in memory.
 class COVOL_API PixelSource {
 public:
-    /// @param labels  the values are labels: coarse levels take the most frequent one, not the mean
+    /// @param labels  the values are labels: a voxel of a coarse level gets the most frequent label instead of the mean
     PixelSource(ImageGeometry geometry, PixelType type, bool labels)
         : geometry_(std::move(geometry)), type_(type), is_labels_(labels) {}
     PixelSource(const PixelSource&) = delete;
@@ -34,17 +34,19 @@ public:
     [[nodiscard]] PixelType type() const noexcept { return type_; }
     [[nodiscard]] bool is_labels() const noexcept { return is_labels_; }
 
-    /// Writes the values of `box`, of type(), to `out`, i fastest. Called by several threads at once.
+    /// Writes the values of `box`, as numbers of type(), to `out`, i fastest. Called by several threads at once.
     virtual void fill(const VoxelBox& box, void* out) const = 0;
-    /// The value of all voxels of `box`, if it is known without evaluating each of them.
+    /// The common value of all voxels of `box`; none if they differ or if that is only known after evaluating each
+    /// voxel.
     [[nodiscard]] virtual std::optional<double> uniform(const VoxelBox& box) const;
-    /// A range that contains all values; none if that requires evaluating the voxels. ImageJ displays this range.
+    /// A range that contains all values; none if that requires evaluating the voxels. It is stored as the display range
+    /// of ImageJ.
     [[nodiscard]] virtual std::optional<std::array<double, 2>> range() const;
-    /// Called once for each voxel of the file, from several threads at once.
-    /// @param values  of the box; null: all of them are `uniform`
+    /// Called after a box was written, from several threads at once; each voxel of the file is in one such box.
+    /// @param values  of the box; null: all voxels have the value `uniform`
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
-    /// Key/value pairs, for NRRD. Also called before the voxels are written: the later texts may be shorter, but not
-    /// longer.
+    /// Key/value pairs, for NRRD. Called before and after the voxels are written: the second time the texts may be
+    /// shorter, but not longer.
     [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> metadata() const;
     /// The meaning of the values, for OME-Zarr and DICOM.
     [[nodiscard]] virtual std::vector<NamedLabel> label_names() const;
@@ -55,15 +57,15 @@ private:
     bool is_labels_;
 };
 
-/// Whether a folder is an array or a group of Zarr 2 or 3, which writing a .zarr may replace.
+/// Whether a folder is an array or a group of Zarr 2 or 3; writing a .zarr replaces only such folders.
 [[nodiscard]] COVOL_API bool is_zarr_store(const std::string& folder);
 
 struct WriteImageOptions {
     bool pack = true;  ///< false: .nrrd and .mha are not compressed
-    /// The file of the image with this lattice, or empty. A NIfTI file keeps its qform and sform and their codes if
-    /// they describe that lattice; a DICOM segmentation belongs to its patient and study, and refers to its slices.
+    /// File of an image with the same lattice, or empty. A NIfTI file gets that file's qform and sform and their codes
+    /// if they describe the lattice; a DICOM segmentation gets its patient and study, and refers to its slices.
     std::string like = {};
-    std::optional<int> like_frame = {};  ///< of that image, as ReadImageOptions::frame
+    std::optional<int> like_frame = {};  ///< frame of that image, as ReadImageOptions::frame
 };
 
 template <>
@@ -72,9 +74,9 @@ inline constexpr auto kOptions<WriteImageOptions> = std::tuple{Option{"pack", &W
 /// Writes an image as the other overloads of write_image() do, but in boxes of a few MB that are filled and compressed
 /// in parallel: memory does not grow with the image. The file does not depend on the number of threads.
 ///
-/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .dcm is a DICOM segmentation (labels only); .zarr is OME-Zarr 0.4
-/// in chunks of 128^3, with levels of half the size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in
-/// tiles of 256 x 256. A folder that is not a Zarr store is never replaced.
+/// Formats: .nrrd, .nii, .nii.gz, .mha, .tif, .npy; .dcm is a DICOM segmentation (labels only); .zarr is OME-Zarr 0.4
+/// in chunks of 128^3 voxels, with coarser levels, each of half the size, down to one chunk. A TIFF above 4000 MiB of
+/// voxels is a BigTIFF in tiles of 256 x 256. A folder that is not a Zarr store is never replaced.
 /// @throws Error Io, InvalidOptions (extension), Unsupported (larger than the format allows), Cancelled; whatever the
 ///     source throws. No partial file remains.
 COVOL_API void write_image(const std::string& path, const PixelSource& source, const WriteImageOptions& options = {},

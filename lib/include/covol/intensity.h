@@ -14,7 +14,7 @@ struct IntensityStatistics {
     double mean = 0, standard_deviation = 0;  ///< of the image's values; 0 without voxels
 };
 
-/// Number of the image's voxels in the box around a surface.
+/// The number of the image's voxels in the bounding box of a surface.
 [[nodiscard]] COVOL_API double count_voxels_around(const Image& image, const FloatGrid& surface);
 
 /// @param surface  a level set, negative inside

@@ -11,19 +11,20 @@
 namespace covol {
 
 /// A closed surface, stored as its signed distance: the grid is an OpenVDB level set in world units, negative inside,
-/// with cubic voxels; outside of a band of kHalfWidthVoxels voxels on both sides of the surface its value is
-/// +-kHalfWidthVoxels voxels. A value type: copies share the grid, which is never modified.
+/// with cubic voxels; farther than kHalfWidthVoxels voxels from the surface, its value is +-kHalfWidthVoxels voxels.
+/// Copies of this object share the grid, which is never modified.
 class LevelSet {
 public:
-    /// The zero level set of any grid that is negative inside; it is redistanced exactly.
+    /// Computes the signed distance to the zero level set of any grid that is negative inside.
     /// @throws Error InvalidInput (no zero crossing; voxels that are not cubes), Cancelled.
     [[nodiscard]] COVOL_API static LevelSet from(const FloatGrid& u, const RunContext& run = {});
-    /// Takes a grid that already is such a distance, as from extract_surface() and start_from_...().
+    /// Uses a grid that already is such a signed distance, as from extract_surface() and the functions
+    /// start_from_...().
     /// @throws Error InvalidInput (null, another class of grid, another background, voxels that are not cubes).
     COVOL_API explicit LevelSet(FloatGridPtr distance);
 
     [[nodiscard]] const FloatGrid& grid() const { return *grid_; }
-    /// For functions that take a pointer, and for files; must not be modified.
+    /// The grid as a pointer; the grid must not be modified through it.
     [[nodiscard]] const FloatGridPtr& pointer() const { return grid_; }
     [[nodiscard]] COVOL_API Domain domain() const;
 
@@ -36,13 +37,14 @@ public:
     /// end.
     /// @throws Error InvalidInput (nothing remains), InvalidOptions (not finite), Cancelled.
     [[nodiscard]] COVOL_API LevelSet offset(double distance, const RunContext& run = {}) const;
-    /// The union, the intersection, or the difference of this and the other solid, on this lattice and domain.
+    /// The union or intersection of this and the other solid, or this solid without the other, on this lattice and
+    /// domain.
     /// @throws Error InvalidInput (nothing remains), Cancelled.
     [[nodiscard]] COVOL_API LevelSet united(const LevelSet& other, const RunContext& run = {}) const;
     [[nodiscard]] COVOL_API LevelSet intersected(const LevelSet& other, const RunContext& run = {}) const;
     [[nodiscard]] COVOL_API LevelSet without(const LevelSet& other, const RunContext& run = {}) const;
 
-    /// Volume, area, components and genus of its triangle mesh, which is not kept.
+    /// Properties of the surface's triangle mesh, which is not stored.
     [[nodiscard]] COVOL_API MeshMeasures measure(const RunContext& run = {}) const;
 
 private:

@@ -9,7 +9,7 @@
 
 namespace covol {
 
-/// The position of a mark: on the structure's surface, inside the structure, or outside of it.
+/// Whether a mark lies on the structure's surface, inside the structure, or outside of it.
 enum class MarkKind { Surface, Inside, Outside };
 template <>
 inline constexpr auto kWords<MarkKind> = std::array{"surface", "inside", "outside"};
@@ -17,13 +17,14 @@ inline constexpr auto kWords<MarkKind> = std::array{"surface", "inside", "outsid
 /// A file of marks, with the kind of each mark if its table has a column `kind`.
 struct KindedPoints {
     PointCloud cloud;
-    std::vector<MarkKind> kinds;  ///< one for each point; empty: the file states none, all lie on the surface
+    /// one for each point; empty: the file states no kinds, and all points are on the surface
+    std::vector<MarkKind> kinds;
 
-    /// Only the points of that kind. Those of a file without kinds are all on the surface, and keep their lines.
+    /// Only the points of that kind. For a file without kinds, Surface gives the whole cloud with its lines.
     [[nodiscard]] COVOL_API PointCloud of(MarkKind kind) const;
 };
 
-/// As read_points(), with the kinds. @throws  as read_points()
+/// Reads points as read_points() does, together with their kinds. @throws  as read_points()
 [[nodiscard]] COVOL_API KindedPoints read_kinded_points(const std::string& path, const ReadPointsOptions& options = {});
 
 }  // namespace covol

@@ -17,119 +17,123 @@
 #include "covol/points.h"
 #include "covol/run.h"
 
-// The input that locates structures: marks of every kind, by structure, and their conversion to the input of segment().
+// Marks of every kind for each structure, and their conversion to the input of segment().
 namespace covol {
 
 /// A label image painted by a person.
 struct PaintedImage {
     Image image;
     PaintedOptions options;
-    std::vector<LabelName> labels;  ///< that belong to structures
-    std::string name;       ///< name of the structure that its only label belongs to; empty: the label's own name
-    bool is_shared = true;  ///< paint of one structure is outside of the others, and labels keep their values
+    std::vector<LabelName> labels;  ///< the labels that belong to structures
+    std::string name;       ///< name of the structure to which all labels belong; empty: each label has its own name
+    bool is_shared = true;  ///< the image is shared by several structures: the paint of each is outside of the others,
+                            ///< and labels keep their values
 };
-/// Finds the labels. @throws Error as find_painted_labels().
+/// Makes a painted image and finds its labels. @throws Error as find_painted_labels().
 [[nodiscard]] COVOL_API PaintedImage make_painted(const Image& image, const PaintedOptions& options = {});
 
-/// A mask, mesh or level set of another program, from which the segmentation starts and which is corrected by marks.
+/// A mask, mesh or level set of another program, which is corrected by marks.
 struct GivenGuess {
     Start start;                ///< as SegmentOptions::guess
-    std::optional<Image> mask;  ///< if it is a mask: the mask as in its file, placed on the image
-    int label = 1;              ///< in that mask
+    std::optional<Image> mask;  ///< if the guess is a mask: that mask with all its labels, placed on the image
+    int label = 1;              ///< the structure's label in that mask
 };
-/// A guess from a label of a mask. @param label  0: the only one
-/// @param image  on which it has to lie; none: no restriction
-/// @param force  as of placed_on()
-/// @throws Error InvalidInput (no such label; several labels and none chosen: lists them; as placed_on()).
+/// Makes a guess from a label of a mask. @param label  0: the mask's only label
+/// @param image  on which the mask has to lie; none: no restriction
+/// @param force  as for placed_on()
+/// @throws Error InvalidInput (no such label; several labels and none chosen: the message lists them; as placed_on()).
 [[nodiscard]] COVOL_API GivenGuess make_guess(const Image& mask, int label, const std::optional<ImageGeometry>& image,
                                               bool force = false);
 
-/// Files with marks of one structure, read by covol/read_marks.h.
+/// Paths of files with marks of one structure, which read_marks() reads.
 struct MarkFiles {
     std::vector<std::string> points, contours, inside, outside;
     std::string guess;  ///< mask, mesh or level set of another tool; empty: none
 };
 
-/// The structure that marks belong to, and their origin.
+/// The structure to which marks belong, and the origin of the marks.
 struct MarksOrigin {
-    std::string name;                    ///< empty: it is the only structure
-    int label = 0;                       ///< in a mask of all structures; 0: see number_labels()
-    MarkFiles files;                     ///< empty: from memory
+    std::string name;  ///< of the structure; empty: it is the only one
+    int label = 0;     ///< value of the structure in a mask of all structures; 0: number_labels() chooses it
+    MarkFiles files;   ///< empty: the marks were given in memory
     std::vector<std::string> rules;      ///< how the coordinates of each cloud of points were interpreted
     std::size_t count = 0;               ///< number of marks that were given
     std::optional<std::size_t> thinned;  ///< number of points after thinning
 };
 
-/// The marks of one structure, world units.
+/// The marks of one structure; world units, except for clouds, which have coordinates of their own.
 struct Marks : MarksOrigin {
     std::vector<Vec3> points;
     PointHints hints;                         ///< for the points
     std::vector<PointCloud> contours;         ///< lines on slices
-    std::vector<PointCloud> inside, outside;  ///< seeds; lines are scribbles
+    std::vector<PointCloud> inside, outside;  ///< seeds; the lines of these clouds are scribbles
     std::vector<Vec3> exterior_seeds;         ///< in addition to those of SegmentOptions
     struct Paint {
         std::shared_ptr<const PaintedImage> image;
         int label = 0;
     };
     std::vector<Paint> paint;
-    std::function<GivenGuess(const RunContext&)>
-        guess;                    ///< called when it is needed: it may be a whole image; none: empty
-    std::optional<Start> start;   ///< instead of SegmentOptions::start
-    std::optional<double> delta;  ///< if EvolveOptions has none, world units
+    std::function<GivenGuess(const RunContext&)> guess;  ///< returns the guess; called only when it is needed, because
+                                                         ///< a guess may be a large image; empty: there is no guess
+    std::optional<Start> start;                          ///< replaces SegmentOptions::start
+    std::optional<double> delta;  ///< replaces EvolveOptions::delta if that has no value, world units
 };
 
 /// Adds a cloud to the points. @param image  none: there is no image
 /// @throws Error InvalidInput as to_world(), and as check_inside() with an image.
 COVOL_API void add_points(Marks& marks, const PointCloud& cloud, const std::optional<ImageGeometry>& image,
                           const RunContext& run = {});
-/// Adds a cloud to the contours. @param image, @throws  as of add_points()
+/// Adds a cloud to the contours. @param image, @throws  as for add_points()
 COVOL_API void add_contours(Marks& marks, PointCloud cloud, const std::optional<ImageGeometry>& image,
                             const RunContext& run = {});
-/// For points without an image: sorts them in space, and keeps `maximum` of them, evenly spread (order_spatially()); 0:
-/// all.
+/// For points without an image: sorts them spatially and keeps `maximum` evenly spread points (order_spatially());
+/// maximum = 0 keeps all points.
 COVOL_API void thin_points(Marks& marks, std::size_t maximum, const RunContext& run = {});
-/// Points and contours as they were given, world units.
+/// The positions of all points and of the marks of all contours, world units.
 [[nodiscard]] COVOL_API std::vector<Vec3> positions_of(const Marks& marks, const std::optional<ImageGeometry>& image);
 
 /// The structure with that name; null if there is none.
 [[nodiscard]] COVOL_API Marks* find_structure(std::vector<Marks>& structures, const std::string& name);
 /// The structure with that name; if there is none, a new one at the end.
 COVOL_API Marks& find_or_add_structure(std::vector<Marks>& structures, const std::string& name);
-/// Assigns each label to the structure of its name. A single label without a name belongs to marks without a name.
+/// Assigns each painted label to the structure with its name. A single label without a name is assigned to the
+/// structure without a name.
 COVOL_API void add_paint(std::vector<Marks>& structures,
                          const std::vector<std::shared_ptr<const PaintedImage>>& images);
-/// Painted labels keep their values in masks; structures without a label get free values.
+/// Gives each structure its value in masks: that of its painted label, or else a value that is not used.
 COVOL_API void number_labels(std::vector<Marks>& structures);
 
 /// How marks are converted to the input of segment().
 struct MarksOptions {
-    ContourOptions contours;      ///< `step` is the voxel size
+    ContourOptions contours;      ///< `step` is set to the voxel size
     CloudCleanupOptions cleanup;  ///< of the points
-    bool force_geometry = false;  ///< placed_on() is forced for painted images that have as many voxels as the image
+    bool force_geometry = false;  ///< the argument `force` of placed_on() for painted images
 };
 
-/// What is known of one structure in addition to its result.
+/// Information about one structure in addition to its result.
 struct StructureFacts : MarksOrigin {
-    std::string grid;                           ///< make_grid_names()
+    std::string grid;                           ///< name of its grid, from make_grid_names()
     std::vector<Vec3> marks;                    ///< cleaned points and the marks of contours as they were set
     std::vector<std::string> contour_rules;     ///< how each cloud of contours was interpreted
-    std::optional<CloudCleanupReport> cleanup;  ///< if there was something to clean
-    std::vector<std::pair<std::string, PaintedLabel>> paint;  ///< paths, and what was derived from the paint
-    double contour_seconds = 0;                               ///< duration of densify()
+    std::optional<CloudCleanupReport> cleanup;  ///< if points were cleaned
+    /// paths of painted images, and the information derived from their paint
+    std::vector<std::pair<std::string, PaintedLabel>> paint;
+    double contour_seconds = 0;  ///< duration of densify()
 };
 
 /// The input of segment() and reconstruct() for one structure.
 struct StructureInput : StructureFacts {
     std::vector<Vec3> points;
     SegmentOptions options;
-    std::function<GivenGuess(const RunContext&)> guess;  ///< not yet part of the options
+    std::function<GivenGuess(const RunContext&)> guess;  ///< becomes SegmentOptions::guess when the structure is solved
 };
 
-/// Cleans the points, joins contours and painted outlines, collects the seeds. Log lines begin with the structure's
+/// Cleans the points, joins contours and painted outlines, and collects the seeds. Log lines begin with the structure's
 /// name; for more than four structures only warnings are logged.
 /// @param options  for all structures; voxel_size has a value
-/// @throws Error InvalidInput (names that are empty or not unique among several; as clean_cloud(), densify(),
-///     understand_painted() and check_inside()), InvalidOptions (a tag distance beyond the marks' box).
+/// @throws Error InvalidInput (names that are empty or not unique if there are several structures; as clean_cloud(),
+/// densify(),
+///     understand_painted() and check_inside()), InvalidOptions (a tag distance above the diagonal of the marks' box).
 [[nodiscard]] COVOL_API std::vector<StructureInput> prepare_marks(std::vector<Marks> structures,
                                                                   const std::optional<ImageGeometry>& image,
                                                                   const SegmentOptions& options,

@@ -10,12 +10,14 @@
 namespace covol {
 
 struct CleanupOptions {
-    double target_edge = 0.0;  ///< > 0: decimate to about this edge length (world units)
-    /// > 0: decimate as long as no triangle is farther from the level set than this (world units, at most two voxels):
-    /// flat parts get large triangles; combined with target_edge, this limits it. Needs the level set.
+    double target_edge = 0.0;  ///< > 0: the mesh is decimated to about this edge length, world units
+    /// > 0: the mesh is decimated as far as possible with no triangle farther from the level set than this (world
+    /// units, at most two voxels), with large triangles in flat parts; with target_edge, it limits that decimation.
+    /// Requires the level set.
     double adaptive = 0.0;
-    int smooth_iterations = 0;  ///< tangential + normal (Taubin-like, volume preserving) smoothing steps
-    bool repair = true;         ///< resolve self-intersections and non-manifold spots, fill holes
+    /// number of smoothing steps, tangential and normal (similar to Taubin's, volume preserving)
+    int smooth_iterations = 0;
+    bool repair = true;  ///< resolves self-intersections and non-manifold parts, and fills holes
 };
 
 template <>
@@ -28,40 +30,41 @@ inline constexpr auto kOptions<CleanupOptions> = std::tuple{
     Option{"smooth", &CleanupOptions::smooth_iterations, kNotNegative, Group::MeshFiles,
            "steps of volume-preserving smoothing"},
     Option{"repair", &CleanupOptions::repair, Group::MeshFiles, "resolve self-intersections and fill holes"}};
-/// The effect of a step on a mesh.
+/// The effect of a cleanup step on a mesh.
 struct CleanupStep {
-    std::int64_t triangles = 0;
-    double smallest_angle = 0;  ///< degrees: 1st percentile of the triangles' smallest angles
-    MeshDeviation change;       ///< world units: from the mesh before, both ways, of vertices and centroids
-    MeshDeviation deviation;    ///< voxels: from the level set; 0 if there is none
+    std::int64_t triangles = 0;  ///< number after the step
+    double smallest_angle = 0;   ///< degrees: 1st percentile of the triangles' smallest angles
+    MeshDeviation change;  ///< world units: distances between the meshes before and after the step, in both directions,
+                           ///< at vertices and centroids
+    MeshDeviation deviation;  ///< voxels: distance from the level set; 0 if there is none
 };
 struct CleanupReport {
-    int self_intersections = 0;  ///< pairs found before repair
+    int self_intersections = 0;  ///< number of pairs of triangles before the repair
     int holes_filled = 0;
-    bool closed = false, manifold = false, intersection_free = false;  ///< afterwards
+    bool closed = false, manifold = false, intersection_free = false;  ///< after all steps
     std::optional<CleanupStep> decimation, smoothing;
 };
-/// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh). Decimation and
-/// smoothing do not move vertices whose move would make triangles touch.
-/// @throws Error InvalidOptions, InvalidInput (a mesh that is not manifold, to be decimated without repair).
+/// Modifies a mesh so that it is closed, manifold, oriented outward and free of self-intersections (CGAL, OpenMesh).
+/// Decimation and smoothing make no change that would cause triangles to touch.
+/// @throws Error InvalidOptions, InvalidInput (decimation without repair of a mesh that is not manifold).
 COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
 
-/// The same for a mesh of a level set: decimated triangles are relaxed on it (relax_mesh()).
+/// The same for a mesh of a level set; after decimation, relax_mesh() improves the triangles on that level set.
 COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0,
                                    const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// Number of pairs of triangles that have a point in common other than the vertices and the edge that they share.
 [[nodiscard]] COVOL_API int count_self_intersections(const TriangleMesh& mesh);
 
-/// The same pairs, by whether both triangles belong to one component.
+/// Numbers of these pairs, by whether both triangles belong to the same component.
 struct Crossings {
-    int within = 0;   ///< a component and itself
-    int between = 0;  ///< two components that touch or overlap, as structures with a common border do
+    int within = 0;   ///< pairs within one component
+    int between = 0;  ///< pairs of two components, which touch or overlap, like structures with a common border
 };
 [[nodiscard]] COVOL_API Crossings count_crossings(const TriangleMesh& mesh);
 
-/// The wall thickness of the solid, world units: distances from the centres of triangles that are evenly spread over
-/// the list, straight inward to the next triangle; the 1st percentile of up to 512. < 0: no ray hit a triangle.
+/// The wall thickness of the solid, world units: the 1st percentile of the distances from the centres of up to 512
+/// triangles, evenly spaced in the mesh's list, straight inward to the next triangle. < 0: no ray hit a triangle.
 [[nodiscard]] COVOL_API double measure_wall(const TriangleMesh& mesh, const RunContext& run = {});
 
 }  // namespace covol

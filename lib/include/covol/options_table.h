@@ -15,17 +15,18 @@
 
 // Each struct of options is followed by a table of its fields, kOptions<Struct>: a tuple of Option, of Part for a
 // nested struct, and of Rule for constraints that the range of one field cannot express. Validation, the command line
-// and its help, Python's keywords, reports and messages are generated from it.
+// and its help, Python's keyword arguments, reports and messages are generated from this table.
 namespace covol {
 
 enum class Unit {
     One,
-    Length,  ///< world units; users may give voxels, "3vx"
-    Volume,  ///< world units^3; users give the edge of a cube
+    Length,  ///< world units; users may also give voxels, as in "3vx"
+    Volume,  ///< world units^3; users give the edge length of a cube of this volume
     Voxels
 };
 
-/// The section of the help that lists an option, in this order; None: only for callers of the library.
+/// The section of the help that lists an option, in the order of the help; None: the option is not listed, because only
+/// callers of the library can set it.
 enum class Group {
     Input,
     Marks,
@@ -43,22 +44,22 @@ enum class Group {
     None
 };
 
-/// The jobs that have an option.
+/// The jobs for which an option is offered.
 enum class Offered {
     Always,
-    WithImage,    ///< not points alone
-    PointsAlone,  ///< not an image
-    SingleStep    ///< only the struct's own step, which runs alone
+    WithImage,    ///< not for points alone
+    PointsAlone,  ///< not for jobs with an image
+    SingleStep    ///< only if the struct's own step runs alone
 };
 
 /// Finite numbers between two limits.
 struct Range {
     double min = -std::numeric_limits<double>::infinity(), max = std::numeric_limits<double>::infinity();
-    bool above_min = false, below_max = false;  ///< the limit itself is excluded
+    bool above_min = false, below_max = false;  ///< whether the limit itself is excluded
     Unit unit = Unit::One;
 
     [[nodiscard]] COVOL_API bool holds(double value) const;
-    /// "> 0", "16 to 2048"
+    /// The range for messages: "> 0", "16 to 2048".
     [[nodiscard]] COVOL_API std::string text() const;
     /// @throws Error InvalidOptions "name: expected > 0, got -1".
     COVOL_API void require(const std::string& name, double value) const;
@@ -74,7 +75,7 @@ inline constexpr Range kPositive{0, std::numeric_limits<double>::infinity(), tru
     kLength = counted_in(Unit::Length, kNotNegative), kPositiveLength = counted_in(Unit::Length, kPositive),
     kAnyLength = counted_in(Unit::Length, {}), kVolume = counted_in(Unit::Volume, kNotNegative);
 
-/// The names of an enumeration's values as the user gives them, in the order of the values; null: it has none.
+/// The names of an enumeration's values as the user gives them, in the order of the values; null: it has no such names.
 template <typename Enum>
 inline constexpr auto kWords = nullptr;
 template <typename Enum>
@@ -96,27 +97,27 @@ struct Place {
 
 /// The description of an option, except for its type.
 struct OptionInfo {
-    const char* name;  ///< the name in messages and for users: a keyword, and with dashes a flag
-    Range range{};     ///< of a number, and of each number in a list
+    const char* name;  ///< the name in messages and Python's keyword; with dashes, the flag of the command line
+    Range range{};     ///< allowed range of a number, or of each number in a list
     Place place{};
     const char* text = "";             ///< one line of help; names of options in backquotes
-    const char* automatic = "";        ///< what applies if it is not given, unless that is a plain value
-    const char* automatic_alone = "";  ///< the same for the single step, if it differs
+    const char* automatic = "";        ///< description of the automatic choice, unless the default is a plain value
+    const char* automatic_alone = "";  ///< the same if the step runs alone, if that differs
 };
 
 template <typename Struct, typename Value>
 struct Option : OptionInfo {
     Value Struct::*field;
 
-    /// A number.
+    /// An option that is a number.
     constexpr Option(const char* name_, Value Struct::*field_, Range range_, Place place_, const char* text_,
                      const char* automatic_ = "", const char* alone = "")
         : OptionInfo{name_, range_, place_, text_, automatic_, alone}, field(field_) {}
-    /// Of another type.
+    /// An option of another type.
     constexpr Option(const char* name_, Value Struct::*field_, Place place_, const char* text_,
                      const char* automatic_ = "", const char* alone = "")
         : OptionInfo{name_, {}, place_, text_, automatic_, alone}, field(field_) {}
-    /// Only for callers of the library.
+    /// An option that only callers of the library can set.
     constexpr Option(const char* name_, Value Struct::*field_, Range range_ = {})
         : OptionInfo{name_, range_}, field(field_) {}
 };
@@ -131,7 +132,7 @@ Part(Inner Struct::*) -> Part<Struct, Inner>;
 
 template <typename Struct>
 struct Rule {
-    const char* name;  ///< of the option that is wrong if the rule is violated
+    const char* name;  ///< name of the option that is reported if the rule is violated
     const char* expected;
     bool (*holds)(const Struct&);
 };
@@ -139,7 +140,8 @@ struct Rule {
 template <typename Struct>
 inline constexpr auto kOptions = nullptr;
 
-/// Calls visit(const OptionInfo&, field) for each option, including those of parts, in the order of the tables.
+/// Calls visit(const OptionInfo&, field) for each option, including the options of nested structs, in the tables'
+/// order.
 template <typename Options, typename Visit>
 constexpr void for_each_option(Options& options, const Visit& visit) {
     const auto take = [&]<typename Row>(const Row& row) {
@@ -156,7 +158,7 @@ inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, 
 
 /// For why_invalid(): adds a line "name: complaint" unless the complaint is empty.
 COVOL_API void add_complaint(std::string& lines, const char* name, const std::string& complaint);
-/// The same for a number outside of the option's range.
+/// Adds such a line if a number is outside of the option's range.
 COVOL_API void complain(std::string& lines, const OptionInfo& option, double value);
 
 namespace detail {
@@ -194,7 +196,7 @@ void complain_of(std::string& lines, const Options& options) {
 
 }  // namespace detail
 
-/// Empty if the options are valid, else one line for each invalid field: "tau: expected > 0, got -1".
+/// An empty text if the options are valid, else one line for each invalid field: "tau: expected > 0, got -1".
 template <typename Options>
 [[nodiscard]] std::string why_invalid(const Options& options) {
     std::string lines;
@@ -202,7 +204,8 @@ template <typename Options>
     return lines;
 }
 
-/// @throws Error InvalidOptions, "function: tau: expected ...", of the first invalid field.
+/// @throws Error InvalidOptions, "function: tau: expected ...", if a field is invalid; Error::option() is the first
+/// one.
 template <typename Options>
 void require_valid(const Options& options, const char* function) {
     const std::string why = why_invalid(options);

@@ -10,20 +10,21 @@
 
 namespace covol {
 
-/// The distance between points on the surface, and their distance from it.
+/// Typical distances between the points of a cloud, and between the points and the surface.
 struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
-    double noise = 0;    ///< standard deviation along the normal
+    double noise = 0;    ///< standard deviation of the points from the surface, along its normal
     double nearest = 0;  ///< median distance to the nearest other point
-    /// For a point and its eleven nearest neighbours: median of their radius, and of their standard deviation from a
-    /// quadric, which is 0.33 of the radius if they fill a ball
+    /// for groups of a point and its eleven nearest neighbours: median of the groups' radius, and of their standard
+    /// deviation from a quadric, which is 0.33 of the radius if the points fill a ball
     double near_reach = 0, near_noise = 0;
 };
-/// From quadrics through neighbourhoods of a sample of the points, at the radius at which they are most like a sheet.
+/// Measures the scale from quadrics fitted to neighbourhoods of a sample of the points, with the radius at which the
+/// neighbourhoods are closest to a sheet.
 [[nodiscard]] COVOL_API CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
 
-/// The indicator function of a solid: about 1 inside and 0 outside, smooth over a few cells; beyond its lattice the
-/// value of the nearest node. Thread-safe.
+/// The indicator function of a solid: about 1 inside and 0 outside, with a smooth transition over a few cells. Beyond
+/// its lattice it has the value of the nearest node. Thread-safe.
 class Indicator {
 public:
     struct Values;
@@ -32,91 +33,97 @@ public:
     struct Sample {
         double inside;
         Vec3 gradient;
-        double cell;  ///< of its grid at this position, world units
+        double cell;  ///< cell size of the indicator's grid at this position
     };                ///< units: 1, 1 / world unit, world units
     [[nodiscard]] COVOL_API Sample at(const Vec3& world) const;
     [[nodiscard]] COVOL_API double inside(const Vec3& world) const;  ///< as at(), but faster
-    [[nodiscard]] COVOL_API double cell() const;                     ///< of its finest grid, world units
-    /// Calls visit(box), with a world box, for each cell of its lattice that its level 1/2 crosses.
+    [[nodiscard]] COVOL_API double cell() const;                     ///< cell size of its finest grid, world units
+    /// Calls visit(box), with the box in world units, for each cell that the indicator's level 1/2 crosses.
     COVOL_API void crossed(const std::function<void(const WorldBox&)>& visit) const;
 
 private:
     std::unique_ptr<const Values> values_;
 };
 
-/// What is known about inside and outside from a cloud without normals.
+/// The result of orienting a cloud.
 struct Orientation {
-    std::vector<Vec3> normals;  ///< unit, outward, of the points as they were given; 0 where unknown
-    std::vector<double> areas;  ///< of the surface that each point represents, world units squared, from the density
+    std::vector<Vec3> normals;  ///< outward unit normals, one for each point; 0 if unknown
+    std::vector<double> areas;  ///< area of the surface that each point represents, from the density, world units^2
     std::shared_ptr<const Indicator> indicator;  ///< from these normals and areas
-    std::shared_ptr<const Indicator> screened;   ///< also fitted to 1/2 at the points; null: not needed
+    /// the screened indicator, which is also fitted to 1/2 at the points; null: not needed
+    std::shared_ptr<const Indicator> screened;
     /// fraction of the points whose normal was turned by more than 90 degrees in the last iteration
     double turned = 0;
-    double off_half = 0;  ///< absolute difference between the mean of the indicator over the points and 1/2
+    double off_half = 0;  ///< absolute difference between 1/2 and the indicator's mean over the points
     int iterations = 0;
-    /// normals replaced because they were not perpendicular to their sheet of points, or on its wrong side
+    /// number of normals that were replaced, because they were not perpendicular to the sheet of their neighbours or
+    /// pointed to its wrong side
     std::size_t mended = 0;
-    /// points of a scan's layers that lie below others: turned, and the surface need not pass through them
+    /// number of points in layers of a scan that lie below other layers: their normals were turned, and the surface
+    /// need not pass through them
     std::size_t layered = 0;
 };
 
-/// Normals that are consistent with the indicator function that they define: from initial normals, which point away
-/// from the points, chi is solved for and each normal replaced by the direction in which chi decreases at its point, on
-/// finer and finer lattices (Hou and others, Iterative Poisson surface reconstruction, ACM Trans. Graph. 41(4), 2022;
-/// Lin, Shi and Liu, Fast and globally consistent normal orientation based on the winding number normal consistency,
-/// ACM Trans. Graph. 43(6), 2024). That alone leaves some parts inverted as a whole, for example a leg: their surface
-/// is where chi is -1/2 instead of 1/2. Therefore a normal is also flipped if chi indicates that its point lies on the
-/// wrong side.
-/// @param scale  of the points: determines the finest lattice
+/// Computes normals that are consistent with the indicator function chi that they define. Starting from normals that
+/// point away from the points, two steps are repeated on increasingly fine lattices: chi is computed from the normals,
+/// and each normal is replaced by the direction in which chi decreases at its point (Hou and others, Iterative Poisson
+/// surface reconstruction, ACM Trans. Graph. 41(4), 2022; Lin, Shi and Liu, Fast and globally consistent normal
+/// orientation based on the winding number normal consistency, ACM Trans. Graph. 43(6), 2024). This alone may leave
+/// whole parts inverted, for example a leg, whose surface then lies at chi = -1/2 instead of 1/2. Therefore a normal is
+/// also flipped if chi indicates that its point lies on the wrong side.
+/// @param scale  of the points; determines the finest lattice
 /// @throws Error InvalidInput (fewer than 4 points, points without extent), Cancelled.
 [[nodiscard]] COVOL_API Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale,
                                            const RunContext& run = {});
 
-/// What files contain about points in addition to their positions. Each list is empty or has an entry for each point, 0
-/// if it is unknown.
+/// Information from files about points in addition to their positions. Each list is empty or has an entry for each
+/// point, which is 0 if it is unknown.
 struct PointHints {
-    std::vector<Vec3> normals;    ///< unit
-    std::vector<Vec3> to_sensor;  ///< unit: from the point to the position from which it was seen
-    bool is_outward = false;      ///< the normals are known to point outwards, as those of sections do
+    std::vector<Vec3> normals;    ///< unit vectors; their sides may be wrong
+    std::vector<Vec3> to_sensor;  ///< unit vectors from the points to the positions from which they were seen
+    bool is_outward = false;      ///< the normals are known to point outwards, like those of a network's sections
 };
-/// The hints of `from` for the points `to`, which remain of them or were made from them: each gets those of the
-/// nearest.
+/// Transfers the hints of the points `from` to the points `to`, which are a subset of `from` or were made from them:
+/// each point gets the hints of the nearest point of `from`.
 [[nodiscard]] COVOL_API PointHints carried(const PointHints& hints, const std::vector<Vec3>& from,
                                            const std::vector<Vec3>& to);
 
-/// What was done with the hints, which are checked and not trusted.
+/// How the hints were used; they are checked first.
 struct HintsReport {
     std::size_t normals = 0, sensors = 0;  ///< number of points that have them
-    bool used = false;                     ///< they determine the orientation
-    /// by the side from which each point was seen, because there are no normals or they are not used
+    bool used = false;                     ///< the hints determine the orientation
+    /// the orientation follows from the sides from which points were seen, because there are no usable normals
     bool from_sensor = false;
-    bool inward = false;  ///< all were flipped, because most pointed inwards
-    /// fraction of the given ones, after flipping, that agree with the indicator of the other half of them
+    bool inward = false;  ///< all given normals were flipped, because most pointed inwards
+    /// cross-validation: fraction of the given normals, after flipping, that agree with an indicator computed from the
+    /// other half of them
     double predicted = 0;
-    double agree = 0;     ///< the same with the indicator of the result: measures their errors
-    std::string why_not;  ///< why they are not used; empty if they are
+    double agree = 0;     ///< fraction of the given normals that agree with the resulting indicator
+    std::string why_not;  ///< why the hints are not used; empty if they are used
 };
 
 /// A cloud that is ready for surface_from_cloud().
 struct CloudOrientation {
-    std::vector<Vec3> points;  ///< those that lie on a surface
+    std::vector<Vec3> points;  ///< the points that lie on the surface
     Orientation orientation;   ///< of these points
     CloudScale scale;
-    std::size_t stray = 0;     ///< points far from all others that lie on no sheet, removed
-    std::size_t enclosed = 0;  ///< points that the given normals place within the solid, removed
-    bool encloses = true;      ///< false: the normals point to where each point was seen from outside
+    std::size_t stray = 0;     ///< number of removed points that are far from all others and lie on no sheet
+    std::size_t enclosed = 0;  ///< number of removed points that lie inside the solid according to the given normals
+    bool encloses = true;      ///< false: the points enclose nothing, and each normal points to the side from which its
+                               ///< point can be seen
     bool has_quadrics = true;  ///< false: the surface is that of the screened indicator alone
-    bool fills = false;        ///< the points fill a solid: the indicator is their density, 1/2 at its border
+    /// the points fill a solid: the indicator is their density, which is 1/2 at the solid's border
+    bool fills = false;
     HintsReport hints;
 };
-/// measure_cloud_scale(), removal of stray points, and orient(). If normals keep flipping there, the points hardly
-/// enclose anything, as in scans of a few sides: each normal then points to where its point can be seen from. Points
-/// that fill a solid are recognised by their neighbourhoods, none of which is a sheet; the indicator is then their
-/// density.
+/// Calls measure_cloud_scale(), removes stray points, and calls orient(). If normals keep flipping in orient(), the
+/// points hardly enclose anything, as in scans of a few sides: then the sides of normals are propagated between
+/// neighbours or, if neighbours do not agree, each normal points to the side from which its point can be seen. If the
+/// points fill a solid, so that no neighbourhood is a sheet, the indicator is their density.
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
-/// The same, from normals and sensors if they are consistent: half of them has to predict the sides of the other half,
-/// and if the orientation without them converges, they must not contradict it in whole parts. A sensor gives each point
-/// the normal of its local plane on the side that was seen.
+/// The same, but uses normals and sensor directions if they are consistent: half of them has to predict the sides of
+/// the other half, and if the orientation without hints converges, the hints must not contradict it in whole regions.
+/// From a sensor direction, a point gets the normal of its local plane on the side that was seen.
 /// @throws Error also InvalidInput (a list of another size)
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,
                                                       const RunContext& run = {});

@@ -11,9 +11,9 @@
 
 namespace covol {
 
-/// How paint is interpreted.
+/// How painted voxels are interpreted.
 enum class PaintedAs {
-    Automatic,  ///< for each label from its paint, see understand_painted()
+    Automatic,  ///< chosen for each label from its paint, see understand_painted()
     Slices,     ///< slices that contain paint show the whole cross-section
     Scribbles   ///< painted voxels are inside, and nothing is known about the others
 };
@@ -22,7 +22,7 @@ inline constexpr auto kWords<PaintedAs> = std::array{"auto", "slices", "scribble
 
 struct PaintedOptions {
     PaintedAs as = PaintedAs::Automatic;
-    int outside_label = 0;  ///< a label painted on what belongs to no structure; 0: none (0 itself means unpainted)
+    int outside_label = 0;  ///< the label of paint outside of all structures; 0: none (0 itself means unpainted)
 };
 
 template <>
@@ -37,8 +37,8 @@ inline constexpr auto kOptions<PaintedOptions> =
 /// A label of a painted image.
 struct LabelName {
     int label = 0;       ///< > 0
-    std::string name;    ///< that of the file (3D Slicer's segments), else "label3"
-    bool named = false;  ///< the file has a name for it
+    std::string name;    ///< the name in the file (3D Slicer's segments), else for example "label3"
+    bool named = false;  ///< the file contains a name for the label
 };
 
 /// The labels in the image, ascending, with the names that a .seg.nrrd gives them.
@@ -58,8 +58,8 @@ struct PaintedLabel {
     int label = 0;
     std::string name;
     std::size_t voxels = 0;
-    std::vector<PaintedView> views;  ///< empty if it is painted in places only
-    std::vector<Vec3> inside;        ///< world positions of the outer voxels of paint that is not part of such a slice
+    std::vector<PaintedView> views;  ///< empty if all paint is scribbles
+    std::vector<Vec3> inside;        ///< world positions of the outer voxels of scribbles
     std::string summary;             ///< one line for the user
 };
 
@@ -69,32 +69,33 @@ struct Painted {
     std::vector<Vec3> outside;  ///< world positions of the outside label's outer voxels
 };
 
-/// Distinguishes painted slices from paint in places, for each label.
+/// Distinguishes, for each label, slices painted as a whole from scribbles.
 ///
 /// A slice counts as painted as a whole if it contains an area: a patch wider than 2 voxels that is not a stroke (a
 /// stroke is at most 4 voxels wide, and at least 6 times as long). Slices perpendicular to an axis are accepted if they
-/// lie apart, or in runs that are thin compared with the widest patch (a third of its width, in voxels and in length);
-/// a ball of paint satisfies neither. Several axes may have such slices. If none does, thick runs along one axis are
-/// accepted if the paint ends bluntly along it: if its sections, extrapolated like those of an ellipsoid, would
-/// continue into the next slice. All other paint is a scribble.
+/// are separate, or form runs of adjacent slices that are thin compared with the widest patch (a third of its width, in
+/// voxels and in length); a ball of paint satisfies neither. Several axes may have such slices. If no axis has, thick
+/// runs along one axis are accepted if the paint ends abruptly there: its sections, extrapolated like those of an
+/// ellipsoid, would continue into the next slice. All other paint is a scribble.
 ///
-/// Each patch's outline runs between the painted voxels and their neighbours, smoothed along itself without shrinking
-/// (a local quadratic over 8 voxels to either side, fewer on small patches), by at most half a voxel anywhere. At the
-/// image's end it is cut, half a voxel beyond the last centres.
+/// The outline of a patch runs between the painted voxels and their neighbours. It is smoothed without shrinking (a
+/// local quadratic over 8 voxels to each side, fewer on small patches), which moves it by at most half a voxel. At the
+/// image's end it is cut, half a voxel beyond the last voxel centres.
 /// @param names  from find_painted_labels()
-/// @throws Error InvalidInput (an outside label that does not exist: lists those that do).
+/// @throws Error InvalidInput (an outside label that does not exist: the message lists the existing ones).
 [[nodiscard]] COVOL_API Painted understand_painted(const Image& labels, const std::vector<LabelName>& names,
                                                    const PaintedOptions& options = {}, const RunContext& run = {});
 
-/// The outlines joined to a body, as by densify(); parts on the image's end are cut, not marked.
+/// Joins the outlines to a body, as densify() does. Parts of outlines at the image's end are places where the body is
+/// cut, and not marks on its surface.
 /// @param lattice  of the label image. @pre the label has a view
 [[nodiscard]] COVOL_API Contours connect_outlines(const PaintedLabel& label, const ImageGeometry& lattice, double step,
                                                   const RunContext& run = {});
 
-/// The label image with the geometry that it has beside `image`: its own, or that of `image` if its file states no
-/// spacing or `force` is set, and both have the same number of voxels.
-/// @throws Error InvalidInput if neither is possible, or painted voxels lie outside the image: the message contains
-///     their number and positions.
+/// The label image with the geometry that fits `image`: its own, or, if its file states no spacing or `force` is set,
+/// that of `image`, provided that both have the same number of voxels.
+/// @throws Error InvalidInput if neither geometry fits, or painted voxels lie outside the image: the message contains
+/// their number and positions.
 [[nodiscard]] COVOL_API Image placed_on(const Image& labels, const ImageGeometry& image, bool force = false);
 
 }  // namespace covol

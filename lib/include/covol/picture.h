@@ -7,13 +7,13 @@
 
 namespace covol {
 
-/// 8-bit RGB, rows from the top.
+/// A picture with 8-bit RGB values, the top row first.
 struct Picture {
     int width = 0, height = 0;
     std::vector<std::uint8_t> rgb;
 };
 
-/// Whole or not at all. @throws Error Io.
+/// Writes the file completely or not at all. @throws Error Io.
 COVOL_API void write_png(const std::string& path, const Picture& picture);
 
 }  // namespace covol

@@ -29,8 +29,8 @@
 
 namespace covol {
 
-/// A guess from the marks if there are few of them (see SegmentOptions::model); more marks are a cloud without an
-/// image, and are tagged with one.
+/// Up to 4,000 marks: a guess from the marks (see SegmentOptions::model). More marks are tagged if there is an image,
+/// and are treated as a cloud otherwise.
 struct AutoStart {};
 struct GuessStart {};  ///< the surface of minimum bending energy through the marks
 struct CloudStart {};  ///< surface_from_cloud(), for points without an image
@@ -50,27 +50,26 @@ struct MaskStart {
 };
 struct LevelSetStart {
     FloatGridPtr level_set;   ///< negative inside
-    bool is_settled = false;  ///< it is a result: marks and image correct it, and no flow follows
+    bool is_settled = false;  ///< the level set is a result: marks and image correct it, and no flow follows
 };
-/// How the level set starts: made from the marks, or given by the caller. covol/mesh_io.h, image_files.h and vdb_io.h
-/// read the files of individual starts, read_start() those of all.
+/// The start: made from the marks, or given by the caller. read_start() reads the files of given starts.
 using Start = std::variant<AutoStart, GuessStart, CloudStart, TagStart, SphereStart, BoxStart, MeshStart, MaskStart,
                            LevelSetStart>;
 template <typename... Kinds>
 [[nodiscard]] bool is_any(const Start& start) {
     return (std::holds_alternative<Kinds>(start) || ...);
 }
-/// Whether the caller gives a shape.
+/// Whether the start is a shape given by the caller.
 [[nodiscard]] inline bool is_named(const Start& start) {
     return !is_any<AutoStart, GuessStart, CloudStart, TagStart>(start);
 }
 
-/// What determines the surface where there are neither marks nor edges.
+/// The model that determines the surface at positions without marks and edges.
 enum class Model {
-    /// A guess: the surface of minimum bending energy through the marks, or the body between contours; the image moves
-    /// it where it shows the same border as at the marks.
+    /// A guess: the surface of minimum bending energy through the marks, or the body between contours; it is moved to
+    /// positions at which the image shows the same border as at the marks.
     Guided,
-    Paper  ///< curvature alone, Eq. (1) as printed
+    Paper  ///< curvature alone, Eq. (1) of the paper
 };
 template <>
 inline constexpr auto kWords<Model> = std::array{"guided", "paper"};
@@ -81,46 +80,47 @@ struct SegmentOptions {
     /// axis
     std::optional<double> mark_precision;
     std::optional<double> voxel_size;  ///< h, world units, > 0; automatic: choose_voxel_size()
-    /// `voxel_size` is a first choice, like an automatic one: it may be increased for points that enclose nothing.
+    /// `voxel_size` was chosen automatically and may be increased for clouds, as if it had no value.
     bool voxel_size_may_grow = false;
     std::optional<WorldBox> roi;  ///< the domain, instead of the image's box; rounded to whole voxels
     /// World position of the centre of voxel (0,0,0); automatic: see choose_domain().
     std::optional<Vec3> lattice_origin;
-    /// points alone, >= 0: from the points to the domain's boundary; automatic: D + 6 voxels
+    /// for points without an image: distance from the points to the domain's boundary, world units, >= 0; automatic: D
+    /// + 6 voxels
     std::optional<double> margin;
-    bool keep_failed = false;  ///< errors are thrown as SegmentFailed, at the cost of a copy of the start
+    bool keep_failed = false;  ///< errors are thrown as SegmentFailed, which requires memory for a copy of the start
     Start start;
-    /// Another tool's result (a mesh, mask or level set), which is corrected by the marks and seeds near them, without
-    /// a flow. `start` is then not used.
+    /// Another tool's result (a mesh, mask or level set), which is corrected in the neighbourhood of the marks and
+    /// seeds, without a flow. `start` is then not used.
     std::optional<Start> guess;
     CorrectionOptions correction;
-    /// Marks on slices, densified with step h: their points are added to the others, those between the slices as part
-    /// of the guess. With closed contours TagStart is the body that they enclose, unless other points lie far from it
-    /// or an exterior seed lies inside it: then all points are tagged, and each hole formed by inner contours is an
-    /// exterior seed.
+    /// Marks on slices, from densify() with step h. Their points are added to the other points. With closed contours
+    /// TagStart is the body that they enclose, unless other points are far from it or an exterior seed lies inside it:
+    /// then all points are tagged, and hole_seeds() are further exterior seeds.
     std::shared_ptr<const Contours> contours;
-    /// For a network of contours, whose lines are the marks: a guess that contradicts them is replaced by the surface
-    /// between them.
+    /// For a network of contours, whose lines are given as marks: a guess that contradicts the sections is replaced by
+    /// a surface that is interpolated between them.
     std::shared_ptr<const Sections> sections;
     PointHints hints;                    ///< for the points as they are given; used for clouds
     std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
-    std::size_t painted_seeds = 0;       ///< how many of them are voxels of paint; for messages
+    std::size_t painted_seeds = 0;       ///< number of these seeds that are voxels of paint; for messages
     std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
-    /// Automatic attraction range: 6 voxels; after tagging without an image unlimited (the band limits the points'
-    /// reach). `follow` is also chosen.
+    /// The automatic attraction range is 6 voxels; after tagging without an image it is unlimited, because the band
+    /// limits the effect of the points. `follow` is always chosen automatically.
     EvolveOptions evolve;
     ExtractOptions extract;
     HolesOptions holes;  ///< for points without an image
-    /// SegmentResult::mesh stays empty, and only level sets take memory: the surface is measured one layer of leaves at
-    /// a time, and the marks' distances are sampled. Holes are closed, no component is dropped, and the isovalue is 0.
+    /// SegmentResult::mesh stays empty, which saves memory: the surface is measured one layer of leaves at a time, and
+    /// the marks' distances are interpolated. Holes have to be closed, all components kept, and the isovalue 0.
     bool without_mesh = false;
     bool without_fields = false;  ///< SegmentResult::u, distance and edge are freed as soon as they are not needed
-    /// levels of voxel size 2h, 4h, ... that precede the flow, >= 0; automatic: 1 for a sphere or a box, else 0
+    /// number of coarser levels, of voxel size 2h, 4h, ..., on which the flow runs first, >= 0; automatic: 1 for a
+    /// sphere or a box, else 0
     std::optional<int> coarse_levels;
-    /// Whether points alone are tagged or belong to contours or another start, so that neither a guess nor a cloud is
-    /// made from them: choose_voxel_size().
+    /// Whether, without an image, neither a guess nor a cloud is made from the points, because they are tagged or
+    /// belong to contours or another start; the argument `tagged` of choose_voxel_size().
     [[nodiscard]] COVOL_API bool tags_points() const;
 };
 
@@ -186,55 +186,58 @@ struct SegmentReport {
     std::size_t densified = 0;    ///< points generated from contours
     GuessReport guess;            ///< if the start was a guess
     CloudReport cloud;            ///< if the start was a cloud
-    InferenceReport inference;    ///< of the guess and the image, before guidance
+    InferenceReport inference;    ///< report of infer(), which runs before guidance
     GuidanceReport guidance;      ///< effect of the image on a guess
     TagDistanceChoice tag;
     BandReport band;
     EdgeReport edge;
     EvolveReport solve;
-    MeshMeasures surface;  ///< of the mesh; if it is open, the volume is that of the level set
+    /// of the mesh; if holes were trimmed, the volume is that of the closed mesh before trimming
+    MeshMeasures surface;
     RelaxReport mesh;
     FitStatistics fit;
-    /// Marks farther from the surface than two voxels of the image: they are wrong, or a part of the structure is
-    /// missing.
+    /// Marks that are far from the surface: they are wrong, or a part of the structure is missing.
     struct MarksOff {
         std::size_t count = 0;
-        double beyond = 0;    ///< world units
-        double farthest = 0;  ///< world units
+        double beyond = 0;  ///< distance from which on marks count: twice the widest voxel, or 4 times a cloud's noise
+        double farthest = 0;  ///< maximum distance of all marks, world units
         Vec3 farthest_world{0, 0, 0};
         Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without an image, as farthest_world
     } marks_off;
-    /// Probability that the image varies more at a mark than five voxels beside it, along the surface's normal; 0.5 if
-    /// it shows nothing there. None without an image and marks.
+    /// Probability that the image varies more at a mark than at positions five voxels from a mark along the surface's
+    /// normal; 0.5 if the image shows no border at the marks. None without marks or without an image that is used.
     std::optional<double> image_support;
     /// The position at which the image's mean slope along the surface's normals at the marks is steepest.
     struct ImageBorder {
-        int voxels = 0;  ///< from the marks, outward; in voxels of the image, or steps of voxel_size if that is longer
-        double fraction = 1;  ///< slope at the marks, within a voxel, as a fraction of the slope there
-        double errors = 0;    ///< difference between the two in standard errors of the mean
+        int voxels = 0;  ///< distance from the marks, outward > 0, in voxels of the image, or in steps of voxel_size if
+                         ///< that is longer
+        double fraction = 1;  ///< slope at the marks, within a voxel, divided by the slope at that position
+        double errors = 0;    ///< difference between the two slopes in standard errors of the mean
     };
-    std::optional<ImageBorder> image_border;  ///< none under the same conditions as image_support
-    /// Fraction of a surface through marks alone that is farther from all of them than half the diagonal of their box.
+    std::optional<ImageBorder> image_border;  ///< none in the same cases as image_support
+    /// If the start is a guess: fraction of the surface that is farther from all marks than half the diagonal of their
+    /// box.
     std::optional<double> surface_beyond_marks;
-    std::vector<std::string> warnings;  ///< messages for the user about what needs attention
+    std::vector<std::string> warnings;  ///< warnings for the user
     SeedCheck seeds;
-    CorrectionReport correction;         ///< of SegmentOptions::guess
-    double fraction_without_points = 0;  ///< of the closed surface's area, farther than holes.distance from every point
-    HolesReport holes;                   ///< for points without an image; distance 0: not treated
-    SegmentOptions resolved;             ///< the options used: each automatic choice that was made has its value
-    std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
+    CorrectionReport correction;  ///< of SegmentOptions::guess
+    /// fraction of the closed surface's area that is farther than holes.distance from every point
+    double fraction_without_points = 0;
+    HolesReport holes;                             ///< for points without an image; distance 0: not treated
+    SegmentOptions resolved;                       ///< the options that were used, with the values of automatic choices
+    std::map<std::string, std::string> automatic;  ///< each automatic choice: its name, value and reason
 };
 
 struct SegmentResult {
     FloatGridPtr u, distance, edge, surface;
     TriangleMesh mesh;
-    std::vector<float> distance_to_points;              ///< at its vertices; for points without an image
+    std::vector<float> distance_to_points;              ///< at the mesh's vertices; for points without an image
     std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
 };
 
-/// An error of segment() or reconstruct() after the start was made, with SegmentOptions::keep_failed: the grids that
-/// existed then, null for the others.
+/// An error of segment() or reconstruct() after the start was made, with SegmentOptions::keep_failed. Contains the
+/// grids that existed at that time; the other pointers are null.
 class COVOL_API SegmentFailed : public Error {
 public:
     SegmentFailed(const Error& error, FloatGridPtr start_, FloatGridPtr u_, FloatGridPtr distance_, FloatGridPtr edge_)
@@ -247,11 +250,12 @@ public:
     FloatGridPtr u, distance, edge;  ///< their last state
 };
 
-/// h and how it was found: the image's smallest spacing, or, for points alone, the median distance to the nearest other
-/// point. More than 4,000 points that are noisy get a coarser h (measure_cloud_scale()); up to 4,000 get a finer one,
-/// by sqrt(n / 4000), because the surface between them is known. With `tagged` the surface is found neither by a guess
-/// nor as a cloud, but by tagging, contours or another start; up to 4,000 points then get a coarser h if they are noisy
-/// (choose_scan_voxel_size()), else a finer one by sqrt(n / 1000).
+/// The automatic voxel size h and its reason: the image's smallest spacing or, for points alone, the median distance to
+/// the nearest other point. For more than 4,000 points, h is larger if they are noisy (measure_cloud_scale()). For up
+/// to 4,000 points, h is smaller by the factor sqrt(n / 4000), because the guess is well defined between them. With
+/// `tagged`, the surface comes from tagging, contours or another start instead of a guess or a cloud; for up to 4,000
+/// points, h is then larger if they are noisy (choose_scan_voxel_size()), else smaller by sqrt(n / 1000) if that is
+/// below 1.
 /// @throws Error InvalidInput if there are fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
@@ -260,15 +264,16 @@ struct VoxelSizeChoice {
 [[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const Image& image);
 [[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged = false);
 
-/// The main function: image and points together.
+/// The main function: segments an image with points.
 /// @throws Error as the individual steps.
 [[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const std::vector<Vec3>& world_points,
                                               const SegmentOptions& options = {}, const RunContext& run = {});
-/// An image alone: the position of the surface is given by SegmentOptions::start, or by contours, seeds or a guess.
+/// Segments an image without points: SegmentOptions::start, contours, seeds or a guess give the position of the
+/// surface.
 /// @throws Error also InvalidInput (tagging without points).
 [[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const SegmentOptions& options = {},
                                               const RunContext& run = {});
-/// Points alone, without an image.
+/// Reconstructs a surface from points without an image.
 /// @throws Error as the individual steps; InvalidInput if there is no point, contour or start.
 [[nodiscard]] COVOL_API SegmentResult reconstruct(const std::vector<Vec3>& world_points,
                                                   const SegmentOptions& options = {}, const RunContext& run = {});

@@ -7,17 +7,18 @@
 
 namespace covol {
 
-/// A mark for the user to look at.
+/// A mark with a name, to be shown in another program.
 struct NamedMark {
     Vec3 index{0, 0, 0};  ///< voxels of the image, from 0
     std::string name;
 };
 
-/// Writes marks in the format of the program in which people mark, by the file extension; completely or not at all.
-/// - .csv: points of napari, z, y, x in voxels, with a column `name`
+/// Writes marks in the format of a marking program, by the file extension; the file is written completely or not at
+/// all.
+/// - .csv: points of napari: z, y, x in voxels, and a column `name`
 /// - .mrk.json: fiducials of 3D Slicer, in LPS
-/// - .roi: a multi-point of Fiji, each on the nearest slice, for stacks of one channel; it cannot store names
-/// @throws Error InvalidOptions (another extension), InvalidInput (for .roi: voxels before the image's first), Io.
+/// - .roi: a multi-point of Fiji, with each mark on the nearest slice, for stacks of one channel; names are not stored
+/// @throws Error InvalidOptions (another extension), InvalidInput (for .roi: negative voxel coordinates), Io.
 COVOL_API void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks,
                                    const ImageGeometry& geometry);
 /// @throws Error InvalidOptions (an extension that write_program_marks() does not know)

@@ -6,16 +6,16 @@
 
 namespace covol {
 
-/// A part of covol that is loaded, or started, when a file first requires it.
+/// A component of the readers that is loaded or started when a file first requires it.
 struct ReaderPart {
     std::string name;     ///< "itk"
-    std::string formats;  ///< that require it: "NRRD and MetaImage"
-    std::string path;     ///< of its file; empty if it is linked into the program
+    std::string formats;  ///< the formats that require it, for example "NRRD and MetaImage"
+    std::string path;     ///< path of its file; empty if it is linked into the program
     std::string problem;  ///< why it cannot be used; empty if it can
 };
 
-/// Loads each of them, and looks for the separate program that reads files. For `covol doctor`: readers load their
-/// parts by themselves.
+/// Loads each part, and searches for the separate program that reads files. Only `covol doctor` needs this; readers
+/// load their parts automatically.
 [[nodiscard]] COVOL_API std::vector<ReaderPart> check_reader_parts();
 
 }  // namespace covol

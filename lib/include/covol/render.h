@@ -19,15 +19,15 @@ struct RenderStructure {
     const FloatGrid* surface = nullptr;                ///< level set, world units; not null
     std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
     std::vector<Vec3> marks;                           ///< world units
-    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 if another structure lies in its box; 0.16 in a
-    /// volume view
+    /// opacity of the surface in the view of the surfaces, 0 to 1; automatic: 1; 0.35 if another structure lies in its
+    /// box; 0.16 in a volume view
     std::optional<double> opacity;
 };
 
 /// The content of pictures. The objects pointed to only have to outlive the call.
 struct RenderScene {
     std::vector<RenderStructure> structures;
-    std::vector<Vec3> marks;       ///< world units, that belong to no structure
+    std::vector<Vec3> marks;       ///< marks that belong to no structure, world units
     const Image* image = nullptr;  ///< null: no slices
     std::string unit;              ///< of lengths, "um" or "mm"; empty: unknown
     /// World axes are anatomical (LPS): slices are labelled with letters at their edges, and oriented as in radiology.
@@ -36,21 +36,21 @@ struct RenderScene {
 
 /// The parts of a picture.
 enum class FigureKind {
-    Composed,  ///< a large view of the surfaces, and slices of the image; other views if there is no image
+    Composed,  ///< a large view of the surfaces, and slices of the image; without an image, further views instead of
+               ///< slices
     Surface,   ///< only the view of the surfaces
     Slices     ///< only the slices
 };
 template <>
 inline constexpr auto kWords<FigureKind> = std::array{"composed", "surface", "slices"};
 
-/// The direction of a parallel view, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 along -z, down
-/// the world's third axis.
+/// The direction of a parallel view, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 looks along -z.
 struct ViewDirection {
     double azimuth = 0, elevation = 0;
 };
 
-/// "front", "back", "left", "right", "top", "bottom" and "iso", or "AZIMUTH,ELEVATION". If axes are anatomical, left is
-/// the patient's. @throws Error InvalidOptions.
+/// "front", "back", "left", "right", "top", "bottom" and "iso", or "AZIMUTH,ELEVATION". If the axes are anatomical,
+/// left is the patient's left. @throws Error InvalidOptions.
 [[nodiscard]] COVOL_API ViewDirection parse_view(const std::string& text, bool is_anatomical);
 
 struct RenderOptions {
@@ -58,15 +58,17 @@ struct RenderOptions {
     FigureKind figure = FigureKind::Composed;
     ViewDirection view{-32, 28};
     double zoom = 1;  ///< of the view of the surfaces, 0.05 to 100
-    /// the view has space for the surfaces turned about the vertical axis, so that frames match
+    /// the view is large enough for the surfaces at any angle about the vertical axis, so that the frames of a turn
+    /// have the same scale
     bool whole_turn = false;
-    /// 0 to 64 slices along `slice_axis` in place of three intersecting planes; those with marks come first.
+    /// number of slices along `slice_axis`, 0 to 64, with preference for slices with marks; none: three intersecting
+    /// planes.
     std::optional<int> slices;
-    /// of the image, 0 to 2; automatic: the axis perpendicular to marked slices, else 2
+    /// image axis perpendicular to the slices, 0 to 2; automatic: the axis perpendicular to marked slices, else 2
     std::optional<int> slice_axis;
-    std::optional<Vec3> at;        ///< world; intersection of the three planes; automatic: the structures' centre
-    bool volume = false;           ///< the image, volume rendered, behind the surfaces
-    bool white_background = true;  ///< else black
+    std::optional<Vec3> at;  ///< world position at which the three planes intersect; automatic: the structures' centre
+    bool volume = false;     ///< shows the image, volume rendered, behind the surfaces
+    bool white_background = true;  ///< false: black background
 };
 
 template <>
@@ -87,9 +89,9 @@ inline constexpr auto kOptions<RenderOptions> = std::tuple{
                             return Range{}.holds(o.view.azimuth) && between(-90, 90).holds(o.view.elevation);
                         }}};
 
-/// A figure: surfaces shaded by the gradient of smoothed level sets, with marks, axes and a scale bar; slices of the
-/// image in true proportions, with each structure's outline, the marks within half a slice, and a scale bar; a legend.
-/// The same input gives the same picture for any number of threads.
+/// Draws a figure with three parts: the surfaces, shaded by the gradient of smoothed level sets, with marks, axes and a
+/// scale bar; slices of the image in true proportions, with the structures' outlines, the marks within half a slice and
+/// a scale bar; and a legend. The same input gives the same picture for any number of threads.
 /// @throws Error InvalidOptions; InvalidInput (no structure, a grid without voxels at a surface or with voxels that are
 ///     not cubes, slices without an image); Cancelled; whatever reading the image throws.
 [[nodiscard]] COVOL_API Picture render(const RenderScene& scene, const RenderOptions& options = {},

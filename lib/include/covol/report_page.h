@@ -19,7 +19,7 @@ struct PageStructure {
     std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
     const TriangleMesh* mesh = nullptr;                ///< world units; not null
     std::vector<Vec3> marks;                           ///< world units
-    const Evidence* evidence = nullptr;                ///< of that mesh; null: not assessed
+    const Evidence* evidence = nullptr;                ///< evidence of that mesh; null: not assessed
 };
 
 /// The content of a report page. The objects pointed to only have to outlive the call.
@@ -31,17 +31,19 @@ struct ReportPage {
     std::string unit;              ///< of lengths; empty: unknown
     /// World axes are anatomical (LPS): the page labels the edges of its views with letters.
     bool is_anatomical = false;
-    /// For a time-lapse: the file names of all frames' pages, which lie in one folder, and the index of this one.
+    /// For a time-lapse: the file names of the pages of all frames, which are in one folder, and the index of this
+    /// page.
     std::vector<std::string> frames;
     std::size_t frame = 0;
 };
 
 struct ReportPageOptions {
-    /// for all structures together; larger meshes are simplified by vertex clustering, with vertices on the surface
+    /// maximum for all structures together; larger meshes are simplified by vertex clustering, with vertices on the
+    /// surface
     std::int64_t max_triangles = 400'000;
-    /// for the slices; larger images are cropped to the structures and their marks, and then subsampled
+    /// maximum for the slices; larger images are cropped to the structures and their marks, and then subsampled
     std::int64_t max_voxels = 16'000'000;
-    std::int64_t max_marks = 20'000;  ///< for each structure; of more marks, every n-th
+    std::int64_t max_marks = 20'000;  ///< maximum for each structure; of more marks, every n-th is shown
     int jpeg_quality = 80;            ///< 1 to 100
 };
 
@@ -62,8 +64,8 @@ struct ReportPageSummary {
 
 /// Writes a page for a web browser, a single file that makes no network requests: the surfaces in 3D with their marks,
 /// three planes of the image with outlines, a table of the structures, and the facts of the run; marks can be set and
-/// saved. The same input gives the same bytes. The file is written completely or not at all: to a temporary name beside
-/// the target, then renamed.
+/// saved. The same input gives the same bytes. The file is written completely or not at all: under a temporary name in
+/// the same folder, then renamed.
 /// @throws Error InvalidOptions; InvalidInput (no structure, an empty mesh, facts that are not a JSON object); Io;
 ///     Cancelled; whatever reading the image throws.
 COVOL_API ReportPageSummary write_report_page(const std::string& path, const ReportPage& page,

@@ -13,22 +13,24 @@ class Checkpoints;
 
 enum class LogLevel { Info, Warning };
 
-/// How a computation runs, as opposed to what it computes: nothing here changes a result.
+/// Settings of how a computation runs; none of them changes a result.
 struct RunContext {
-    /// Maximum number of threads, limited by the cores; 0: those of the caller's TBB arena, all cores.
+    /// Maximum number of threads, limited by the number of cores; 0: the threads of the caller's TBB arena, by default
+    /// one for each core.
     int threads = 0;
 
     /// Called from the calling thread with the name of a stage and its completed fraction in [0,1].
     std::function<void(const std::string& stage, double fraction)> progress;
 
-    /// Called with one line of text; automatic choices have level Info. Options are named as in messages of errors.
+    /// Called with one line of text; automatic choices have level Info. Options are named as in error messages
+    /// (option_names.h).
     std::function<void(LogLevel, const std::string& line)> log;
 
-    /// Set from anywhere (a signal handler, for example) to make the computation throw Errc::Cancelled or, if partial
-    /// results are useful, return early and report it.
+    /// Set this to true from any thread or a signal handler to cancel the computation: it throws Errc::Cancelled or, if
+    /// partial results are useful, returns early and reports that.
     const std::atomic<bool>* cancel = nullptr;
 
-    /// Where the states of long flows are saved; null: nowhere.
+    /// Saves the states of flows to disk; null: they are not saved.
     std::shared_ptr<Checkpoints> checkpoints;
 
     /// Maximum number of bytes that may be allocated; 0: unlimited. A computation that certainly needs more fails
@@ -45,8 +47,8 @@ struct RunContext {
     COVOL_API void check() const;
 };
 
-/// Runs `work` on at most run.threads threads (including every TBB loop inside it, OpenVDB's own too): in a separate
-/// TBB arena, or in the caller's if it has that many threads. Exceptions of `work` are passed on.
+/// Runs `work`, including all TBB loops in it and in OpenVDB, on at most run.threads threads: in a separate TBB arena,
+/// or in the caller's arena if it has that number of threads. Exceptions of `work` are passed on.
 COVOL_API void with_threads(const RunContext& run, const std::function<void()>& work);
 
 }  // namespace covol

@@ -11,20 +11,21 @@
 
 namespace covol {
 
-/// Positions inside or outside of a structure as given by a file: single points unchanged, lines (scribbles) with
-/// additional points between their marks, at most `step` apart; closed lines are closed. World units.
+/// The seeds of a cloud in world units: single points unchanged, lines (scribbles) with additional points, so that
+/// neighbouring ones are at most `step` apart, also between the last and the first mark of a closed line.
 [[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, const ImageGeometry& geometry,
                                                         double step);
-/// @throws Error InvalidInput if points need an image.
+/// The same without an image. @throws Error InvalidInput if the points need an image.
 [[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step);
 
 /// The result of checking seeds against a surface.
 struct SeedCheck {
     std::size_t inside = 0, outside = 0;              ///< seeds that were checked
-    std::size_t painted = 0;                          ///< number of those that are voxels of paint; for warning()
+    std::size_t painted = 0;                          ///< number of these seeds that are voxels of paint; for warning()
     std::size_t wrong_inside = 0, wrong_outside = 0;  ///< number of seeds on the wrong side
     Vec3 first{0, 0, 0};                              ///< the first seed on the wrong side, world units
-    double farthest = 0;  ///< their maximum distance from the surface, limited by the width of the level set
+    /// maximum distance of wrong seeds from the surface, limited by the half width of the level set
+    double farthest = 0;
 
     [[nodiscard]] std::size_t wrong() const { return wrong_inside + wrong_outside; }
     /// One line for the user; empty if no seed is wrong.
@@ -36,8 +37,8 @@ struct SeedCheck {
 [[nodiscard]] COVOL_API SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside,
                                               const std::vector<Vec3>& outside, double slack = 0);
 
-/// @throws Error InvalidInput if a position is given as inside and outside (closer than `same`); the message contains
-///     it.
+/// @throws Error InvalidInput if a position inside and a position outside are closer than `same`; the message contains
+/// the position.
 COVOL_API void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double same);
 
 }  // namespace covol

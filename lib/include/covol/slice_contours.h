@@ -10,21 +10,21 @@
 #include "covol/image.h"
 #include "covol/run.h"
 
-// The contours of surfaces in the slices of an image, which programs for radiotherapy draw and read.
+// Contours of surfaces in the slices of an image, for programs for radiotherapy.
 namespace covol {
 
 /// A closed curve in a slice; the last point is connected to the first.
 struct SliceContour {
-    int slice = 0;             ///< k of the lattice
+    int slice = 0;             ///< index k of the slice
     std::vector<Vec3> points;  ///< world units
 };
 
 /// The closed curves in which a surface intersects the slices of a lattice, by marching squares over trilinear samples
-/// of the level set that are at most one of its voxels apart. In ascending order of the slices.
+/// of the level set, at most one voxel of the level set apart. In ascending order of the slices.
 ///
-/// A part with holes is one curve: each hole is connected to the outline by a channel of zero width, which is traversed
-/// in both directions ("keyhole", DICOM PS3.3 C.8.8.6.3). Surfaces that extend beyond the image are cut at its end,
-/// half a voxel beyond the last centres.
+/// A section with holes is one curve: each hole is connected to the outline by a channel of zero width, which is
+/// traversed in both directions ("keyhole", DICOM PS3.3 C.8.8.6.3). Surfaces that extend beyond the image are cut at
+/// its end, half a voxel beyond the last centres.
 /// @param surface  a signed distance, negative inside
 /// @throws Error Cancelled.
 [[nodiscard]] COVOL_API std::vector<SliceContour> outline_slices(const FloatGrid& surface,

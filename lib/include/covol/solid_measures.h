@@ -8,18 +8,19 @@ namespace covol {
 
 /// Position and extent of a solid; world units.
 struct SolidMeasures {
-    Vec3 centroid{0, 0, 0};  ///< of the inside
-    WorldBox box;            ///< the smallest box along the world's axes that holds the surface
+    Vec3 centroid{0, 0, 0};  ///< centroid of the solid's volume
+    WorldBox box;            ///< the smallest box along the world's axes that contains the surface
 };
 
-/// A voxel contributes the fraction of it that is inside of a plane at its distance; the box ends where the distance is
-/// 0 between voxels. Both are therefore far more precise than a voxel. Bit-identical for any number of threads.
+/// Measures a solid. Each voxel is weighted by the fraction that is inside, with the surface in it approximated by a
+/// plane at the stored distance; the box ends at the interpolated zero crossings between voxels. Centroid and box are
+/// therefore much more precise than a voxel. Bit-identical for any number of threads.
 /// @param surface  a signed distance, negative inside, on cubic voxels along the world's axes
 /// @throws Error InvalidInput if nothing is inside, Cancelled.
 [[nodiscard]] COVOL_API SolidMeasures measure_solid(const FloatGrid& surface, const RunContext& run = {});
 
-/// How close a closed surface is to a sphere: the area of the sphere of this volume divided by its own; 1 for a sphere
-/// (Wadell 1935). 0 if there is no area.
+/// The sphericity of a closed surface (Wadell 1935): the area of the sphere with the same volume divided by the
+/// surface's area; 1 for a sphere, 0 if the area is 0.
 [[nodiscard]] COVOL_API double sphericity(double volume, double area);
 
 }  // namespace covol

@@ -20,21 +20,21 @@ namespace covol {
 /// Voxels of the mask above 0 are inside.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_mask(const Domain& domain, const Image& mask,
                                                      const RunContext& run = {});
-/// The body between closed contours.
+/// The body between closed contours; see ContourSolid.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid,
                                                          const RunContext& run = {});
-/// Fills values at from + n * step, n < count (world units): negative inside.
+/// Computes a function, negative inside, at the world positions from + n * step, 0 <= n < count.
 using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
 /// The parts of a function's zero level set that pass near the seeds; the function's scale does not matter.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds,
                                                       const LevelRow& level, const RunContext& run = {});
-/// A surface from seeds alone: halfway between the nearest seeds inside and outside, but no farther from the seeds
-/// inside than half the usual distance between the two kinds (the median over the seeds outside of the distance to the
-/// nearest one inside), and far enough to join them. Without seeds outside the distance is kHalfWidthVoxels.
+/// A surface from seeds alone: halfway between the nearest seeds inside and outside, but within a maximum distance of
+/// the seeds inside. That distance is half the median distance from a seed outside to the nearest seed inside, or
+/// kHalfWidthVoxels voxels without seeds outside, and is increased if it is too small to join the seeds inside.
 /// @throws Error also if there is no seed inside, or none in the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
                                                       const std::vector<Vec3>& outside, const RunContext& run = {});
-/// Any grid like a level set (negative inside), resampled onto the domain.
+/// The zero level set of any grid that is negative inside, resampled onto the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set,
                                                      const RunContext& run = {});
 

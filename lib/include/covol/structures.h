@@ -23,7 +23,8 @@ struct Structure {
 };
 
 struct SeparateOptions {
-    std::optional<double> gap;  ///< gaps narrower than this are closed, world units; 0: none; automatic: 1 voxel
+    /// gaps narrower than this are closed, world units; 0: no gap is closed; automatic: 1 voxel
+    std::optional<double> gap;
     /// in (0.5,1]: a solid is carved out of a larger one that contains at least this fraction of it
     double nested_fraction = 0.9;
 };
@@ -36,13 +37,13 @@ inline constexpr auto kOptions<SeparateOptions> =
 /// Two structures that overlapped.
 struct StructureOverlap {
     std::size_t a = 0, b = 0;          ///< a < b
-    double volume = 0;                 ///< claimed by both, world units^3
+    double volume = 0;                 ///< volume that belongs to both, world units^3
     std::optional<std::size_t> inner;  ///< the structure that was carved out of the other
 };
 
 struct SeparateReport {
     std::vector<StructureOverlap> overlaps;
-    std::vector<bool> changed;  ///< for each structure
+    std::vector<bool> changed;  ///< for each structure: whether its surface was changed
 };
 
 struct SeparateResult {
@@ -50,32 +51,34 @@ struct SeparateResult {
     SeparateReport report;
 };
 
-/// Makes solids disjoint, and closes gaps between them that are narrower than a voxel.
+/// Makes solids disjoint, and closes gaps between them that are narrower than SeparateOptions::gap.
 ///
-/// With φ_i the signed distances and m = min over j≠i of φ_j, a voxel where φ_i + m is below 0 (an overlap), or below
-/// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
-/// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. If overlaps are deep, the distances are computed to that depth. A
-/// solid inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
-/// extract_surface(). The result does not depend on the structures' order or on the number of threads.
+/// With φ_i the signed distances and m = min over j≠i of φ_j, a voxel where φ_i + m is below 0 (an overlap), or is
+/// below the gap width while the voxel lies between the two surfaces (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new
+/// interface is the middle surface φ_i = φ_j, near which φ_i' = −φ_j'. For deep overlaps, the distances are computed to
+/// the necessary depth. A solid inside another one is carved out of it instead: φ' = max(φ_outer, −φ_inner). Changed
+/// surfaces are redistanced by extract_surface(). The result does not depend on the structures' order or on the number
+/// of threads.
 ///
-/// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are
-///     the same solid; one of which nothing remains).
+/// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two identical
+/// solids; a solid of which nothing remains).
 [[nodiscard]] COVOL_API SeparateResult separate(const std::vector<Structure>& structures,
                                                 const SeparateOptions& options = {}, const RunContext& run = {});
 
-/// Label image in the given geometry (i fastest): n + 1 where the voxel's centre lies in structures[n], else 0.
-/// A centre that lies in two solids due to rounding, or in none where two touch, belongs to the nearer one (if they are
-/// equally near, to the one whose name comes first).
+/// Label image in the given geometry (i fastest): n + 1 in voxels whose centre lies in structures[n], else 0.
+/// A centre that lies in two solids due to rounding, or in none between two that touch, belongs to the nearer solid (at
+/// equal distances, to the one whose name comes first).
 /// @throws Error InvalidInput (more than 254 structures).
 [[nodiscard]] COVOL_API std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures,
                                                                    const ImageGeometry& geometry,
                                                                    const RunContext& run = {});
 
-/// The same image, to be written box by box (covol/image_stream.h), so that it is never held in memory as a whole.
+/// The same label image for writing box by box (covol/image_stream.h), so that it is never completely in memory.
 class COVOL_API LabelImage : public PixelSource {
 public:
-    /// @param values  of the structures, instead of 1, 2, ...; int32 if one is below 0 or above 255, else bytes
-    /// @param named  store names and colours if the format supports them
+    /// @param values  label values of the structures, instead of 1, 2, ...; the type is int32 if one is below 0 or
+    /// above 255, else uint8
+    /// @param named  whether names and colours are stored if the format supports them
     /// @throws Error InvalidInput (more than 254 structures).
     LabelImage(std::vector<Structure> structures, const ImageGeometry& geometry, std::vector<int> values = {},
                bool named = true);
@@ -96,8 +99,8 @@ private:
     std::unique_ptr<State> state_;
 };
 
-/// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. A single structure is called "surface", as everywhere in
-/// covol.
+/// Unique names of grids, of the form [A-Za-z_][A-Za-z0-9_]*, for the structures. The grid of a single structure is
+/// called "surface".
 [[nodiscard]] COVOL_API std::vector<std::string> make_grid_names(const std::vector<std::string>& names);
 
 /// A colour for structure n, red, green and blue in [0,255]; the first twelve are clearly distinct.
@@ -105,12 +108,12 @@ private:
 
 /// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
 /// 1, 2, ... and extents.
-/// @param extents  the box of each structure's voxels; 0 to -1 if it has none
-/// @param values  label values of the file, instead of 1, 2, ...; empty: 1, 2, ...
+/// @param extents  the box of each structure's voxels; from 0 to -1 if it has no voxels
+/// @param values  label values in the file; empty: 1, 2, ...
 [[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(
     const std::vector<std::string>& names, const std::vector<VoxelBox>& extents, const std::vector<int>& values = {});
 
-/// ITK-SNAP's label description file for labels 1, 2, ..., or those of `values`
+/// The content of a label description file of ITK-SNAP, for the labels 1, 2, ... or those in `values`.
 [[nodiscard]] COVOL_API std::string make_itksnap_labels(const std::vector<std::string>& names,
                                                         const std::vector<int>& values = {});
 

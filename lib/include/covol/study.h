@@ -19,7 +19,7 @@
 #include "covol/options_table.h"
 #include "covol/pipeline.h"
 
-// Marks set by a person on one image: structures with their marks, and a journal of all actions on them.
+// Marks set by a person on one image: structures with their marks, and the journal of all actions that changed them.
 namespace covol {
 
 /// Numbers of structures, marks and outlines begin at 1 and are never reused, not even after an undo.
@@ -35,17 +35,17 @@ struct StudyMark {
 /// A line on a slice of the image.
 struct StudyOutline {
     StudyId id = 0;
-    int axis = 2;        ///< image axis perpendicular to the slice: 0, 1, 2 for i, j, k
-    double at = 0;       ///< the slice: voxels along that axis
-    bool closed = true;  ///< it encloses the structure; an open one lies on its surface
-    std::vector<Vec3> world;
+    int axis = 2;             ///< image axis perpendicular to the slice: 0, 1, 2 for i, j, k
+    double at = 0;            ///< position of the slice along that axis, in voxels
+    bool closed = true;       ///< true: the line encloses the structure; false: it lies on the structure's surface
+    std::vector<Vec3> world;  ///< marks of the line
     bool operator==(const StudyOutline&) const = default;
 };
 
-/// Another program's result, which a structure's marks correct.
+/// Another program's result, which the marks of a structure correct.
 struct StudyGuess {
     std::string path;    ///< a mask, label image, mesh or level set; if relative, from the study's folder
-    std::string digest;  ///< digest_of() the file
+    std::string digest;  ///< digest_of() of the file
     int label = 0;       ///< of a mask; 0: its only label
     bool operator==(const StudyGuess&) const = default;
 };
@@ -54,10 +54,11 @@ struct StudyGuess {
 struct StudyStroke {
     StudyId id = 0;
     bool erases = false;
-    double radius = 1;        ///< world units, > 0
-    std::optional<int> axis;  ///< perpendicular to the slice `at`, for a disc on it; none: a ball
-    int at = 0;               ///< voxels along that axis
-    std::vector<Vec3> world;  ///< vertices of the line; a single one is a dab
+    double radius = 1;  ///< world units, > 0
+    /// image axis perpendicular to the slice `at`, on which the brush is a disc; none: the brush is a ball
+    std::optional<int> axis;
+    int at = 0;               ///< index of the slice along that axis
+    std::vector<Vec3> world;  ///< vertices of the line; may be a single one
     bool operator==(const StudyStroke&) const = default;
 };
 
@@ -73,18 +74,18 @@ struct StudyStructure {
     std::optional<StudyGuess> guess;
     bool operator==(const StudyStructure&) const = default;
 
-    /// Whether a surface can be made from it.
+    /// Whether the structure has marks, outlines, strokes or a guess, from which a surface can be made.
     [[nodiscard]] bool has_evidence() const {
         return !marks.empty() || !outlines.empty() || !strokes.empty() || guess.has_value();
     }
-    /// Whether the surfaces of both are made from the same input.
+    /// Whether both structures have the same input for their surfaces.
     [[nodiscard]] bool has_same_evidence(const StudyStructure& other) const {
         return marks == other.marks && outlines == other.outlines && strokes == other.strokes && guess == other.guess;
     }
 };
 
-/// Options for the segmentation of all structures of a study, instead of the automatic choices of SegmentOptions; flags
-/// of the program override them.
+/// Options for the segmentation of all structures of a study, which replace the automatic choices of SegmentOptions;
+/// flags of the program override them.
 struct StudyOptions {
     std::optional<double> voxel_size;      ///< world units, > 0
     std::optional<double> rho;             ///< EvolveOptions::rho, in [0,1]
@@ -95,7 +96,7 @@ struct StudyOptions {
     [[nodiscard]] COVOL_API SegmentOptions applied_to(SegmentOptions options) const;
 };
 
-/// Structures in their order. They are shared between states, and immutable.
+/// The structures of a study in their order. They are immutable and shared between states.
 using StudyState = std::vector<std::shared_ptr<const StudyStructure>>;
 
 /// The actions of a person. `structure` identifies the structure concerned; colours are chosen automatically if none is
@@ -136,7 +137,7 @@ struct StudyActions {
     struct AddMarks {
         StudyId structure = 0;
         MarkKind kind = MarkKind::Surface;
-        std::vector<Vec3> world;  ///< of that kind
+        std::vector<Vec3> world;  ///< marks of that kind
         std::vector<Vec3> inside = {}, outside = {};
         std::vector<StudyOutline> outlines = {};  ///< their ids are not used
     };
@@ -171,9 +172,9 @@ struct StudyActions {
     struct RemoveGuess {
         StudyId structure = 0;
     };
-    /// A structure for each label of another program's label image, with that label as its guess.
+    /// Adds a structure for each label of another program's label image, with that label as its guess.
     struct AddLabels {
-        std::string path, digest;  ///< as of StudyGuess
+        std::string path, digest;  ///< as for StudyGuess
         struct Label {
             int label = 0;
             std::string name;
@@ -195,18 +196,18 @@ using StudyAction =
                  StudyActions::ClearPaint, StudyActions::SetGuess, StudyActions::RemoveGuess, StudyActions::AddLabels,
                  StudyActions::SetOptions, StudyActions::Undo, StudyActions::Redo>;
 
-/// Whether the action contains the name of a file, which actions from a page must not.
+/// Whether the action contains the name of a file; such actions are not accepted from a page.
 [[nodiscard]] COVOL_API bool names_file(const StudyAction& action);
 
-/// An action with a key made by its sender: an action that arrives twice is applied once.
+/// An action with a key chosen by its sender; of several actions with the same key, only the first is applied.
 struct KeyedAction {
     std::string key;  ///< at most 100 printable ASCII characters; empty: no key
     StudyAction action;
 };
 
-/// {"key":"...","do":"add_mark","structure":1,"kind":"surface","world":[x,y,z]}: docs/study.md describes all of them.
+/// {"key":"...","do":"add_mark","structure":1,"kind":"surface","world":[x,y,z]}: docs/study.md describes all actions.
 /// The text may come from an untrusted source.
-/// @throws Error InvalidInput: the text is not such an action.
+/// @throws Error InvalidInput: the text is not a valid action.
 [[nodiscard]] COVOL_API KeyedAction parse_study_action(std::string_view json);
 /// @throws Error InvalidInput: an invalid key, or a text that is not UTF-8
 [[nodiscard]] COVOL_API std::string to_json(const KeyedAction& action);
@@ -226,26 +227,27 @@ public:
 
     /// The effect of an action.
     struct Changed {
-        std::vector<StudyId> structures;  ///< that changed, were added or removed; none: an undo of nothing
+        std::vector<StudyId> structures;  ///< structures that were changed, added or removed; empty for an undo without
+                                          ///< an action to undo
         StudyId made = 0;                 ///< id of the first new structure, mark or similar; 0: none
         bool options = false;             ///< whether the options changed
     };
-    /// The same actions in the same order give the same state, including ids.
+    /// Applies an action. The same actions in the same order give the same state, including ids.
     /// @throws Error InvalidInput: the action is impossible (no such structure, a name that is in use, a position
     ///     outside of the image, a locked structure), and nothing changed.
     Changed apply(const StudyAction& action) { return carry_out(plan(action)); }
 
-    /// The change of one structure, where `before` or `after` may be null; or of the options.
+    /// A change of one structure (`before` is null if it is added, `after` if it is removed) or of the options.
     struct Change {
         std::shared_ptr<const StudyStructure> before, after;
-        std::size_t place = 0;                                    ///< index in the order of the structures
+        std::size_t place = 0;  ///< index of the structure in the order of the structures
         std::optional<std::array<StudyOptions, 2>> options = {};  ///< before and after
     };
-    /// A validated action. What has to be on the disk first is written between plan() and carry_out().
+    /// A validated action. Between plan() and carry_out() the action is written to the disk.
     struct Step {
         enum class Kind { Do, Undo, Redo } kind = Kind::Do;
         std::vector<Change> changes;  ///< for Do
-        StudyId last_id = 0;          ///< after it
+        StudyId last_id = 0;          ///< the last id in use after the step
     };
     /// @throws Error as apply().
     [[nodiscard]] Step plan(const StudyAction& action) const;
@@ -264,7 +266,7 @@ private:
     StudyId last_id_ = 0;
 };
 
-/// The image that a study belongs to, from its journal.
+/// The image to which a study belongs, as recorded in its journal.
 struct StudyImage {
     std::string path;  ///< if relative, from the study's folder
     ImageGeometry geometry;
@@ -274,12 +276,13 @@ struct StudyImage {
 /// Only one program at a time can open it.
 ///
 /// The journal (docs/study.md) is JSON lines: the first one describes the image, the others are actions in their order.
-/// An incomplete last line, due to a full disk or a power failure, is an action that was not confirmed: it is dropped.
+/// An incomplete last line, due to a full disk or a power failure, is an action that was not confirmed; it is
+/// discarded.
 class COVOL_API Study {
 public:
     /// Opens a study, or creates one.
-    /// @param image  its geometry has to equal that of the journal
-    /// @throws Error Io (cannot be written; open elsewhere), InvalidInput (a damaged journal, another image).
+    /// @param image  the study's image, whose geometry has to equal the geometry in the journal
+    /// @throws Error Io (cannot be written; open in another program), InvalidInput (a damaged journal, another image).
     Study(std::string folder, const std::string& image_path, const ImageGeometry& image);
     ~Study();
     Study(Study&&) noexcept;
@@ -290,15 +293,16 @@ public:
     [[nodiscard]] const StudyState& state() const noexcept { return history_.state(); }
     /// Number of actions in the journal.
     [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_; }
-    /// Message about an incomplete line that was dropped; empty: the journal was complete.
+    /// Message about an incomplete line that was discarded; empty: the journal was complete.
     [[nodiscard]] const std::string& repaired() const noexcept { return repaired_; }
 
     struct Applied {
         StudyHistory::Changed changed;
-        bool is_new = true;  ///< false: an action with this key was applied before; `made` is the id that it made then
+        /// false: an action with this key was applied before; Changed::made is the id that it made
+        bool is_new = true;
     };
-    /// The action is on the disk when this returns. @throws Error InvalidInput (as StudyHistory::apply()), Io: nothing
-    /// changed.
+    /// Applies an action, which is on the disk when this function returns. @throws Error InvalidInput (as
+    /// StudyHistory::apply()), Io; in both cases nothing changes.
     Applied apply(const KeyedAction& action);
 
 private:
@@ -307,28 +311,29 @@ private:
     std::string folder_;
     StudyHistory history_;
     std::unique_ptr<Journal> journal_;
-    std::unordered_map<std::string, StudyId> made_;  // by the key of each action
+    std::unordered_map<std::string, StudyId> made_;  // ids of new objects by the keys of actions
     std::uint64_t sequence_ = 0;
     std::string repaired_;
 };
 
-/// The image of a study that is opened for reading only, by a program without a page. @throws Error Io, InvalidInput.
+/// Reads the image of a study from its journal, without opening the study for changes. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyImage read_study_image(const std::string& folder);
-/// Its current structures; another program may have it open. @throws Error Io, InvalidInput.
+/// Reads the current structures of a study, which another program may have open. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyState read_study(const std::string& folder);
 
-/// The options with which all of its structures are segmented. @throws Error Io, InvalidInput.
+/// Reads the options of a study. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyOptions read_study_options(const std::string& folder);
 
 /// What is needed to convert a study's structures to marks.
 struct StudySite {
     ImageGeometry image;
-    /// Reads a guess and checks its digest (StudyFiles); none: structures with a guess are an error.
+    /// Reads a guess and checks its digest (open_study_site()); empty: structures with a guess are an error.
     std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess;
 };
-/// The input of segment_structures() for a structure.
+/// Converts a structure to the input of segment_structures().
 [[nodiscard]] COVOL_API Marks marks_of(const StudyStructure& structure, const StudySite& site);
-/// For all structures with evidence, in their order; guesses from label images keep their labels.
+/// Converts all structures with has_evidence(), in their order; structures with guesses from label images keep their
+/// label values.
 [[nodiscard]] COVOL_API std::vector<Marks> marks_of(const StudyState& state, const StudySite& site);
 
 /// The paint of a structure as a label image of its bounding box, 1 where it is painted; none if nothing is painted.

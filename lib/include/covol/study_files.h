@@ -10,11 +10,12 @@
 // Results of other programs that a study's structures start from.
 namespace covol {
 
-/// How a study in that folder refers to a file: by its path relative to the folder, and its digest. @throws Error Io.
+/// Makes the reference of a study in `folder` to a file: its path relative to the folder, and its digest. @throws Error
+/// Io.
 [[nodiscard]] COVOL_API StudyGuess guess_of_file(const std::string& folder, const std::string& file, int label = 0);
 
-/// Reads guesses as read_guess() does. The most recent ones are kept in memory, so that a structure whose marks change
-/// does not need to read its guess again.
+/// A site whose read_guess reads guesses as read_guess() does. The most recent guesses are kept in memory, so that they
+/// are not read again when the marks of a structure change.
 /// @throws Error (by read_guess) InvalidInput: the file has changed since the study was created; as read_guess().
 [[nodiscard]] COVOL_API StudySite open_study_site(const std::string& folder, const ImageGeometry& image);
 

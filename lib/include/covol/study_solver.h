@@ -10,20 +10,20 @@
 
 namespace covol {
 
-/// What is known about a structure's surface.
+/// The state of the computation of a structure's surface.
 struct StudyResult {
     enum class Stage {
         Empty,    ///< there is no surface yet: `message` states what is missing
         Working,  ///< the next surface is being computed, see `progress`
-        /// The last surface, moved to the marks; without one, the surface through the marks alone; for a large
-        /// structure in voxels of twice the size.
+        /// A preliminary surface, computed without the image: the previous surface, corrected by the marks, or, if
+        /// there is none, the surface through the marks. Large structures are computed with twice the voxel size.
         First,
-        Refined,  ///< as from `covol segment`
-        Failed    ///< `message` states why; the last surface remains
+        Refined,  ///< the final surface, as from `covol segment`
+        Failed    ///< `message` states why; the previous surface remains valid
     };
     StudyId structure = 0;
     Stage stage = Stage::Empty;
-    std::uint64_t version = 0;   ///< of the surface, increasing; 0: there is none
+    std::uint64_t version = 0;   ///< number of the surface, increasing; 0: there is no surface
     std::uint64_t sequence = 0;  ///< number that the caller gave with the marks
     double progress = 0;         ///< in [0,1]
     std::string message;
@@ -32,14 +32,14 @@ struct StudyResult {
 };
 
 /// Computes the surfaces of structures whose marks change, one at a time, on a separate thread: the structure that
-/// changed last comes first, and computations that its change made obsolete are cancelled. The thread has a lower
-/// priority than those of the caller.
+/// changed last comes first, and a running computation is cancelled and repeated later if it is still needed. The
+/// thread has a lower priority than those of the caller.
 ///
 /// Each structure is solved independently, as segment_structures() solves a single one; overlaps between structures are
 /// resolved by the caller that requests all of them together.
 class StudySolver {
 public:
-    /// @param image  returns the image from which a surface is made; called on the solver's thread
+    /// @param image  returns the image; called in the constructor and on the solver's thread
     /// @param read_guess  as for StudySite; none: structures with a guess fail
     /// @param on_result  called on the solver's thread, one result at a time; it must not call the solver
     COVOL_API StudySolver(std::function<Image()> image, SegmentOptions options,
@@ -50,19 +50,19 @@ public:
     StudySolver(const StudySolver&) = delete;
     StudySolver& operator=(const StudySolver&) = delete;
 
-    /// Takes effect with the next solve(). The running computation is not affected: all structures have to be solved
-    /// again.
+    /// Sets the options of computations that begin afterwards. Surfaces that were computed before are not updated;
+    /// solve() has to be called again for their structures.
     COVOL_API void set_options(SegmentOptions options);
-    /// To be called when the structure's marks have changed.
+    /// Computes the surface of a structure; to be called when its marks have changed.
     COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
-    /// The same for a structure whose surface is known: it is solved when nothing else is left to do, and without the
+    /// Computes the surface of a structure whose marks have not changed: after all waiting structures, and without the
     /// stage First.
     COVOL_API void confirm(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
-    /// To be called when the structure was removed.
+    /// Discards a structure and its surface; to be called when the structure was removed.
     COVOL_API void forget(StudyId structure);
     /// The newest surface; null if there is none.
     [[nodiscard]] COVOL_API std::shared_ptr<const SegmentResult> surface(StudyId structure) const;
-    /// Waits until nothing is left to do.
+    /// Waits until all computations are finished.
     COVOL_API void wait() const;
 
 private:

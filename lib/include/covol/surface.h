@@ -10,15 +10,15 @@
 
 namespace covol {
 
-/// The zero level set of u as a true signed distance: class GRID_LEVEL_SET, half width 3 voxels, name "surface".
-/// Where the solid reaches the domain's boundary it is closed there. @throws Error InvalidInput (no zero crossing).
+/// The signed distance to the zero level set of u: class GRID_LEVEL_SET, half width 3 voxels, name "surface". A solid
+/// that reaches the domain's boundary is closed there. @throws Error InvalidInput (no zero crossing).
 [[nodiscard]] COVOL_API FloatGridPtr extract_surface(const FloatGrid& u, const RunContext& run = {});
 
-/// Fog volume in [0,1] of a level set: class GRID_FOG_VOLUME, name "density".
+/// Converts a level set to a fog volume with values in [0,1]: class GRID_FOG_VOLUME, name "density".
 [[nodiscard]] COVOL_API FloatGridPtr to_fog_volume(const FloatGrid& surface);
 
 struct ExtractOptions {
-    double isovalue = 0.0;              ///< world units
+    double isovalue = 0.0;              ///< level at which the mesh is extracted, world units
     double min_component_volume = 0.0;  ///< world units^3; smaller components are dropped; 0 keeps all
 };
 
@@ -29,26 +29,26 @@ inline constexpr auto kOptions<ExtractOptions> =
                Option{"min_component", &ExtractOptions::min_component_volume, kVolume, Group::MeshFiles,
                       "drop pieces of the mesh that are smaller than a cube of this edge length"}};
 
-/// Closed, manifold, outward triangles of the zero level set, in world units.
+/// The closed, manifold mesh of a level set at ExtractOptions::isovalue, oriented outward, in world units.
 [[nodiscard]] COVOL_API TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},
                                                   const RunContext& run = {});
 
-/// Label image in the given geometry (i fastest): `label` where the voxel's centre is inside, else 0.
+/// Label image in the given geometry (i fastest): `label` in voxels whose centre is inside, else 0.
 [[nodiscard]] COVOL_API std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry,
                                                             std::uint8_t label = 1, const RunContext& run = {});
 
-/// Distances from points to the zero level set (world units), exact to the extracted triangles.
+/// Distances from points to the surface, world units; they are exact distances to the mesh's triangles.
 struct FitStatistics {
     double mean = 0, p95 = 0, max = 0;
-    /// only from segment(): mean of the signed distances; > 0 if the points lie outside, so that the surface is too
-    /// small
+    /// only from segment(): mean of the signed distances; > 0 if the points lie outside on average, that is, if the
+    /// surface is too small
     double bias = 0;
 };
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
                                                   const RunContext& run = {});
 
-/// The same without the mesh: distances are interpolated within the level set's half width, and at most 0.12 voxels too
-/// large beyond it. @throws Error InvalidInput (no point)
+/// The same without a mesh: within the level set's half width distances are interpolated, beyond it they are at most
+/// 0.12 voxels too large. @throws Error InvalidInput (no point)
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface,
                                                   const RunContext& run = {});
 

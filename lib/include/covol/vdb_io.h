@@ -10,8 +10,8 @@
 
 namespace covol {
 
-/// Compression of the values of a .vdb file. Blosc is the fastest, and the default of OpenVDB's own programs; a reader
-/// that was built without it fails on such a file, or crashes. Zip only affects grids that are neither level sets nor
+/// Compression of the values of a .vdb file. Blosc is the fastest, and the default of OpenVDB's own programs; programs
+/// that were built without Blosc fail on such a file, or crash. Zip only affects grids that are neither level sets nor
 /// fog volumes, because OpenVDB leaves those uncompressed.
 enum class VdbCompression { None, Zip, Blosc };
 template <>
@@ -35,23 +35,25 @@ inline constexpr auto kOptions<WriteVdbOptions> =
 COVOL_API void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids,
                          const WriteVdbOptions& options = {});
 
-/// NanoVDB, for viewers and GPUs: the same grids, values as floats, uncompressed and without metadata; only the name,
-/// class, transform and values of a grid are kept. covol does not read such files. The file is written completely or
-/// not at all. @throws Error as write_vdb; Unsupported (covol was built without NanoVDB's headers).
+/// Writes grids as NanoVDB, for viewers and GPUs: values are uncompressed floats, and only the name, class, transform
+/// and values of a grid are stored. covol does not read such files. The file is written completely or not at all.
+/// @throws Error as write_vdb; Unsupported (covol was built without NanoVDB's headers).
 COVOL_API void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids);
 
 /// A grid as the user gives it, "FILE.vdb:name".
 struct VdbGridName {
-    std::string path, grid;  ///< no grid if none is given, or if a file with the whole text as its name exists
+    /// `grid` is empty if no name is given, or if the whole text is the name of an existing file
+    std::string path, grid;
 };
 [[nodiscard]] COVOL_API VdbGridName split_grid_name(const std::string& text);
 
-/// The grid of that name; with an empty name the one in the path ("FILE.vdb:name"), else the file's first float grid.
-/// @throws Error Io, InvalidInput (no such grid; not a float grid: lists the grids that exist).
+/// Reads the grid with that name; if it is empty, the grid named in the path ("FILE.vdb:name"), else the first float
+/// grid.
+/// @throws Error Io, InvalidInput (no such grid; not a float grid: the message lists the existing grids).
 [[nodiscard]] COVOL_API FloatGridPtr read_vdb(const std::string& path, const std::string& name = {});
 
-/// The level set in the path ("FILE.vdb:name"); else "surface", else the file's first level set, else its first float
-/// grid that is not a fog volume. Warns, with their names, if a file has several to choose from.
+/// Reads the grid named in the path ("FILE.vdb:name"), else "surface", else the file's first level set, else its first
+/// float grid that is not a fog volume. If there are several candidates, a warning lists their names.
 /// @throws Error as read_vdb; Unsupported (a fog volume).
 [[nodiscard]] COVOL_API FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run = {});
 
@@ -65,7 +67,7 @@ struct VdbGridInfo {
     std::map<std::string, std::string> metadata;
     std::string compression;  ///< "none", "zip" or "blosc"
 };
-/// All grids, or the one in the path ("FILE.vdb:name"). @throws as read_vdb.
+/// Properties of all grids, or of the grid named in the path ("FILE.vdb:name"). @throws as read_vdb.
 [[nodiscard]] COVOL_API std::vector<VdbGridInfo> list_vdb(const std::string& path);
 
 }  // namespace covol

@@ -12,11 +12,11 @@
 
 namespace covol {
 
-/// COVOL_VERSION_STRING of the library in use at run time; the macros are those of the library at compile time.
+/// The version of the library in use at run time; the macros give the version at compile time.
 [[nodiscard]] COVOL_API const char* version() noexcept;
 
-/// How the library was built: "GCC 12.2.0, x86_64, OpenVDB 10.0.1", and the revision of its source if the build was
-/// given one (the CMake variable COVOL_REVISION).
+/// How the library was built: "GCC 12.2.0, x86_64, OpenVDB 10.0.1", and the revision of its source if the CMake
+/// variable COVOL_REVISION was set.
 [[nodiscard]] COVOL_API const char* build_text() noexcept;
 
 }  // namespace covol
