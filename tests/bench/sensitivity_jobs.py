@@ -222,7 +222,7 @@ def doubt_name(structure, kind):
 
 def doubt_error(out, kind):
     """Number of warnings of right marks, or 10 without a warning of wrong ones."""
-    warnings = len(json.loads((out / "r.json").read_text())["warnings"])
+    warnings = len(json.loads((out / "r.json").read_text()).get("warnings", []))
     return warnings if kind == "right" else 10 * (warnings == 0)
 
 
@@ -369,7 +369,7 @@ def output_of(job, out):
 
 def warnings_of(job, out):
     """Part of the result of jobs that are about warnings."""
-    return json.dumps(json.loads((out / "r.json").read_text())["warnings"]).encode() if JOBS[job][1] == "doubt" else b""
+    return json.dumps(json.loads((out / "r.json").read_text()).get("warnings", [])).encode() if JOBS[job][1] == "doubt" else b""
 
 
 def error_of(job, folder, out):

@@ -71,8 +71,9 @@ struct SolvedBrick {
 /// around it; null if the brick has not been solved yet.
 using BrickStates = std::function<FloatGridPtr(std::size_t brick)>;
 
-/// A segmentation or reconstruction that is computed in bricks: from tagged points, clouds, and given starts with a
-/// flow. Guesses and contours are not supported, because their surface depends on all marks at once.
+/// A segmentation or reconstruction that is computed in bricks. It starts from tagged points, from a cloud, or from a
+/// given shape (sphere, box, mesh, mask or level set) that evolves. Guesses and contours are not supported, because
+/// their surface depends on all marks at once.
 class BrickJob {
 public:
     /// Makes the automatic choices that `options` leaves open; for a cloud this includes its orientation.

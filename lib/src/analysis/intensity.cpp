@@ -50,8 +50,8 @@ IntensityStatistics measure_intensity(const Image& image, const FloatGrid& surfa
     IntensityStatistics result;
     const std::optional<VoxelBox> all = voxels_within(image, surface);
     if (!all) return result;
-    // Slices are read in layers, so that the whole image is never in memory. Sums are taken relative to the first value
-    // to avoid cancellation.
+    // Only a few slices are read at a time, so that the whole image is never in memory. Sums are taken relative to the
+    // first value to avoid cancellation.
     const double slice = double(all->size()[0]) * all->size()[1];
     const int layers = std::max(1, int(std::min(double(all->size()[2]), double(1 << 22) / slice)));
     double shift = 0, sum = 0, squares = 0;

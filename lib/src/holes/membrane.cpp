@@ -50,8 +50,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                 if (fixed[a] && fixed[b]) continue;
                 const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
                                       v = at.row(b).transpose() - tip;
-                // In the first round, all edges have the same weight: this distributes the vertices of a bulge over
-                // the future surface.
+                // In the first round, all edges have the same weight: the patch may bulge, and this distributes its
+                // vertices evenly before cotangents are used.
                 const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kMinWeight, 1 / kMinWeight);
                 edges += (u - v).norm();
                 ++edge_count;

@@ -43,7 +43,7 @@ private:
     char* data_;
 };
 
-/// A file to be read by the program.
+/// A file that the started program reads, and the place of the result in the shared memory.
 struct Piece {
     std::string path;
     std::string detail = {};  ///< further input of the task

@@ -36,7 +36,8 @@ struct Choices {
     StepReport report;
 };
 
-/// The choices, and the marks as used: without duplicates and without the noise of scans.
+/// The choices, and the marks as used: points that almost coincide are merged, and a thick layer of tagged points
+/// without an image is averaged to its middle surface.
 struct Resolved {
     Choices choices;
     MarkSets marks;

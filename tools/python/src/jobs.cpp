@@ -35,8 +35,9 @@ GivenMarks to_marks(const py::handle& name, const py::handle& inputs) {
 }
 
 /// @param marks    inputs of each structure, by name
-/// @param painted  the image, the label of the outside, and how the image is read
-/// @return the results, and (a, b, volume, inner) of each overlap
+/// @param painted  the label image or None, its label of the outside, and whether its labels are slices or scribbles
+/// @return the results, and for each overlap the indices of both structures, the common volume in world units^3, and
+///     the index of the structure that was carved out of the other, or None
 py::tuple run_job(const char* function, const std::optional<Image>& image, const py::dict& marks,
                   const py::tuple& painted, const py::object& init, const py::dict& keywords, const Call& call,
                   TimeLapse* lapse) {

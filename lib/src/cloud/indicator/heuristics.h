@@ -30,7 +30,8 @@ struct IndicatorHeuristics {
     double beyond = heuristic("indicator.beyond", 0.2);
     /// [cells] Minimum number of cells along the longest side.
     int min_cells = heuristic("indicator.min_cells", 48);
-    /// [spacings around a point] Maximum cell size at a point, by which sparser points get coarser grids.
+    /// [square roots of the area that a point represents] Maximum cell size at the point, unless the finest grid is
+    /// coarser: the coarsest grid within this limit is used, so that sparser points have coarser grids.
     double local_cells = heuristic("indicator.local_cells", 0.5);
     /// [V-cycles] Number of multigrid cycles for a solution without a close initial value.
     int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);

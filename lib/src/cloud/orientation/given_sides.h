@@ -13,8 +13,8 @@ struct GivenSides {
 
 /// Uses given normals, or normals of local planes on the side of the sensor. Their reliability is cross-validated
 /// between two halves of the points: each half's indicator function must decrease along the other half's normals.
-/// Single normals that the indicator contradicts are reversed; if more than a few of the others disagree with it, all
-/// are replaced by the normals of the indicator.
+/// If too few agree, they are not used. Otherwise, normals along which the indicator clearly increases are reversed; if
+/// it still increases along more than kCloud.few of all normals, all are replaced by the normals of the indicator.
 /// @param hints  of the points
 /// @param cell   cell size of the indicator's grid, world units
 [[nodiscard]] GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale,

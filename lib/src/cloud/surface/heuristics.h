@@ -56,8 +56,8 @@ struct LocalFitHeuristics {
     double wide_of_apart = heuristic("local_fit.wide_of_apart", 7);
     /// [cosine] Minimum between the normals of a node and of a quadric on the same sheet.
     double same_sheet = heuristic("local_fit.same_sheet", 0.7);
-    /// [minimum radii] Ratio to the minimum radius of nearby quadrics from more closely spaced points, above which a
-    /// quadric is dropped; values of 2 to 4 give the same surfaces.
+    /// [ratio] A quadric is dropped if the smallest neighbourhood that determines it has a radius of more than this
+    /// many times that of a nearby quadric, and of the median quadric. Values of 2 to 4 give the same surfaces.
     double lone = heuristic("local_fit.lone", 2.5);
 };
 COVOL_HEURISTICS LocalFitHeuristics kFit{};

@@ -104,7 +104,7 @@ std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& p
     return body;
 }
 
-/// Whether the points enclose a body without further points beyond the image's end.
+/// Whether the points alone enclose a body, so that none need to be added beyond the image's end to close it.
 bool encloses_alone(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain) {
     if (const std::optional<double>& D = tagger.problem.options.tag_distance)
         return !tagger.tag(points, domain, *D).report.leaks;
