@@ -79,6 +79,10 @@ class Programs(Folder):
         self.expect_finding("bare.seg.nrrd", "slicer", "problem", "Segment0_ID")
         self.expect_finding("x.tif", "slicer", "problem", "spacing nor origin")
         self.expect_finding("x.npy", "slicer", "problem", ".npy")
+        header = ("\t\nics_version\t2.0\nlayout\torder\tbits\tx\ty\tz\nlayout\tsizes\t8\t8\t8\t8\nrepresentation\tformat\tinteger\n"
+                  "representation\tsign\tunsigned\nrepresentation\tbyte_order\t1\nend\n")
+        (self.out / "a.ics").write_bytes(header.encode() + bytes(range(256)) * 2)
+        self.expect_finding("a.ics", "slicer", "problem", "does not open .ics", "write .nrrd")
 
     def test_fiji(self):
         self.expect_finding("s.vdb", "fiji", "problem", "covol mask")

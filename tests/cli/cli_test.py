@@ -335,7 +335,7 @@ class Segment(Case):
             self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mask", "m.nrrd", "--mask-label", label, code=3,
                         expected_text="--mask-label")
         self.refuse("segment", self.image, "--points", f"a={self.points}", f"b={self.points}", "-o", "s.vdb", "--mask", "m.nrrd",
-                    "--mask-label", 7, code=2, expected_text="expected one structure, got 2")
+                    "--mask-label", 7, code=2, expected_text="expected one structure, got 2; leave it out")
 
     def test_provenance(self):
         self.segment("--theta", "0.75", "--mesh", "m.ply")

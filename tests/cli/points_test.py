@@ -111,6 +111,16 @@ class Formats(PointsCase):
         self.assertEqual(report["space"], "index")
         self.assertIn("6 polygon", report["rule"])
 
+    def test_fiji_cell_counter(self):
+        markers = "".join(f"<Marker><MarkerX>{x:.9g}</MarkerX><MarkerY>{y:.9g}</MarkerY><MarkerZ>{z + 1}</MarkerZ></Marker>"
+                          for x, y, z in self.marks)
+        path = self.inputs / "cells.xml"
+        path.write_text("<?xml version='1.0'?><CellCounter_Marker_File><Image_Properties><Image_Filename>a.tif</Image_Filename>"
+                        f"</Image_Properties><Marker_Data><Marker_Type><Type>1</Type>{markers}</Marker_Type></Marker_Data>"
+                        "</CellCounter_Marker_File>")
+        self.same_place(path)
+        self.assertIn("Cell Counter (1 type), slices from 1", self.run_covol("info", path).stdout)
+
     def test_fiji_results(self):
         # Fiji stores the spacing but no origin
         rows = [(n + 1, 200, p[0] * SPACING[0], p[1] * SPACING[1], p[2] + 1) for n, p in enumerate(self.marks)]

@@ -7,6 +7,7 @@ numpy, pydicom, h5py.
 """
 import argparse
 import concurrent.futures
+import gzip
 import io
 import lzma
 import os
@@ -143,7 +144,9 @@ def seeds_of(covol, folder):
               "representation\tformat\tinteger\nrepresentation\tsign\tunsigned\nrepresentation\tcompression\tuncompressed\n"
               "representation\tbyte_order\t1\t2\nparameter\torigin\t0\t1\t2\t3\nparameter\tscale\t1\t0.5\t0.5\t2\n"
               "parameter\tunits\tbits\tum\tum\tnm\nend\n")
-    seeds["ics"] = [header.encode() + np.arange(60, dtype="<u2").tobytes()]
+    values = np.arange(60, dtype="<u2").tobytes()
+    seeds["ics"] = [header.encode() + values, header.replace("uncompressed", "gzip").encode() + gzip.compress(values),
+                    header.replace("ics_version\t2.0", "ics_version\t1.0").encode()]  # whose voxels are not there
     write_hdf5(folder / "a.h5", lambda file, values: file.create_dataset("data", data=values, chunks=(2, 5, 6), compression="gzip"))
     write_hdf5(folder / "a.ims", imaris)
     for frames, packed in ((2, False), (1, False), (1, True)):
@@ -154,7 +157,6 @@ def seeds_of(covol, folder):
         seeds.setdefault("contours.dcm", []).append((folder / "a.dcm").read_bytes())
     for name in ("h5", "ims"):
         seeds[name] = [(folder / f"a.{name}").read_bytes()]
-    values = np.arange(60, dtype="<u2").tobytes()
     seeds["zarr"] = [zarr('{"zarr_format":2,"shape":[3,4,5],"chunks":[3,4,5],"dtype":"<u2","compressor":null,"fill_value":0,"order":"C",'
                           '"filters":null}', values)]
     seeds["zarr3"] = [zarr('{"zarr_format":3,"node_type":"array","shape":[3,4,5],"data_type":"uint16","chunk_grid":{"name":"regular",'

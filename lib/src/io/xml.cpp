@@ -75,6 +75,7 @@ bool XmlTags::read(XmlTag& tag) {
         skip_spaces();
         if (at_ >= text_.size() || text_[at_] == '>') return at_ < text_.size();
         if (text_[at_] == '/') {
+            tag.empty = true;
             ++at_;
             continue;
         }

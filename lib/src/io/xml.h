@@ -8,6 +8,7 @@ namespace covol::detail {
 struct XmlTag {
     std::string name;  ///< without a namespace
     bool closing = false;
+    bool empty = false;  ///< as in <a/>: no closing tag follows
     std::map<std::string, std::string> attributes;
 
     [[nodiscard]] std::string value(const std::string& key) const {

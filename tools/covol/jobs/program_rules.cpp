@@ -152,7 +152,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "write .nrrd, .nii.gz or .seg.nrrd"; }},
         {Program::Slicer, kProblem,
          [](Facts f) {
-             return ends_in(f, {".npy", ".zarr", ".ome.zarr", ".h5", ".hdf5", ".ims"});
+             return ends_in(f, {".npy", ".zarr", ".ome.zarr", ".h5", ".hdf5", ".ims", ".ics"});
          },
          [](Facts f) -> Text { return "it does not open " + f.ending; },
          [](Facts) -> Text { return "write .nrrd or .nii.gz"; }},

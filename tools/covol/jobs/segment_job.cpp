@@ -160,9 +160,11 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                 "label image with the geometry of the image; .seg.nrrd for 3D Slicer, .dcm for a DICOM segmentation")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr|.dcm");
         command
-            .add_option("--mask-label", mask_label,
-                        "value of the structure in --mask, 1 to 255; only for a single structure, and not for a mask "
-                        "of --guess, which keeps its values [1, or the painted label]")
+            .add_option(
+                "--mask-label", mask_label,
+                "value of the structure in --mask, 1 to 255; only for a single structure, and neither for a mask "
+                "of --guess, which keeps its values, nor for .dcm, whose segments are numbered from 1 [1, or "
+                "the painted label]")
             ->type_name("N");
         command
             .add_option("--rtstruct", rtstruct_path,

@@ -273,7 +273,7 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
     // --mask-label without --mask is accepted, because covol rerun repeats the settings of a run without its outputs.
     if (job.mask_label && structures.size() != 1)
         throw UsageError("--mask-label: expected one structure, got " + std::to_string(structures.size()) +
-                         ", which are numbered 1, 2, ...");
+                         "; leave it out, because each of them has a value of its own, or segment one at a time");
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
     if (!job.mask_path.empty() && !structures.front().name.empty() && !keeps_names(job.mask_path))

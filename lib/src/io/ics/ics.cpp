@@ -24,6 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 using std::string_view;
 
+constexpr int kMaxVolumes = 1 << 20;
+
 /// The lines of a header in the categories "layout", "representation", "parameter" and "source". The categories
 /// "history" and "sensor" are skipped.
 class IcsHeader {
@@ -36,6 +38,10 @@ public:
         file.read(text.data(), static_cast<std::streamsize>(text.size()));
         text.resize(static_cast<std::size_t>(file.gcount()));
         read(text);
+        if (end_ == 0 && text.size() == kMaxHeader)
+            throw read_error(Errc::Unsupported, path_,
+                             "expected a header of at most 1 MiB, got no line \"end\" in it; save the image again "
+                             "without its history");
     }
 
     [[nodiscard]] int version() const { return version_; }
@@ -92,7 +98,8 @@ private:
         std::vector<std::string> words;
         for (std::size_t at = 0; at < line.size();) {
             const std::size_t last = std::min(line.find(between, at), line.size());
-            if (last > at) words.emplace_back(line.substr(at, last - at));
+            // Bio-Formats pads the sizes with blanks.
+            if (const string_view word = trim(line.substr(at, last - at)); !word.empty()) words.emplace_back(word);
             at = last + 1;
         }
         return words;
@@ -113,7 +120,7 @@ private:
             return false;
         const std::string key = category + " " + lower(words[1]);
         words.erase(words.begin(), words.begin() + 2);
-        lines_.emplace(key, std::move(words));
+        lines_[key] = std::move(words);  // the last of several lines counts, as in libics
         return false;
     }
 
@@ -132,27 +139,38 @@ struct IcsAxes {
     std::string order;           ///< fastest first, for example "XYZCT"
 };
 
+/// Whether this is a name of the axis of channels: of libics, Huygens or Bio-Formats.
+bool is_channels(const std::string& name) {
+    constexpr std::array kNames{"p", "c", "ch", "channel", "channels", "probe", "probes"};
+    return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+}
+
 IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
     const std::vector<std::string>& names = header.values("layout order");
     const std::vector<std::string>& texts = header.values("layout sizes");
-    if (names.size() < 2 || names.size() != texts.size())
-        throw header.damaged("expected as many sizes as axes in its layout");
+    const std::string stated = header.word("layout parameters");
+    const std::size_t count = stated.empty() ? names.size() : to_number<std::size_t>(stated).value_or(0);
+    if (count < 2 || names.size() < count || texts.size() < count)
+        throw header.damaged("expected a name and a size for each axis in its layout, got " +
+                             std::to_string(names.size()) + " names and " + std::to_string(texts.size()) + " sizes" +
+                             (stated.empty() ? "" : " for the parameters " + quote(stated)));
     std::vector<std::uint64_t> sizes;
-    for (const std::string& text : texts) {
-        const auto size = to_number<std::uint64_t>(text);
-        if (!size) throw header.damaged("expected whole numbers as sizes, got " + quote(text));
+    for (std::size_t n = 0; n < count; ++n) {
+        const auto size = to_number<std::uint64_t>(texts[n]);
+        if (!size) throw header.damaged("expected whole numbers as sizes, got " + quote(texts[n]));
         sizes.push_back(*size);
     }
     const auto refuse = [&] {
         return read_error(Errc::Unsupported, path,
-                          "expected the axes bits, x, y, z, and then ch and t, got " +
+                          "expected the axes bits, x, y, z, and then channels (p, c, ch, channel, channels, probe or "
+                          "probes) and time points (t or time), got " +
                               quote(header.joined("layout order")) + "; save the stack in that order");
     };
     IcsAxes axes;
     axes.bits = sizes[0];
     if (lower(names[0]) != "bits") throw refuse();
     bool has_channels = false, has_frames = false;
-    for (std::size_t n = 1; n < names.size(); ++n) {
+    for (std::size_t n = 1; n < count; ++n) {
         const std::string name = lower(names[n]);
         if (n < 4) {
             if (name != std::string(1, "xyz"[n - 1])) throw refuse();
@@ -160,11 +178,13 @@ IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
             axes.order += "XYZ"[n - 1];
             continue;
         }
-        const bool is_channel = name == "ch" || name == "probe";
+        const bool is_channel = is_channels(name), is_frame = name == "t" || name == "time";
         bool& seen = is_channel ? has_channels : has_frames;
-        if ((!is_channel && name != "t") || seen) throw refuse();
-        constexpr std::uint64_t kMax = std::uint64_t(1) << 20;
-        if (sizes[n] < 1 || sizes[n] > kMax)
+        if ((!is_channel && !is_frame) || seen) {
+            if (sizes[n] != 1) throw refuse();
+            continue;
+        }
+        if (sizes[n] < 1 || sizes[n] > std::uint64_t(kMaxVolumes))
             throw read_error(Errc::InvalidInput, path,
                              "expected 1 to 2^20 frames and channels, the header claims " + texts[n]);
         if (is_channel) axes.channels_first = !has_frames;
@@ -176,7 +196,8 @@ IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
 }
 
 void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint64_t bits, PixelPlace& place) {
-    const std::string format = header.word("representation format");
+    const std::string stated = header.word("representation format");
+    const std::string format = stated == "float" ? "real" : stated;
     const bool is_signed = header.word("representation sign") != "unsigned";
     static constexpr struct {
         const char* format;
@@ -193,7 +214,7 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
     if (type == std::end(kTypes))
         throw read_error(Errc::Unsupported, path,
                          "expected integers of 8, 16 or 32 bits, or reals of 32 or 64 bits, got the format " +
-                             quote(format) + " with " + std::to_string(bits) + " bits");
+                             quote(stated) + " with " + std::to_string(bits) + " bits");
     place.type = type->type;
     // The line gives the significance of each stored byte; 1 is the lowest. "1 2" is little-endian, "2 1" big-endian.
     const std::vector<std::string>& order = header.values("representation byte_order");
@@ -211,13 +232,13 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
 }
 
 /// Sets spacing and origin, converted to the unit of x. libics writes a scale of 1 and the unit "undefined" if the
-/// spacing is not known.
+/// spacing is not known; a unit of pixels means the same.
 void set_geometry(const IcsHeader& header, ImageInfo& info) {
     ImageGeometry& geometry = info.geometry;
     const std::vector<std::string>& units = header.values("parameter units");
     const auto unit_of = [&](std::size_t axis) {
         const std::string unit = axis + 1 < units.size() ? normal_unit(units[axis + 1]) : "";
-        return unit == "undefined" ? "" : unit;
+        return unit == "undefined" || unit == "px" || unit == "pixel" ? "" : unit;
     };
     geometry.unit = unit_of(0);
     for (std::size_t a = 0; a < 3; ++a) {
@@ -229,9 +250,9 @@ void set_geometry(const IcsHeader& header, ImageInfo& info) {
         geometry.spacing[a] = info.spacing_known[a] ? scale * factor : 1;
         geometry.origin[a] = info.spacing_known[a] ? header.number("parameter origin", a + 1).value_or(0) * factor : 0;
     }
-    for (const char* key :
-         {"layout order", "layout sizes", "representation format", "representation sign", "representation byte_order",
-          "representation compression", "parameter scale", "parameter origin", "parameter units"})
+    for (const char* key : {"layout order", "layout sizes", "layout coordinates", "representation format",
+                            "representation sign", "representation byte_order", "representation compression",
+                            "parameter scale", "parameter origin", "parameter units"})
         if (const std::string found = header.joined(key); !found.empty()) info.fields.emplace_back(key, found);
 }
 
@@ -287,6 +308,11 @@ std::unique_ptr<ImageFile> open_ics(const std::string& path) {
     std::vector<std::string> files;
     if (header.version() == 1) {
         place.path = fs::path(path).replace_extension(path.ends_with("S") ? ".IDS" : ".ids").string();
+        std::error_code status;
+        if (!fs::exists(place.path, status) && fs::exists(place.path + ".gz", status)) {
+            place.path += ".gz";
+            place.packed = true;
+        }
         files = {place.path};
         require_regular_files(path, files);
     } else {
@@ -298,8 +324,7 @@ std::unique_ptr<ImageFile> open_ics(const std::string& path) {
         place.path = path;
         place.file_offset = header.end();
     }
-    constexpr int kMax = 1 << 20;
-    if (axes.channels > kMax / axes.frames)
+    if (axes.channels > kMaxVolumes / axes.frames)
         throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 volumes, the header claims more");
     ImageInfo volumes = info;
     volumes.channels = 1;

@@ -79,6 +79,9 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".ics" || end == ".npy" || end == ".vdb";
     // DICOM files are also recognized by their contents, because their extensions are often numbers.
     const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
+    if (end == ".ids")
+        throw read_error(Errc::Unsupported, path,
+                         "these are the voxels of an ICS image; open its header, the .ics file of the same name");
     if (!marked && !known)
         throw read_error(Errc::Unsupported, path,
                          std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");

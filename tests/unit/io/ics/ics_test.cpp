@@ -24,14 +24,19 @@ struct Header {
     std::string version = "2.0", order = "bits x y z", sizes = "16 4 3 2", format = "integer", sign = "unsigned",
                 bytes = "1 2", compression = "uncompressed", scale = "1 0.5 0.25 2000",
                 units = "bits micrometers micrometers nanometers", origin = "0 10 -20 3000";
-    std::string more;  ///< further lines
+    std::string more;        ///< further lines
+    std::string parameters;  ///< empty: the number of axes
 
+    [[nodiscard]] std::string count() const {
+        return parameters.empty() ? std::to_string(1 + std::count(order.begin(), order.end(), ' ')) : parameters;
+    }
     [[nodiscard]] std::string text(const std::string& separators = "\t\n") const {
-        std::string lines = "ics_version " + version + "\nfilename ball\nlayout parameters 4\nlayout order " + order +
-                            "\nlayout sizes " + sizes + "\nlayout significant_bits 16\nrepresentation format " +
-                            format + "\nrepresentation sign " + sign + "\nrepresentation compression " + compression +
-                            "\nrepresentation byte_order " + bytes + "\nparameter scale " + scale +
-                            "\nparameter units " + units + "\nparameter origin " + origin + "\n" + more;
+        std::string lines = "ics_version " + version + "\nfilename ball\nlayout parameters " + count() +
+                            "\nlayout order " + order + "\nlayout sizes " + sizes +
+                            "\nlayout significant_bits 16\nrepresentation format " + format + "\nrepresentation sign " +
+                            sign + "\nrepresentation compression " + compression + "\nrepresentation byte_order " +
+                            bytes + "\nparameter scale " + scale + "\nparameter units " + units +
+                            "\nparameter origin " + origin + "\n" + more;
         if (version == "2.0") lines += "end\n";
         for (char& c : lines) c = c == ' ' ? separators[0] : c == '\n' ? separators[1] : c;
         return separators + lines;
@@ -97,6 +102,7 @@ TEST_CASE("ICS: voxels of every type, in both byte orders") {
           PixelType::UInt32);
     CHECK(read("32 4 3 2", "integer", "signed", "1 2 3 4", counted<std::int32_t>()) == PixelType::Int32);
     CHECK(read("32 4 3 2", "real", "signed", "1 2 3 4", counted<float>()) == PixelType::Float);
+    CHECK(read("32 4 3 2", "float", "signed", "1 2 3 4", counted<float>()) == PixelType::Float);
     CHECK(read("64 4 3 2", "real", "signed", "8 7 6 5 4 3 2 1", counted<double>(kVoxels, true)) == PixelType::Double);
 }
 
@@ -123,6 +129,11 @@ TEST_CASE("ICS: spacing and origin, in the unit of x") {
     header.units = "relative um um furlongs";  // which cannot be converted to um
     info = read_image_info(scratch.write("a.ics", header.text() + voxels));
     CHECK(info.spacing_known == std::array<bool, 3>{true, true, false});
+    header.scale = "1 1 1 1";
+    header.units = "bits px pixel Pixel";
+    info = read_image_info(scratch.write("a.ics", header.text() + voxels));
+    CHECK(info.spacing_known == std::array<bool, 3>{false, false, false});
+    CHECK(info.geometry.unit.empty());
 }
 
 TEST_CASE("ICS: the voxels of version 1 are in the .ids file beside the header") {
@@ -137,6 +148,59 @@ TEST_CASE("ICS: the voxels of version 1 are in the .ids file beside the header")
     CHECK(read_image_info(path).format == "ICS 1.0");
     scratch.write("a.ids", counted<std::uint16_t>().substr(1));
     CHECK_THAT(message_of([&] { (void)read_image(path); }), Catch::Contains("cannot hold"));
+    CHECK_THAT(message_of([&] { (void)read_image(scratch.path("a.ids")); }), Catch::Contains("open its header"));
+}
+
+TEST_CASE("ICS: the voxels of version 1 may be in .ids.gz, if there is no .ids") {
+    const Scratch scratch;
+    Header header;
+    header.version = "1.0";
+    const std::string path = scratch.write("a.ics", header.text());
+    scratch.write("a.ids.gz", gzipped(counted<std::uint16_t>()));
+    check_counts(read_image(path));
+    CHECK(list_image_files(path) == std::vector<std::string>{scratch.path("a.ids.gz")});
+    scratch.write("a.ids", counted<std::uint16_t>());
+    check_counts(read_image(path));
+    CHECK(list_image_files(path) == std::vector<std::string>{scratch.path("a.ids")});
+}
+
+TEST_CASE("ICS: headers as other programs write them") {
+    const Scratch scratch;
+    const auto read = [&](const Header& header, int volumes = 1) {
+        const std::string path = scratch.write("a.ics", header.text() + counted<std::uint16_t>(volumes * kVoxels));
+        ReadImageOptions first;
+        first.channel = first.frame = 0;
+        check_counts(read_image(path, first));
+        return read_image_info(path);
+    };
+    Header huygens;
+    huygens.order = "bits x y z p";
+    huygens.sizes = "16 4 3 2 1";
+    huygens.more = "layout coordinates cartesian\n";
+    const ImageInfo info = read(huygens);
+    CHECK(std::find(info.fields.begin(), info.fields.end(),
+                    std::pair<std::string, std::string>{"layout coordinates", "cartesian"}) != info.fields.end());
+    for (const char* channels : {"p", "c", "ch", "channel", "Channels", "probe", "probes"}) {
+        Header header;
+        header.order = std::string("bits x y z time lifetime ") + channels;
+        header.sizes = "16 4 3 2 3 1 2";
+        const ImageInfo several = read(header, 6);
+        CHECK(several.channels == 2);
+        CHECK(several.frames == 3);
+        CHECK(several.axis_order == "XYZTC");
+    }
+    // Blanks after the sizes, as in files of Bio-Formats, where the separator is a tab.
+    std::string padded = Header().text();
+    padded.insert(padded.find("16\t4\t3\t2") + 8, "\t     ");
+    check_counts(read_image(scratch.write("padded.ics", padded + counted<std::uint16_t>())));
+    Header more_names;
+    more_names.order = "bits x y z ch t";
+    more_names.parameters = "4";
+    CHECK(read(more_names).channels == 1);
+    Header twice;
+    twice.more = "layout sizes 16 4 3 2\n";
+    twice.sizes = "16 9 9 9";
+    (void)read(twice);
 }
 
 TEST_CASE("ICS: gzip, other separators, long histories") {
@@ -191,7 +255,10 @@ TEST_CASE("ICS: files that are none, that lie, or that are not supported") {
     is_refused(with(&Header::version, "3.0"), "expected ics_version 1.0 or 2.0");
     is_refused(with(&Header::order, "bits y x z"), "expected the axes bits, x, y, z");
     is_refused(with(&Header::order, "x y z bits"), "expected the axes bits, x, y, z");
-    is_refused(with(&Header::order, "bits x y"), "as many sizes as axes");
+    is_refused(with(&Header::order, "bits x y z ch"), "got 5 names and 4 sizes");
+    is_refused(with(&Header::parameters, "5"), "got 4 names and 4 sizes for the parameters '5'");
+    is_refused(with(&Header::parameters, "many"), "got 4 names and 4 sizes for the parameters 'many'");
+    is_refused(with(&Header::order, "bits x y"), "expected a 3D image");
     is_refused(with(&Header::sizes, "16 4 3 0"), "expected a 3D image");
     is_refused(with(&Header::sizes, "16 4 3 -2"), "expected whole numbers as sizes");
     is_refused(with(&Header::sizes, "16 4 3 2000000000"), "the header claims");
@@ -206,6 +273,13 @@ TEST_CASE("ICS: files that are none, that lie, or that are not supported") {
     many.order = "bits x y z ch t";
     many.sizes = "16 4 3 2 1000000 1000000";
     is_refused(many.text() + voxels, "2^20");
+    Header unknown;
+    unknown.order = "bits x y z lifetime";
+    unknown.sizes = "16 4 3 2 2";
+    is_refused(unknown.text() + voxels, "channels (p, c, ch, channel, channels, probe or probes)");
+    Header history;
+    history.more = "history step " + std::string(std::size_t(1) << 20, 'a') + "\n";
+    is_refused(history.text() + voxels, "expected a header of at most 1 MiB");
 }
 
 TEST_CASE("damaged ICS files end in an Error, never in a crash") {

@@ -533,8 +533,8 @@ TEST_CASE("the types of Cell Counter are structures, and its slices may count ch
     const std::string path = scratch.write("a.xml", cell_counter(kIndex));
     std::vector<StructurePoints> structures = read_structures_of_points(path, "type");
     REQUIRE(structures.size() == 2);
-    CHECK(structures[0].name == "type 1");
-    CHECK(structures[1].name == "type 2");
+    CHECK(structures[0].name == "Type 1");
+    CHECK(structures[1].name == "Type 2");
     CHECK(structures[1].points.cloud.points == std::vector<Vec3>{kIndex[2], kIndex[3]});
     structures = read_structures_of_points(scratch.write("n.xml", cell_counter(kIndex, true)), "type");
     REQUIRE(structures.size() == 2);
@@ -558,10 +558,33 @@ TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
     contains(read_error(scratch, "a.xml", good.substr(0, good.size() - 5)), "has no end");
     contains(read_error(scratch, "a.xml", with("<MarkerZ>4</MarkerZ>", "")),
              "marker 1: expected MarkerX, MarkerY and MarkerZ");
-    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>0<")), "marker 1: expected a slice from 1");
+    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>0<")),
+             "marker 1: expected a slice from 1, got MarkerZ '0'; does the file count slices from 0?");
+    contains(read_error(scratch, "a.xml", with("</Type>", "</Type><Name><Unnamed></Name>")), "write it as &lt;");
+    contains(read_error(scratch, "a.xml", with("</Type>", "</Type><Name>a < 5 um</Name>")), "write it as &lt;");
+    contains(read_error(scratch, "a.xml", good.substr(0, good.find("</Type>")) + "</Type><Name>cell"), "has no end");
+    contains(read_error(scratch, "a.xml", with("<MarkerX>", "<Marker><MarkerX>")), "marker 1: expected its end");
+    contains(read_error(scratch, "a.xml", with("<Type>1</Type>", "")), "marker 1: expected the Type or Name");
+    contains(read_error(scratch, "a.xml", "<?xml version=\"1.0\"?><SpimData version=\"0.2\"/>"), "open the .h5 file");
     contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>nan<")), "expected a number as MarkerZ");
     contains(read_error(scratch, "a.xml", "<CellCounter_Marker_File></CellCounter_Marker_File>"),
              "expected at least one point");
+}
+
+TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of cellfinder") {
+    const Scratch scratch;
+    std::string text = cell_counter(kIndex);
+    const auto set = [&](const std::string& old, const std::string& other) {
+        text.replace(text.find(old), old.size(), other);
+    };
+    set("<MarkerZ>4</MarkerZ>", "<MarkerZ>\r\n  4\r\n</MarkerZ>");
+    CHECK(read_points(scratch.write("a.xml", text)).points == kIndex);
+    set("</Type>", "</Type><Name />");  // of the type's number
+    CHECK(read_structures_of_points(scratch.write("n.xml", text), "type")[0].name == "Type 1");
+    set("a.tif", "placeholder.tif");
+    const PointCloud cloud = read_points(scratch.write("b.xml", text));
+    CHECK(cloud.points[0] == Vec3{kIndex[0][0], kIndex[0][1], kIndex[0][2] + 1});
+    contains(cloud.rule, "cellfinder (2 types), slices from 0");
 }
 
 TEST_CASE("markups give lines, their own names and nothing that is not placed") {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -9,11 +10,19 @@
 #include "io/xml.h"
 
 // Layout: WriteXML.java of Fiji's plugin Cell Counter. MarkerX and MarkerY are pixels, counted from 0. MarkerZ is the
-// number of the plane in the stack, counted from 1; in a hyperstack, the channels of a slice are separate planes.
+// number of the plane in the stack, counted from 1: in a hyperstack, channels vary fastest, then slices, then time
+// points. BrainGlobe's cellfinder writes the same tags with slices from 0; its files name the image placeholder.tif.
 namespace covol::detail {
 namespace {
 
 constexpr const char* kRoot = "CellCounter_Marker_File";
+
+/// The text after a tag, without blanks and line ends around it.
+std::string text_after(const XmlTags& tags) {
+    std::string text = tags.text();
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return std::string(trim(text));
+}
 
 /// The markers of a file, one tag after another.
 class CellMarkers {
@@ -24,56 +33,83 @@ public:
     void read(const std::string& text) {
         XmlTags tags(text);
         XmlTag tag;
-        if (!tags.next(tag) || tag.name != kRoot)
+        const bool has_root = tags.next(tag);
+        if (has_root && tag.name == "SpimData")
+            fail(path_, "this is the header of a BigDataViewer image, not marks; open the .h5 file of the same name");
+        if (!has_root || tag.name != kRoot)
             fail(path_, std::string("expected a file of Fiji's Cell Counter, which begins with ") + kRoot + ", got " +
                             quote(tag.name));
         bool is_complete = false;
         while (!is_complete && tags.next(tag)) {
+            if (in_name_ && !(tag.closing && tag.name == "Name")) refuse_name();
             is_complete = tag.closing && tag.name == kRoot;
             if (tag.closing)
                 close(tag.name);
             else
                 open(tag.name, tags);
+            if (tag.empty) close(tag.name);
         }
+        // At a syntax error, the tag is the one with the error.
+        if (in_name_ && !tag.closing && tag.name != "Name") refuse_name();
         if (!is_complete) fail(path_, "damaged or truncated: " + quote(kRoot) + " has no end");
     }
 
     [[nodiscard]] PointTable finish() {
         table_.space = PointSpace::Index;
         table_.order = PointOrder::XYZ;
-        table_.rule = "Fiji's Cell Counter (" + std::to_string(types_) + (types_ == 1 ? " type" : " types") +
-                      "), slices from 1, by pixel centres";
+        table_.rule = std::string(first_slice_ == 0 ? "Cell Counter's format as written by cellfinder ("
+                                                    : "Fiji's Cell Counter (") +
+                      std::to_string(types_) + (types_ == 1 ? " type" : " types") + "), slices from " +
+                      std::to_string(first_slice_) + ", by pixel centres";
         return std::move(table_);
     }
 
 private:
     void open(const std::string& name, const XmlTags& tags) {
-        if (name == "Marker_Type") {
+        if (name == "Image_Filename") {
+            first_slice_ = text_after(tags) == "placeholder.tif" ? 0 : 1;
+        } else if (name == "Marker_Type") {
             type_ = {};
             has_markers_ = false;
         } else if (name == "Type") {
-            type_ = "type " + std::string(trim(tags.text()));
+            if (const std::string number = text_after(tags); !number.empty()) type_ = "Type " + number;
         } else if (name == "Name") {
-            if (const std::string given = tags.text(); !trim(given).empty()) type_ = trim(given);
+            in_name_ = true;
+            if (const std::string given = text_after(tags); !given.empty()) type_ = given;
         } else if (name == "Marker") {
+            if (std::exchange(in_marker_, true)) fail(path_, who() + ": expected its end before the next Marker");
             at_ = {};
         } else if (name == "MarkerX" || name == "MarkerY" || name == "MarkerZ") {
-            const std::string text = tags.text();
-            const std::optional<double> value = to_number(trim(text));
+            const std::string text = text_after(tags);
+            const std::optional<double> value = to_number(text);
             if (!value || !std::isfinite(*value))
-                fail(path_, who() + ": expected a number as " + name + ", got " + quote(trim(text)));
+                fail(path_, who() + ": expected a number as " + name + ", got " + quote(text));
             at_[std::size_t(name.back() - 'X')] = value;
+            if (name == "MarkerZ") slice_ = text;
         }
     }
 
     void close(const std::string& name) {
+        if (name == "Name") in_name_ = false;
+        if (name == "Marker_Type") type_ = {};
         if (name != "Marker") return;
+        in_marker_ = false;
         if (!at_[0] || !at_[1] || !at_[2]) fail(path_, who() + ": expected MarkerX, MarkerY and MarkerZ");
-        if (*at_[2] < 1) fail(path_, who() + ": expected a slice from 1, got MarkerZ " + std::to_string(*at_[2]));
-        table_.points.push_back({*at_[0], *at_[1], *at_[2] - 1});
+        if (type_.empty()) fail(path_, who() + ": expected the Type or Name of its Marker_Type before it");
+        if (*at_[2] < first_slice_)
+            fail(path_,
+                 who() + ": expected a slice from " + std::to_string(first_slice_) + ", got MarkerZ " + quote(slice_) +
+                     (first_slice_ == 1 ? "; does the file count slices from 0? Then add 1 to each MarkerZ" : ""));
+        table_.points.push_back({*at_[0], *at_[1], *at_[2] - first_slice_});
         if (by_type_) name_structure(table_, path_, type_);
         if (!std::exchange(has_markers_, true)) ++types_;
         at_ = {};
+    }
+
+    [[noreturn]] void refuse_name() const {
+        fail(path_,
+             "not well-formed XML: expected no '<' in the name of a type; write it as &lt;, or rename the type "
+             "in Cell Counter and save the markers again");
     }
 
     [[nodiscard]] std::string who() const { return "marker " + std::to_string(table_.points.size() + 1); }
@@ -81,8 +117,11 @@ private:
     const std::string& path_;
     bool by_type_;
     PointTable table_;
-    std::string type_;  ///< name of the current type of markers; without a name, for example "type 1"
+    int first_slice_ = 1;
+    std::string type_;  ///< name of the current type of markers; without a name, "Type 1" as in the plugin
+    bool in_name_ = false, in_marker_ = false;
     std::array<std::optional<double>, 3> at_{};
+    std::string slice_;  ///< MarkerZ as written
     bool has_markers_ = false;
     int types_ = 0;  ///< number of types with markers; the plugin also writes types without any
 };
