@@ -130,7 +130,7 @@ class Pictures(Case):
                 (("--view", "aside"), 3, "expected front, back"),
                 (("--view", "10,100"), 3, "elevation"),
                 (("--opacity", "2"), 2, "0 to 1"),
-                (("--opacity", "middle=0.5"), 2, "expected NAME=SHARE with a level set of the file (left, right)"),
+                (("--opacity", "middle=0.5"), 2, "expected NAME=FRACTION with a level set of the file (left, right)"),
                 (("--points", f"middle={self.left}"), 2, "(left, right)"),
                 (("--zoom", "0"), 3, "zoom"),
                 (("--slices", "-1"), 3, "slices"),

@@ -103,13 +103,13 @@ private:
             if (given.name.empty())
                 for (RenderStructure& structure : scene.structures) structure.opacity = value;
             else
-                scene.structures[owner_of(names_of(scene), "--opacity", given, "SHARE")].opacity = value;
+                scene.structures[owner_of(names_of(scene), "--opacity", given, "FRACTION")].opacity = value;
         }
     }
 
     static double parse_fraction(const std::string& text) {
         const double value = parse_number("--opacity", text);
-        if (!(value >= 0 && value <= 1)) throw UsageError("--opacity: expected [NAME=]SHARE, 0 to 1, got " + text);
+        if (!(value >= 0 && value <= 1)) throw UsageError("--opacity: expected [NAME=]FRACTION, 0 to 1, got " + text);
         return value;
     }
 
@@ -154,7 +154,7 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
         .add_option("--opacity", job.opacities,
                     "opacity of the surfaces, 0 to 1, for all of them or for one by its name [1; 0.35 around other "
                     "structures; 0.16 with --volume]")
-        ->type_name("[NAME=]SHARE...");
+        ->type_name("[NAME=]FRACTION...");
     bind_options(command, job.given, Offered::Always);
     add_words(command, {"slice_axis", {}, {}, "axis of the image along which slices are taken"}, {"x", "y", "z"},
               [&job](std::size_t n) { job.given.options.slice_axis = int(n); })

@@ -13,10 +13,25 @@ namespace covol::tool {
 namespace {
 
 // Type names of option values by role. trust_test.Roles checks the roles of the options.
-constexpr std::array<std::string_view, 19> kSettings{
-    "N",         "INT",          "UINT",       "FLOAT",        "NUMBER",         "LENGTH", "VOXELS",
-    "LABEL",     "FACTOR",       "X,Y,Z",      "SX,SY,SZ",     "KIND",           "NAME",   "X0,Y0,Z0,X1,Y1,Z1",
-    "all|N|A-B", "WIDTHxHEIGHT", "NAME|AZ,EL", "[NAME:]X,Y,Z", "[NAME=]SHARE..."};
+constexpr std::array<std::string_view, 19> kSettings{"N",
+                                                     "INT",
+                                                     "UINT",
+                                                     "FLOAT",
+                                                     "NUMBER",
+                                                     "LENGTH",
+                                                     "VOXELS",
+                                                     "LABEL",
+                                                     "FACTOR",
+                                                     "X,Y,Z",
+                                                     "SX,SY,SZ",
+                                                     "KIND",
+                                                     "NAME",
+                                                     "X0,Y0,Z0,X1,Y1,Z1",
+                                                     "all|N|A-B",
+                                                     "WIDTHxHEIGHT",
+                                                     "NAME|AZ,EL",
+                                                     "[NAME:]X,Y,Z",
+                                                     "[NAME=]FRACTION..."};
 constexpr std::array<std::string_view, 21> kInputs{
     "IMAGE",        "IMAGE...", "FILE",     "FILE...",     "[NAME=]FILE", "[NAME=]FILE...", "[NAME=]FILE|X,Y,Z",
     "FILE|X,Y,Z",   "START",    "IN",       "A",           "B",           "IN.vdb[:NAME]",  "U.vdb",
