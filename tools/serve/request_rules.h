@@ -45,7 +45,9 @@ struct Decision {
     Request request{};           ///< of Get and Post
     std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::max_body_bytes
     bool is_head = false;
-    bool is_link = false;  ///< for SetCookie: the user followed a link on another page, or in a file
+    /// for SetCookie: the user followed a link on another page or in a file, or a page on another port loads this one
+    /// into a frame
+    bool is_link = false;
 };
 
 /// Applies all rules to a request. Handlers are called only if Host, Origin, Sec-Fetch-Site and either the token or the

@@ -66,7 +66,7 @@ struct TagDistanceChoice {
 
 /// Shrinks a tagged body back to the points: removes from the inside of `band` every voxel that is closer than D to the
 /// tagged surface, which lies about D outside of the points. Together, tagging and this step are a morphological
-/// closing by a ball of radius D. The result is a signed distance, clamped to a few voxels, or null if nothing remains.
+/// closing by a ball of radius D. The result is a signed distance, clamped to 5 voxels, or null if nothing remains.
 [[nodiscard]] COVOL_API FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance,
                                                    const RunContext& run = {});
 

@@ -82,14 +82,15 @@ struct Sections;
 
 /// Marks on slices, with additional points between them, dense enough to determine a level set.
 struct Contours {
-    std::vector<Vec3> marks;                    ///< as they were set, world units
-    std::vector<Vec3> along;                    ///< points on the lines through the marks, including the marks
+    std::vector<Vec3> marks;  ///< as they were set, world units
+    /// points on the lines through the marks, including the marks; for a network, fewer points at equal distances
+    std::vector<Vec3> along;
     std::vector<Vec3> between;                  ///< points on the interpolated surface between slices and on the domes
     std::shared_ptr<const ContourSolid> solid;  ///< null if there is no closed contour on parallel slices
     std::size_t closed = 0, open = 0;           ///< numbers of closed and open lines
     std::size_t slices = 0;  ///< number of slices with closed contours; for a network, number of planes
-    bool flat = false;  ///< all marks lie on one slice of an image with several slices, and no thickness is given: the
-                        ///< thickness of the body is an estimate
+    bool flat = false;  ///< all marks lie in one plane, which is not the only slice of an image, and no thickness is
+                        ///< given: the thickness of the body is an estimate
     /// median distance between neighbouring marked slices, world units; the image's spacing for one slice
     double slice_distance = 0;
     std::string summary;      ///< one line for the user

@@ -74,7 +74,7 @@ private:
     std::shared_ptr<detail::ChunkCache> cache_;
 };
 
-/// Opens the coarser levels of the file `image.path()`.
+/// Returns the image with the coarser levels of its file `image.path()`; without them if it is held in memory.
 /// @param options  the options with which `image` was read
 /// @param max_bytes  maximum size of the decoded chunks that are kept
 /// @throws Error as read_image(). A coarser level that is damaged is skipped with a warning.

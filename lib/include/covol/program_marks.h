@@ -18,7 +18,8 @@ struct NamedMark {
 /// - .csv: points of napari: z, y, x in voxels, and a column `name`
 /// - .mrk.json: fiducials of 3D Slicer, in LPS
 /// - .roi: a multi-point of Fiji, with each mark on the nearest slice, for stacks of one channel; names are not stored
-/// @throws Error InvalidOptions (another extension), InvalidInput (for .roi: negative voxel coordinates), Io.
+/// @throws Error InvalidOptions (another extension), InvalidInput (for .roi: marks before the image's first voxel),
+/// Unsupported (for .roi: more than 65535 marks, or a coordinate above 32766 pixels), Io.
 COVOL_API void write_program_marks(const std::string& path, const std::vector<NamedMark>& marks,
                                    const ImageGeometry& geometry);
 /// @throws Error InvalidOptions (an extension that write_program_marks() does not know)

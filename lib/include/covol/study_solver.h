@@ -55,8 +55,8 @@ public:
     COVOL_API void set_options(SegmentOptions options);
     /// Computes the surface of a structure; to be called when its marks have changed.
     COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
-    /// Computes the surface of a structure whose marks have not changed: after all waiting structures, and without the
-    /// stage First.
+    /// Computes the surface of a structure for whose marks the caller already has a surface: after all waiting
+    /// structures, and without the stage First.
     COVOL_API void confirm(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
     /// Discards a structure and its surface; to be called when the structure was removed.
     COVOL_API void forget(StudyId structure);

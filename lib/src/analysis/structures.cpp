@@ -158,7 +158,8 @@ private:
         return g;
     }
 
-    /// The minimum of the distances to the other structures at a leaf's voxels; it matters if one of them is close.
+    /// The minimum of the distances to the other structures at a leaf's voxels; it matters if the leaf is in one of
+    /// them or close to one.
     struct Nearest {
         std::array<float, kLeafSize> value;
         bool matters = false;

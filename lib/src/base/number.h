@@ -6,8 +6,8 @@
 
 namespace covol::detail {
 
-/// Rounds down. Faster than floor(), which is a function call on processors without a rounding instruction.
-/// @pre |x| < 2^31
+/// Rounds down. Faster than floor(), which is a function call if the code is compiled for an instruction set without
+/// rounding. @pre |x| < 2^31
 inline int round_down(double x) {
     const int i = int(x);
     return i - (double(i) > x);

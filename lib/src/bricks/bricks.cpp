@@ -113,8 +113,8 @@ std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     return near;
 }
 
-/// A brick and its neighbours, in the plan's order. Overlapping states are summed in this order, which changes the
-/// last bits of sums of three numbers.
+/// A brick and its neighbours, in the plan's order. Overlapping states are summed in this order, because the last bits
+/// of sums of three numbers depend on it.
 std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
     std::vector<std::size_t> all = plan.bricks[brick].neighbours;
     all.push_back(brick);

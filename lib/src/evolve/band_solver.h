@@ -30,7 +30,7 @@ public:
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 
-    /// Gathers u and the fields whose weight is not 0.
+    /// Gathers u, the fields whose weight is not 0, and the bounds that are given.
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 

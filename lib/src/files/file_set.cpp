@@ -18,7 +18,8 @@ namespace covol {
 namespace fs = std::filesystem;
 namespace {
 
-/// If a write failed for lack of disk space, this reason, which libraries do not report; otherwise empty.
+/// The reason of a failed write, which libraries do not report, if the disk is full, or a quota or the maximum size of
+/// a file is exceeded. Empty for other reasons, and if `message` already contains the reason.
 std::string disk_full_reason(const std::string& message) {
     const int why = errno;
     if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};

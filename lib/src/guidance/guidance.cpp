@@ -219,7 +219,7 @@ void Guide::set_ranges() {
     if (options_.range) broad_ = std::min(broad_, 0.5 * *options_.range);
     ranges_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
-        // The range at marks is not smaller than elsewhere, although the guess is more accurate there.
+        // At least twice the deviation of the whole guess is searched, also at marks, where the guess is more accurate.
         double range = std::max(reach[i], 2 * broad_);
         if (options_.range) range = std::min(range, *options_.range);
         range = std::min(range + std::abs(home_[i]), kGuide.farthest * h_);

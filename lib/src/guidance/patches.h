@@ -11,7 +11,7 @@ namespace covol::guidance {
 struct SurfaceVertices {
     std::vector<Vec3> places, normals;
     std::vector<double> area;                      ///< a third of the area of the triangles around it
-    std::vector<std::uint32_t> first, neighbours;  ///< vertex v: neighbours[first[v] .. first[v+1])
+    std::vector<std::uint32_t> first, neighbours;  ///< of vertex v, each once: neighbours[first[v] .. first[v+1])
 };
 
 /// @param mesh    closed, with outward normals

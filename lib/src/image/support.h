@@ -8,7 +8,7 @@ namespace covol::detail {
 
 /// Whether an image varies more at certain places than beside them, be it at a step or a line of intensity.
 struct ImageSupport {
-    std::size_t places = 0;  ///< number of places that lie in the image together with the windows beside them
+    std::size_t places = 0;  ///< number of places whose window and at least one window beside it lie in the image
     double fraction = 0;     ///< probability that the range at a place exceeds a range beside one; ties count half
     double error = 0;        ///< standard error of `fraction`
 };

@@ -57,7 +57,9 @@ inline constexpr double kKnown = 4;
 
 /// The source of a candidate's normals.
 struct Proposal {
-    std::vector<Vec3> axes;  ///< by mark: lines along which normals probably lie; empty: unknown
+    /// by mark: the line along which the normal probably lies, with the weight of guess::Constraints::axes; empty:
+    /// unknown
+    std::vector<Vec3> axes;
     guess::Search search = guess::Search::Wide;
     double amplitude = 0;           ///< of VariationalSurface; 0: estimated, which takes three times as long
     const Solid* refine = nullptr;  ///< restricts the body to a band around the surface of this one

@@ -85,7 +85,7 @@ public:
     }
     ~Reader() override {
         stream_.exceptions(std::ios::goodbit);
-        // The stream refers to its metadata, which is destroyed before the stream.
+        // Removes the stream's reference to tags_ before both are destroyed.
         vdb::io::clearStreamMetadataPtr(stream_);
     }
     Reader(const Reader&) = delete;
@@ -93,8 +93,8 @@ public:
 
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
-    /// The name of a grid, with an index if the name is repeated, as OpenVDB's programs print it: "surface[1]" is the
-    /// second grid named "surface".
+    /// The name of a grid, with an index if an earlier grid has the same name, as OpenVDB's programs print it:
+    /// "surface[1]" is the second grid named "surface".
     [[nodiscard]] std::string unique_name(std::size_t n) const {
         std::size_t before = 0;
         for (std::size_t other = 0; other < n; ++other) before += name(other) == name(n) ? 1 : 0;

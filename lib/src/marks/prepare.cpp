@@ -123,8 +123,8 @@ private:
         if (!marks.hints.to_sensor.empty()) marks.hints.to_sensor.resize(marks.points.size());
     }
 
-    /// The contours of one painted label, on the lattice of its image. Null if there are further painted labels or
-    /// contours, which need a common lattice, or if the label has no view.
+    /// The contours of the only painted label, on the lattice of its image. Null if no label is painted, if there are
+    /// further painted labels or contours, which need a common lattice, or if the label has no view.
     std::shared_ptr<const Contours> own_contours(const Marks& marks, const RunContext& run) {
         if (marks.paint.size() != 1 || !marks.contours.empty()) return nullptr;
         const PaintedLabel& label = paint_.label_of(marks.paint.front(), run);

@@ -49,7 +49,7 @@ private:
 
 /// Properties of the slices across one axis.
 struct AxisPaint {
-    std::vector<int> areas;           ///< slices with an area: a patch that is no stroke and wider than one voxel
+    std::vector<int> areas;           ///< slices with an area: a patch that is no stroke and wider than 2 voxels
     std::vector<int> painted;         ///< slices with any paint
     std::vector<std::size_t> voxels;  ///< by painted slice
     std::vector<char> small;          ///< by painted slice: only patches that are neither areas nor strokes

@@ -14,6 +14,7 @@ public:
         std::uint32_t begin, end;
     };
 
+    /// @param points  at most 2^32 - 1
     /// @param edge  edge of a cell, > 0; increased if the points' box would have more than 2^20 cells along an axis
     PointCells(const std::vector<Vec3>& points, double edge);
 

@@ -33,9 +33,9 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
 inline constexpr double kFreeWidth = 7.0;
 
 /// Redistances u for a surface that neither points nor edges will hold, so that its path is the result, not a steady
-/// state. If |grad u| is between kFlattest and kSteepest, voxels next to the front get u / |grad u|, which is accurate
-/// to second order and does not move the front: a ball of 16 voxels moves by less than 0.002. The others get the exact
-/// distance to the front's polygons, which lie within a convex front.
+/// state. Voxels next to the front at which |grad u| is between kFlattest and kSteepest get u / |grad u|, which is
+/// accurate to second order and does not move the front: a ball of 16 voxels moves by less than 0.002. All others get
+/// the exact distance to the front's polygons, which lie within a convex front.
 /// @throws Error InvalidInput if u has no zero level set.
 void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& run);
 

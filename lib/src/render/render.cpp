@@ -126,7 +126,8 @@ private:
     }
 
     /// Puts the planes into the order of ways(). In the first arrangement the second plane is beside the first one and
-    /// has the same vertical axis; in the others its axes are exchanged. Slices are ordered column by column.
+    /// has the same vertical axis; in the others its axes are exchanged, unless they are anatomical. Slices are ordered
+    /// column by column.
     void arrange(int way) {
         if (options_.slices) {
             std::vector<Plane> ordered;

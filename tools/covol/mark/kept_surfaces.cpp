@@ -38,7 +38,7 @@ std::string made_from(const StudyStructure& structure, const StudyOptions& optio
 
 bool is_finite(const Json& json) { return json.is_number() && std::isfinite(json.get<double>()); }
 
-/// The validated KeptSurfaces::Kept::figures of a file. @throws Error InvalidInput
+/// The validated KeptSurfaces::Kept::figures of a file. @throws Error InvalidInput; Json::exception
 Json checked_figures(const Json& from) {
     const auto require = [](bool is_good) {
         if (!is_good) throw Error(Errc::InvalidInput, "kept surface: damaged");

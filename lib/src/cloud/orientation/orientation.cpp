@@ -85,7 +85,8 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         throw Error(Errc::InvalidInput, "points: expected different positions, got the same one for all points");
     Orientation best;
     with_threads(run, [&] {
-        // Normals keep turning because of noise or of thin parts; smaller cells may resolve thin parts.
+        // If normals keep turning, the cause may be noise or thin parts, which are hard to distinguish; smaller cells
+        // may resolve thin parts.
         const double first = first_cell(scale, points);
         // Parts thinner than the first cells require cells as small as the points allow.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);

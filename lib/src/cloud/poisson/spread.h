@@ -1,5 +1,5 @@
 #pragma once
-// Sums of the splines of all points at the nodes of a level.
+// Sums of the points' splines at the nodes of a level.
 #include <tbb/parallel_for.h>
 
 #include <cmath>

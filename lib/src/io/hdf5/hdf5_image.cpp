@@ -92,7 +92,8 @@ private:
         return dataset;
     }
 
-    /// The position of a volume that is stored uncompressed and contiguously, i fastest; empty if it is not.
+    /// The position of a volume that is stored uncompressed and contiguously, i fastest; empty if it has to be read
+    /// in chunks.
     [[nodiscard]] std::optional<PixelPlace> place_in(const Hdf5Dataset& dataset, const PixelRequest& request) const {
         const ChunkedArray& array = dataset.array();
         const std::string& letters = layout_.letters;

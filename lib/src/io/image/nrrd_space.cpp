@@ -87,7 +87,7 @@ std::vector<std::size_t> space_axes(const TextHeader& header, const std::vector<
     return axes.size() == 3 ? axes : std::vector<std::size_t>{0, 1, 2};
 }
 
-/// The unit of each axis, as a multiple of the unit of the first axis; 0 if it is unknown.
+/// The unit of each axis, as a multiple of the unit of the first axis; 0 if it is unknown, 1 if there is none.
 Vec3 unit_factors(const std::array<std::string, 3>& units) {
     Vec3 factors{1, 1, 1};
     const double first = unit_in_metres(units[0]);

@@ -56,7 +56,7 @@ private:
     mutable std::mutex mutex_;
     std::list<Key> order_;  ///< most recently used first
     std::unordered_map<Key, Entry, Hash> entries_;
-    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< a chunk of fill values per source
+    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< by source: fill values, for all missing chunks
     std::uint64_t bytes_ = 0, decoded_ = 0;
 };
 
