@@ -101,7 +101,7 @@ public:
         port_ = acceptor_.local_endpoint().port();
         hub_.rules.authorities = allowed_authorities(port_, hub_.options.authorities);
         hub_.rules.token = random_secret();
-        hub_.rules.cookie = random_secret();  // not the token, because links are stored, such as in histories
+        hub_.rules.cookie = random_secret();  // not the token, because links appear in histories and process lists
         hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
         hub_.rules.live_path = hub_.options.live_path;
         hub_.rules.may_be_framed = !hub_.options.frame_origins.empty();

@@ -18,9 +18,9 @@
 // A coarse solve of the whole domain gives every brick its start. A brick is solved together with some layers of voxels
 // of its neighbours; the outermost of these layers are fixed to the neighbours' last results (the alternating method of
 // Schwarz, 1870; for all bricks at once: Lions, On the Schwarz alternating method, 1988). Sweeps over the bricks are
-// repeated until the surfaces of neighbours agree in the layers that both have computed. All bricks lie on one lattice
-// and each of its leaves belongs to at most one brick, so that the joined level set is a union of leaves; near the
-// border of two bricks its values are the weighted mean of both results.
+// repeated until the surfaces of neighbours agree near the faces between them. All bricks lie on one lattice and each
+// of its leaves belongs to at most one brick, so that the joined level set is a union of leaves; near the border of two
+// bricks its values are the weighted mean of both results.
 namespace covol {
 
 struct BrickOptions {
@@ -104,8 +104,9 @@ private:
     std::unique_ptr<Parts> parts_;
 };
 
-/// The maximum distance, in voxels, between the surfaces of a brick and of its neighbours, in the voxels that the
-/// states of both contain.
+/// The maximum distance, in voxels, between the surfaces of a brick and of its neighbours, in the three layers of
+/// voxels on each side of the faces between their cores. kHalfWidthVoxels if a state is missing or a surface lies
+/// outside the other state's band.
 [[nodiscard]] COVOL_API double measure_seams(const BrickPlan& plan, std::size_t brick, const BrickStates& states);
 
 }  // namespace covol

@@ -15,7 +15,8 @@ class Creases;
 struct CloudReport {
     double spacing = 0;          ///< CloudScale::spacing
     double turned = 0;           ///< Orientation::turned
-    double noise = 0;            ///< median over the local quadrics of the standard deviation of their points
+    double noise = 0;            ///< median over the local quadrics of the standard deviation of their points;
+                                 ///< CloudScale::noise if there are no quadrics
     double radius = 0;           ///< median radius of the neighbourhoods to which the quadrics were fitted
     double nearest = 0;          ///< CloudScale::nearest
     double near_reach = 0;       ///< CloudScale::near_reach

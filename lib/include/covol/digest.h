@@ -7,8 +7,8 @@ namespace covol {
 
 /// A digest of the content, which distinguishes inputs of the same name: "xxh128:HEX" of a file, as xxh128sum prints
 /// it; "xxh128-of-pieces:HEX" of a file above 64 MiB, from 64 evenly spaced pieces of 1 MiB, which include its first
-/// and last byte; "xxh128-of-metadata:HEX" of a folder such as a Zarr store, from its files .zarray, .zattrs, .zgroup
-/// and zarr.json, ordered by their paths.
+/// and last byte; "xxh128-of-metadata:HEX" of a folder such as a Zarr store or a study, from its files .zarray,
+/// .zattrs, .zgroup, zarr.json and journal.jsonl, ordered by their paths.
 /// @throws Error Io.
 [[nodiscard]] COVOL_API std::string digest_of(const std::string& path);
 

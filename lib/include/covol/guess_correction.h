@@ -70,8 +70,9 @@ public:
     /// Signed distance of the guess; negative inside.
     [[nodiscard]] COVOL_API double guess(const Vec3& world) const;
     [[nodiscard]] COVOL_API const CorrectionReport& report() const;
-    /// Applies the correction to a mask. Voxels with value 0 that are now inside get `label`, voxels with `label` that
-    /// are now outside get 0; all other voxels, including those with another label, keep their value.
+    /// Applies the correction to a mask. Of the voxels whose side of the surface changes, those with value 0 that are
+    /// now inside get `label`, and those with `label` that are now outside get 0; all other voxels, including those
+    /// with another label, keep their value.
     /// @throws Error InvalidInput (values that are not whole numbers).
     [[nodiscard]] COVOL_API CorrectedMask apply(const Image& mask, int label, const RunContext& run = {}) const;
     /// The corrected surface as a start on the guess's lattice: a signed distance, clamped.

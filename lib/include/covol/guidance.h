@@ -18,7 +18,7 @@ struct GuidanceOptions {
     /// voxel
     std::optional<double> mark_precision;
     /// maximum distance from the guess within which the border is searched, >= 0: twice the assumed standard deviation
-    /// of the guess; automatic: from the distance to the marks
+    /// of the guess; automatic: from the distance to the marks, and the deviation also from the image
     std::optional<double> range;
     /// upper limit of the root mean square error of the guess divided by the distance from the nearest mark, >= 0, if
     /// it was measured; automatic: no limit; the estimate from the image is too large if the image shows another border

@@ -152,8 +152,8 @@ public:
     COVOL_API static Image from_values(const ImageGeometry& geometry, const float* values);
     COVOL_API static Image from_values(const ImageGeometry& geometry, const std::uint8_t* values);
     /// An image that uses the given voxels without a copy; they must not change during the lifetime of the image.
-    /// @throws Error InvalidInput (no voxel, an invalid spacing or origin, values that are not finite), Unsupported
-    ///     (axes that are not perpendicular).
+    /// @throws Error InvalidInput (fewer than two voxels along an axis, an invalid spacing or origin, values that are
+    ///     not finite), Unsupported (axes that are not perpendicular).
     [[nodiscard]] COVOL_API static Image from_view(const ImageGeometry& geometry, const VoxelView& voxels);
     /// The held voxels, without a copy; none for an image whose chunks are read on request.
     [[nodiscard]] COVOL_API std::optional<VoxelView> view() const;

@@ -42,7 +42,8 @@ public:
     /// A range that contains all values; none if that requires evaluating the voxels. It is stored as the display range
     /// of ImageJ.
     [[nodiscard]] virtual std::optional<std::array<double, 2>> range() const;
-    /// Called after a box was written, from several threads at once; each voxel of the file is in one such box.
+    /// Called when the values of a box are known, before they are written, from several threads at once; each voxel of
+    /// the file is in exactly one such box.
     /// @param values  of the box; null: all voxels have the value `uniform`
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
     /// Key/value pairs, for NRRD. Called before and after the voxels are written: the second time the texts may be

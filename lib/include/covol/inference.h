@@ -42,7 +42,8 @@ struct InferenceReport {
     std::size_t held_out = 0;  ///< number of held-out marks used for these measurements
     /// Marks that are probably wrong, with their original positions; the body is computed without them.
     std::vector<Vec3> wrong_marks;
-    std::optional<ExpectedDice> expected;  ///< none if there were too few held-out marks
+    /// none if there were too few held-out marks, or if the body was rejected because it misses many marks
+    std::optional<ExpectedDice> expected;
 };
 
 struct Inferred {
@@ -55,8 +56,8 @@ struct Inferred {
 /// Computes the body from marks and image together, for cases in which a guess from the marks alone may be wrong.
 ///
 /// The image's gradients give the normals at the marks up to their signs; the appearance of inside and outside is
-/// estimated on both sides of the marks. The resulting log odds define the body, which is the global optimum of a
-/// convex problem; its normals are used in the next round (lib/src/inference/candidate.h). Held-out marks show how
+/// estimated on both sides of the marks. The body of minimum surface with the resulting log odds is the global optimum
+/// of a convex problem; its normals are used in the next round (lib/src/inference/candidate.h). Held-out marks show how
 /// reliable body and guess are. Marks count as wrong if there are several that are far from the body whether or not
 /// they are held out. The guess is kept in these cases: it agrees with the body and predicts held-out marks as well as
 /// the body, within one standard error; it does not agree, but predicts them better by two standard errors; the body
@@ -78,8 +79,8 @@ struct Redrawn : RedrawnGuess {
 
 /// Redraws the parts of a guess that are wrong according to the marks. The appearance of inside and outside is
 /// estimated from the parts of the guess that no mark contradicts. Around each mark that the guess misses, within a few
-/// times the distance between both, the guess is replaced by the body that follows from these log odds. No unconnected
-/// pieces or voids are added.
+/// times the distance between both, the guess is replaced by the body of minimum surface with the log odds that follow
+/// from this appearance. No unconnected pieces or voids are added.
 /// @param guess  a start: a signed distance, clamped
 /// @param marks  world positions on the surface
 /// @throws Error Cancelled.

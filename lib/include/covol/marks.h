@@ -100,7 +100,8 @@ COVOL_API Marks& find_or_add_structure(std::vector<Marks>& structures, const std
 /// structure without a name.
 COVOL_API void add_paint(std::vector<Marks>& structures,
                          const std::vector<std::shared_ptr<const PaintedImage>>& images);
-/// Gives each structure its value in masks: that of its painted label, or else a value that is not used.
+/// Gives each structure whose `label` is 0 its value in masks: that of its painted label in a shared image if no other
+/// structure has it, else a value that is not used.
 COVOL_API void number_labels(std::vector<Marks>& structures);
 
 /// How marks are converted to the input of segment().
@@ -132,8 +133,8 @@ struct StructureInput : StructureFacts {
 /// name; for more than four structures only warnings are logged.
 /// @param options  for all structures; voxel_size has a value
 /// @throws Error InvalidInput (names that are empty or not unique if there are several structures; as clean_cloud(),
-/// densify(),
-///     understand_painted() and check_inside()), InvalidOptions (a tag distance above the diagonal of the marks' box).
+///     densify(), understand_painted() and check_inside()), InvalidOptions (a tag distance above the diagonal of the
+///     marks' box).
 [[nodiscard]] COVOL_API std::vector<StructureInput> prepare_marks(std::vector<Marks> structures,
                                                                   const std::optional<ImageGeometry>& image,
                                                                   const SegmentOptions& options,

@@ -19,7 +19,7 @@ struct VertexAttribute {
 };
 
 struct WriteMeshOptions {
-    bool binary = true;  ///< for PLY and STL; else text
+    bool binary = true;  ///< for PLY and STL; false: these are written as text
     /// rotates from z up to y up: (x,y,z) -> (x,z,-y); none: only for .glb, whose y axis points up
     std::optional<bool> y_up;
     double unit_scale = 1.0;            ///< factor of the coordinates, for example 0.001 for mm to m

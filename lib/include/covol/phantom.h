@@ -13,7 +13,7 @@ namespace covol {
 struct PhantomOptions {
     std::string kind = "sphere";  ///< sphere, torus, box, two-spheres, sphere-round, sphere-square, sphere-slit
     int size = 128;               ///< voxels along each axis, >= 16
-    int point_count = 3000;  ///< number of points on the true surface; for the spheres with holes, without the holes
+    int point_count = 3000;  ///< number of points on the true surface; for the spheres with holes, in the holes only
     double noise = 0.0;      ///< standard deviation of additive Gaussian noise, in units of the contrast
     std::uint64_t seed = 1;
 };

@@ -199,7 +199,9 @@ struct SegmentReport {
     /// Marks that are far from the surface: they are wrong, or a part of the structure is missing.
     struct MarksOff {
         std::size_t count = 0;
-        double beyond = 0;  ///< distance from which on marks count: twice the widest voxel, or 4 times a cloud's noise
+        /// distance from which on marks count, world units: twice the widest voxel, or 4 times a cloud's noise if that
+        /// is more
+        double beyond = 0;
         double farthest = 0;  ///< maximum distance of all marks, world units
         Vec3 farthest_world{0, 0, 0};
         Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without an image, as farthest_world

@@ -74,7 +74,9 @@ public:
 private:
     struct Last {
         std::string name;
-        FloatGridPtr surface;  ///< without a flow SegmentResult::u, else the extracted surface
+        /// without a flow SegmentResult::u, because redistancing would move its edges slightly; else the extracted
+        /// surface
+        FloatGridPtr surface;
         std::optional<double> delta;
         std::optional<SurfaceTemplate> look;  ///< for a surface that was not moved by a flow
     };

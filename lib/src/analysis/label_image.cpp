@@ -87,7 +87,8 @@ private:
         for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
         return all;
     }
-    /// The distinct structures of the six neighbours, ascending: both structures beside a slit of one voxel's width.
+    /// The distinct structures of the six neighbours, ascending. At a slit of zero width, both structures beside it are
+    /// among them.
     [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
         std::vector<std::size_t> found;
         const Index3 here{i, j, k};

@@ -84,7 +84,7 @@ bool are_near(const VoxelBox& a, const VoxelBox& b, int voxels) {
 
 std::vector<Brick> split(const Domain& domain, const FloatGrid& coarse, const BrickOptions& options) {
     std::vector<Place> places = places_of(domain, coarse);
-    // A band has the same width in voxels on both lattices, so its volume grows with the square of the factor.
+    // A band has the same width in voxels on both lattices, so its number of voxels grows with the factor squared.
     const double factor = coarse.voxelSize()[0] / domain.voxel_size;
     Splitter splitter(domain, factor * factor, options);
     splitter.split({domain.min, domain.max}, places.begin(), places.end());

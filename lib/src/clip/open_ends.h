@@ -19,8 +19,8 @@ struct ImageFace {
 [[nodiscard]] bool on_end_slice(const ImageFace& face, const Vec3& x);
 
 /// Copies of the points on each end slice, shifted beyond the face in steps of the slice distance up to `length`. They
-/// continue the section, and copies of marks inside the section close it. A surface that leaves the image at a shallow
-/// angle is not closed: the flood fill passes above it.
+/// continue the section, and copies of marks inside the section close it beyond the face. The flood fill can therefore
+/// pass above a surface that leaves the image at a shallow angle, between it and the face.
 [[nodiscard]] std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                            double length);
 

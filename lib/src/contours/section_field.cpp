@@ -298,7 +298,8 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     for (int a = 0; a < 3; ++a) volume *= box.max[a] - box.min[a];
     for (const Section& section : sections) area += area_within(section.plane, box);
     plane_distance_ = area > 0 ? volume / area : longest_side(box);
-    // The box extends by the planes' distance beyond the sections; its border is outside.
+    // The box extends by the planes' distance beyond the sections, and its border is outside, so that the body ends
+    // halfway to the next plane, as between slices.
     double nodes = 1;
     for (int a = 0; a < 3; ++a) {
         box.min[a] = origin[a] + h * std::floor((box.min[a] - plane_distance_ - origin[a]) / h);

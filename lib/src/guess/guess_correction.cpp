@@ -122,8 +122,8 @@ Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, st
     for (std::size_t n = 0; n < targets.size(); ++n) {
         surface.push_back(targets[n].at);
         if (n < marks) continue;
-        // The surface is placed beyond a seed, in any direction: the hull contains positions around it, twice as far
-        // away.
+        // The surface is placed kVoxelEnd beyond a seed, in any direction. The hull therefore contains positions around
+        // the seed at twice that distance.
         for (int a = 0; a < 3; ++a)
             for (const int side : {-1, 1}) {
                 surface.push_back(targets[n].at);

@@ -13,13 +13,14 @@ inline constexpr int kStepsPerVoxel = 4;
 inline constexpr int kBorderSteps = 10;
 inline constexpr int kDepths = 2 * kBorderSteps + 1;
 inline constexpr int kLevels = 24;  ///< number of levels of intensity
-/// [voxels] Distance to which profiles are read on both sides of the surface: the maximum offset plus kBorderSteps.
+/// [voxels] Distance on both sides of the surface that a profile at the maximum offset needs: that offset plus
+/// kBorderSteps.
 inline double profile_reach() { return kGuide.farthest + double(kBorderSteps) / kStepsPerVoxel; }
 
 /// Intensity along the normals of one patch: each row belongs to a vertex, from `lo` to `hi` steps outward of it.
 struct PatchProfile {
     int lo = 0, hi = -1;
-    bool image_ends_below = false, image_ends_above = false;  ///< the profile ends at the image's boundary
+    bool image_ends_below = false, image_ends_above = false;  ///< the image ends there; the border may lie beyond
     int rows = 0;
     std::vector<float> values;  ///< row by row
     std::vector<float> seen;    ///< [step][level]: number of rows with that level at that step

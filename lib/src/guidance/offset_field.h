@@ -29,7 +29,8 @@ public:
     };
     /// @param mean, deviation  the prior, by patch
     /// @param evidence         by patch
-    /// @param fixed, fixed_precision  offsets known from marks and their 1 / variance, by patch; precision 0: unknown
+    /// @param fixed, fixed_precision  other known offsets, such as those of marks, and their 1 / variance, by patch;
+    /// precision 0: unknown
     /// @param shift  a change of the prior's mean, for Fit::carried; may be null
     [[nodiscard]] Fit fit(const std::vector<double>& mean, const std::vector<double>& deviation,
                           const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,

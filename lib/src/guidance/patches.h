@@ -50,7 +50,8 @@ void find_borders(SurfaceVertices&& vertices, Patches& patches);
 [[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
                                               const std::vector<double>& by_patch);
 
-/// The root mean square of the edges of the image's voxels, weighted by the components of a unit vector.
+/// The root mean square of the edges of the image's voxels, weighted by the squared components of a unit vector along
+/// them.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);
 
 }  // namespace covol::guidance

@@ -152,8 +152,9 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
     const Field level = coarse_body_.level();
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
+    // The smaller one of the distances from the bodies that were computed with and without the mark.
     std::vector<double> off;
-    for (std::size_t i = 0; i < held.marks.size(); ++i)  // from the bodies computed with and without this mark
+    for (std::size_t i = 0; i < held.marks.size(); ++i)
         off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
     const std::vector<double> wrong = probability_wrong(off, anywhere, kUniformDeviation * coarse_cell());
     std::vector<Vec3> suspects;

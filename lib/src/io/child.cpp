@@ -236,7 +236,7 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     wait_for(child, alive.from, batch, seconds, run);
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
-    if (batch.slots[n].now() != kBegun)  // no file was read yet: loading the libraries failed, which start threads
+    if (batch.slots[n].now() != kBegun)  // not the file's fault: the libraries start threads when they are loaded
         throw Error(Errc::Io, program +
                                   ": the reader process ended before it could read a file; "
                                   "allow more processes, threads or memory");

@@ -7,7 +7,7 @@
 // Lengths and positions that floating-point numbers represent well, for files of any kind.
 namespace covol::detail {
 
-// Their cubes, which are volumes, are also valid in single precision.
+// The cubes of these lengths are volumes, which are also valid in single precision: some are stored in it.
 constexpr double kMinLength = 1e-12, kLargestLength = 1e12;
 // Distance from 0, in voxels, at which double precision still resolves a millionth of a voxel.
 constexpr double kFarthestVoxel = 4294967296.0;

@@ -105,7 +105,8 @@ public:
 private:
     [[nodiscard]] double h() const { return marks_options_.contours.step; }
 
-    /// Adds contours in planes of several directions: their lines as marks, and positions in their sections as seeds.
+    /// Adds contours in planes of several directions: their lines as marks, and positions inside and outside of their
+    /// sections as seeds.
     static void add_network(const Contours& network, Marks& marks, SegmentOptions& options) {
         const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
             list.insert(list.end(), more.begin(), more.end());

@@ -16,10 +16,10 @@
 
 namespace covol::meshing {
 
-/// The surface on which extract_mesh() places its vertices: the isosurface of an interpolated grid, cut
-/// off at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second differences along its
-/// edges, which makes it third-order; without the correction its error is up to h^2/8 times the second derivative along
-/// each axis. Use one object per thread.
+/// The surface whose crossings with the lattice's edges extract_mesh() approximates by linear interpolation: the
+/// isosurface of an interpolated grid, cut off at the faces of a clip. Within a cell the trilinear interpolant is
+/// corrected by the second differences along its edges, which makes it third-order; without the correction its error is
+/// up to h^2/8 times the second derivative along each axis. Use one object per thread.
 class Level {
 public:
     /// @param grid  kept by reference. @param clip  which layers of the grid represent the faces of a cut.

@@ -70,8 +70,9 @@ private:
     CGAL::AABB_tree<CGAL::AABB_traits<Cartesian, Primitive>> tree_;
 };
 
-/// Several trees, each of consecutive triangles, most of which are close together. CGAL builds a tree on one thread, so
-/// several trees are built in parallel. Each additional tree costs a query one test of its root.
+/// Several trees, each of consecutive triangles, most of which are close together. CGAL builds a tree on one thread,
+/// and smaller trees faster, so several trees are built in parallel. Each additional tree costs a query one test of its
+/// root.
 std::vector<std::unique_ptr<TriangleTree>> trees_of(const TriangleMesh& mesh) {
     constexpr std::size_t kTriangles = 1 << 17;
     const std::size_t count = mesh.triangles.size();

@@ -31,7 +31,7 @@ using Tag = CGAL::Parallel_tag;
 constexpr std::size_t kFewest = 7;  // minimum number of points: each then has six neighbours
 
 class Cleaner {
-    // point_map_ and not_cancelled_ are members because CGAL keeps references to its arguments.
+    // See not_cancelled_ about how CGAL stores its arguments.
     [[nodiscard]] auto parameters() const { return CGAL::parameters::point_map(point_map_).callback(not_cancelled_); }
 
 public:

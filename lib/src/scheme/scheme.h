@@ -111,7 +111,8 @@ struct SchemeKernels {
 /// boundary is elsewhere) take the value of the nearest voxel inside.
 void mirror_outside(float* padded_values, const int lo[3], const int hi[3]);
 
-/// Sets the coefficients of faces on the boundary lo..hi, and all coefficients of voxels outside of it, to 0.
+/// Removes the faces on the boundary lo..hi from the rows: their coefficients become 0, and the others of the same row
+/// are scaled accordingly. All coefficients of voxels outside of the boundary become 0.
 void close_faces(Fraction* c, const int lo[3], const int hi[3]);
 
 /// The fastest kernels that this processor supports; COVOL_SIMD=baseline|avx2|avx512 in the environment selects others.

@@ -10,7 +10,7 @@ namespace covol::pipeline {
 /// Marks by what they are used for; world units.
 struct MarkSets {
     std::vector<Vec3> attracting;  ///< all marks that attract, including points interpolated between slices of contours
-    std::vector<Vec3> trusted;     ///< the attracting marks that are not interpolated
+    std::vector<Vec3> trusted;     ///< the attracting marks that are not interpolated between slices
 };
 
 /// The input of one structure, as given. The objects that it refers to must outlive it.

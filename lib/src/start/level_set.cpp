@@ -19,7 +19,7 @@
 namespace covol {
 namespace {
 
-/// `other` on the lattice of `first`; null if no part of it lies in the domain of `first`.
+/// `other` on the lattice of `first`. @throws Error InvalidInput if none of its surface lies in the domain of `first`.
 FloatGridPtr on_lattice_of(const LevelSet& first, const LevelSet& other, const RunContext& run) {
     const Domain domain = first.domain();
     return domain == other.domain() ? other.grid().deepCopy() : start_from_grid(domain, other.grid(), run);

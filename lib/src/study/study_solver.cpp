@@ -204,7 +204,7 @@ struct StudySolver::State {
             }
             SegmentOptions first = refined;
             first.evolve.rho = 0;
-            first.without_mesh = first.without_fields = true;  // meshing and relaxing would take as long as the surface
+            first.without_mesh = first.without_fields = true;  // a relaxed mesh would take as long as the surface
             Marks moved = marks;
             const auto before = newest(result.structure);
             if (before) {

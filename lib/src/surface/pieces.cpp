@@ -24,7 +24,7 @@ using detail::DisjointSets;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The 6-connected pieces of the active voxels of one sign. A part is the intersection of a connected set with one
+/// The 6-connected pieces of the active voxels of one sign. A part is a set of them that is 6-connected within one
 /// leaf.
 class ActivePieces {
 public:
@@ -126,7 +126,7 @@ public:
     }
 
     /// Changes the sign of those regions of one sign that have fewer than `minimum` points within a voxel, except the
-    /// region with the most active voxels and the surrounding space. @return the number of changed regions
+    /// region with the largest number of active voxels and the surrounding space. @return the number of changed regions
     std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t minimum) {
         std::vector<Label> roots;
         for (Label n = 0; n < parents_.size(); ++n)

@@ -197,7 +197,7 @@ std::vector<SliceContour> outline_slices(const FloatGrid& surface, const ImageGe
     const double h = surface.voxelSize()[0];
     std::array<int, 2> parts{};
     for (std::size_t a = 0; a < 2; ++a)
-        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // 1 if spacing and h are equal
+        parts[a] = std::max(1, int(std::ceil(geometry.spacing[a] / h * (1 - 1e-6))));  // 1 if equal up to rounding
     with_threads(run, [&] {
         tbb::parallel_for(0, geometry.size[2], [&](int k) {
             if (run.cancelled() || !(k >= reach.low[2] && k <= reach.high[2])) return;

@@ -34,7 +34,7 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
 /// The distance at which the main cores are closed, voxels; 0 if only pockets are enclosed.
 struct MainCores {
     double saddle = 0;
-    double peak = 0;  ///< of the core with the largest volume
+    double peak = 0;  ///< of the significant core with the largest full_volume()
     int cores = 0;
 };
 

@@ -21,7 +21,7 @@ struct BrickCall {
 /// Removes the arguments of `brick` from `words`, the arguments after the program's name. The remaining ones are the
 /// command line of segment or reconstruct; for run and join, the settings and inputs of the plan are added.
 /// @param program  defines the commands whose options a plan may name
-/// @return nullopt, with `words` unchanged, if the command is not `brick`.
+/// @return nullopt, with `words` unchanged, unless they begin with `brick` and the name of a step.
 /// @throws UsageError, Error InvalidInput, Unsupported (the plan contains more than settings and inputs), Io.
 [[nodiscard]] std::optional<BrickCall> take_brick_call(std::vector<std::string>& words, const CLI::App& program);
 

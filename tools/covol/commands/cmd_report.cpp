@@ -17,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // of the evidence of marks; as their automatic attraction range
+constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // reach of marks as evidence: their automatic attraction range
 
 /// One level set of the file, and the marks and evidence that it is compared with.
 struct Shown {

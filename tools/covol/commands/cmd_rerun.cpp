@@ -145,6 +145,7 @@ private:
     }
 
     /// A value such as NAME=marks_{frame}.csv with the folder of the inputs that match it; empty if no input matches.
+    /// @throws Error if these inputs are in several folders
     [[nodiscard]] std::string placed_frames(const std::string& value, std::size_t begin) const {
         const auto parts = around_frame(value.substr(begin));
         std::string folder;

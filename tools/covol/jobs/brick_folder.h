@@ -10,9 +10,9 @@
 
 namespace covol::tool {
 
-/// The folder of a job in bricks. It contains plan.json, coarse.vdb, and for each sweep N and brick B its state in
-/// sweep-N/brick-B.vdb, and sweep-N/brick-B.json, which exists when brick B has been solved. Files are written
-/// completely or not at all, and are never replaced.
+/// The folder of a job in bricks. It contains plan.json, coarse.vdb, and for each sweep N and brick B the file
+/// sweep-N/brick-B.json, which exists when the sweep is done for the brick, and the state of the brick in
+/// sweep-N/brick-B.vdb if the sweep changed it. Files are written completely or not at all, and are never replaced.
 class BrickFolder {
 public:
     explicit BrickFolder(std::string path) : path_(std::move(path)) {}

@@ -137,7 +137,7 @@ std::string about_voxels(std::int64_t count) {
 }
 
 /// Whether the mesh has to be streamed, because of --plain or to save memory.
-/// @throws Error if the memory does not suffice even then
+/// @throws Error if the memory does not suffice even then, or if the mesh would have to be streamed but cannot be
 bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
     if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;

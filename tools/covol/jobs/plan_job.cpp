@@ -27,7 +27,7 @@ constexpr double kGuessBandBytes = 335;  ///< instead of kBandBytes if a guess i
 constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and in total
 constexpr double kFlowTime = 1.3;                                ///< time of a flow with an image / without one
 constexpr double kGuessTime = 2.8;    ///< the same for a guess; includes estimating the appearance at the marks
-constexpr double kPilotVoxels = 128;  ///< along the marks' bounding box, on the finer of the two lattices
+constexpr double kPilotVoxels = 128;  ///< along the longest side of the marks' box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< distance from the surface within which the image is sampled
 constexpr double kGuessVoxels = 25;   ///< the same for a guess; this part of the image is smoothed
 constexpr double kGuessBytes = 8;     ///< memory for each voxel of that part, for two copies

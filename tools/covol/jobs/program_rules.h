@@ -36,8 +36,8 @@ struct Advice {
 /// The program's rules that apply to the file, in the table's order.
 [[nodiscard]] std::vector<Advice> advice_for(Program program, const FileFacts& facts);
 
-/// The text after `key`, up to the next blank, in the first 64 KiB of a file; empty if `key` does not occur. For text
-/// headers of meshes and images whose files have been read, and so validated, before.
+/// The first word of letters and digits after `key` in the first 64 KiB of a file; empty if `key` does not occur. For
+/// text headers of meshes and images whose files have been read, and so validated, before.
 [[nodiscard]] std::string word_in_header(const std::string& path, const std::string& key);
 [[nodiscard]] bool header_holds(const std::string& path, const std::string& text);
 

@@ -37,7 +37,8 @@ struct SegmentJob {
     ImageFlags image;
     PointFlags points;
     ContourFlags contours;
-    std::string structure_column;  ///< column with the structure of each mark; empty: a file has one structure
+    /// Column with the structure of each mark; empty: a file has one structure, unless it is a DICOM structure set.
+    std::string structure_column;
     std::shared_ptr<SharedMarks> shared = std::make_shared<SharedMarks>();
     PaintedFlags painted;
     SeedFlags seeds;

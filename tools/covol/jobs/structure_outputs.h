@@ -20,7 +20,7 @@ namespace covol::tool {
 struct StructureOutput : StructureResult {
     std::optional<Evidence> evidence;
     std::optional<IntensityStatistics> intensity;  ///< inside the surface
-    std::optional<CorrectedMask> corrected;        ///< if the guess is a mask with the geometry of the image
+    std::optional<CorrectedMask> corrected;        ///< for --mask, if the guess is a mask with the image's geometry
     [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
 };
 
@@ -44,7 +44,7 @@ struct StructuresOutput {
 [[nodiscard]] bool is_density_in_output(const SegmentJob& job);
 [[nodiscard]] std::string density_name(const StructuresOutput& output, const StructureOutput& structure);
 
-/// Called with the tagged name of each requested output, and the function that writes it.
+/// Called with the tagged name of an output, empty if it is not requested, and the function that writes it.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
 void queue_outputs(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                    Session& session, const Sink& sink);

@@ -58,7 +58,7 @@ public:
 
 private:
     struct Solved {
-        std::shared_ptr<const StudyStructure> from;  ///< state of the structure that was solved; null: none
+        std::shared_ptr<const StudyStructure> from;  ///< state that was passed to the solver last; null: none
         std::uint64_t requested = 0;                 ///< sequence number of the study at the last request to the solver
         Json reported;                               ///< the last result, as sent to pages; null: none
         std::uint64_t version = 0;

@@ -35,7 +35,7 @@ GivenMarks to_marks(const py::handle& name, const py::handle& inputs) {
 }
 
 /// @param marks    inputs of each structure, by name
-/// @param painted  the label image or None, its label of the outside, and whether its labels are slices or scribbles
+/// @param painted  the label image or None, its label of the outside, and "auto", "slices" or "scribbles"
 /// @return the results, and for each overlap the indices of both structures, the common volume in world units^3, and
 ///     the index of the structure that was carved out of the other, or None
 py::tuple run_job(const char* function, const std::optional<Image>& image, const py::dict& marks,

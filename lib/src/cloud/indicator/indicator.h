@@ -36,7 +36,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(StackField field);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
 
-/// The indicator of the orientation's normals and areas, computed with the given cell size.
+/// The indicator of the orientation's normals and areas, computed with the cell size indicator_cell(points, cell).
 [[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points,
                                                             const Orientation& orientation, double cell,
                                                             const RunContext& run);

@@ -33,7 +33,7 @@ double bare_fraction(const CloudOrientation& cloud) {
 bool does_enclose(const CloudOrientation& cloud) {
     return doubt(cloud.orientation) < kOrientation.settled || bare_fraction(cloud) < kOrientation.bare;
 }
-/// Recomputes the indicator with smaller cells if they are too large for the detail of the normals.
+/// Recomputes the indicator with smaller cells if its cells are too large for the detail of the normals.
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double noise = cloud.scale.noise, spacing = cloud.scale.spacing;
@@ -70,7 +70,7 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 }
 
 /// For points that enclose nothing with their current orientation: orients them by views, unless the surface from views
-/// misses many more points than the current one.
+/// misses many more points than the current one, and the current one is not mostly bare or misses few points.
 /// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);

@@ -21,8 +21,9 @@ namespace covol::cloud {
 
 /// Sets result.screened, an indicator that is also fitted to 1/2 at the points (Kazhdan and Hoppe, Screened Poisson
 /// surface reconstruction, ACM Trans. Graph. 32(3), 2013), so that even sheets that enclose nothing lie at 1/2. Normals
-/// on the same side as those of result.indicator are replaced by them.
-/// @param is_free  for each point, whether it is excluded from that fit; empty: none is
+/// on the same side as those of result.indicator are replaced by them; points with other normals are excluded from that
+/// fit, and result.turned is their fraction.
+/// @param is_free  for each point, whether it is excluded from that fit as well; empty: no further points are
 /// @param start    initial value; null: none
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
                   const StackField* start, Orientation& result, const RunContext& run);

@@ -9,12 +9,12 @@
 
 namespace covol::cloud {
 
-/// Adds row(spline, point, i, j), a Float4, to the four nodes in row (i, j) of the 4^3 nodes around each point of level
-/// l. The order of summation does not depend on the number of threads.
+/// Adds row(spline, point, i, j), a Float4, to the four nodes in row (i, j) of the 4^3 nodes of level l around each
+/// point whose spline reaches that level. The order of summation does not depend on the number of threads.
 template <typename Row>
 void spread_on(const GridStack& stack, const std::vector<Vec3>& points, std::size_t l, std::vector<float>& nodes,
                Row row) {
-    constexpr std::size_t kSide = 12;  // nodes -1 to 9 relative to a block, and one more so that rows of 4 fit
+    constexpr std::size_t kSide = 12;  // nodes -1 to 9 relative to a block, rounded up to a multiple of 4
     const GridLevel& level = stack.levels()[l];
     for (const std::vector<std::uint32_t>& colour : level.source_colours)
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, colour.size(), 4), [&](const auto& some) {

@@ -248,7 +248,8 @@ public:
     }
 
 private:
-    /// Approximate distance from the indicator's level 1/2, limited to the range -limit to limit.
+    /// Approximate distance from the indicator's level 1/2, limited to the range -limit to limit, whose ends only
+    /// distinguish inside and outside.
     [[nodiscard]] double indicator_distance(const Vec3& world, double limit) const {
         const Indicator::Sample at = indicator_.at(world);
         const double off = 0.5 - at.inside, beyond = (std::abs(off) - kBlend.sure) / kBlend.sure;

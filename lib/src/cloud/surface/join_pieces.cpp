@@ -39,7 +39,7 @@ struct Piece {
     }
 };
 
-/// The pieces of a mesh without cavities, the largest first.
+/// The pieces of a mesh except cavities, the largest first.
 std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     detail::DisjointSets joined(mesh.vertices.size());
     for (const auto& t : mesh.triangles)

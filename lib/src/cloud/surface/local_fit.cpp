@@ -95,7 +95,8 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
     const Vector6 first = solver.solve(Vector6::Unit(0));
-    const FitResidual residual = fit_residual(near, x.data());  // squares are weighted by counts
+    // Squares are weighted by counts because the variance of a mean of c points is 1 / c of the points' variance.
+    const FitResidual residual = fit_residual(near, x.data());
     const double effective = sums.near * sums.near / sums.near_squares;
     if (effective < 7) return result;
     result.noise = r * std::sqrt(residual.squares / residual.near * effective / (effective - 6));

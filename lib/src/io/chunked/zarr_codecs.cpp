@@ -148,7 +148,7 @@ constexpr std::array<std::uint32_t, 256> crc32c_table() {
 }  // namespace
 
 ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
-    // In Zarr 3, the names of Zarr 2's codecs have this prefix.
+    // In Zarr 3, the names of Zarr 2's codecs have this prefix, unless Zarr 3 specifies the codec itself.
     constexpr const char* kPrefix = "numcodecs.";
     const std::string own = name.starts_with(kPrefix) ? name.substr(std::string_view(kPrefix).size()) : name;
     if (own == "blosc") return ZarrCodec::Blosc;

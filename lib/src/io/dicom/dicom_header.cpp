@@ -61,7 +61,7 @@ constexpr Representation kRepresentations[] = {
 /// "UN" (unknown) is accepted for all tags.
 bool has_expected_vr(std::uint32_t tag, std::string_view vr) {
     if (vr == "UN") return true;
-    // The descriptors of palettes (tags 0028,1101 to 1103) may be signed numbers.
+    // The descriptors of palettes (tags 0028,1101 to 1103) are signed if the pixels are.
     if (vr == "SS" && tag >= 0x00281101 && tag <= 0x00281103) return true;
     const auto* known = std::lower_bound(std::begin(kRepresentations), std::end(kRepresentations), tag,
                                          [](const Representation& r, std::uint32_t t) { return r.tag < t; });

@@ -6,7 +6,8 @@
 #include "io/dicom/dicom_elements.h"
 #include "io/dicom/dicom_slices.h"
 
-// The patient, the study and the series that results of an image belong to, as recorded in SEG and RTSTRUCT files.
+// The patient, the study and the series of the image from which results were computed, as recorded in SEG and RTSTRUCT
+// files.
 namespace covol::detail {
 
 /// The instance and the frame that contain one plane of the image.
@@ -46,7 +47,8 @@ DicomSource read_dicom_source(const std::string& like, std::optional<int> frame,
 /// and columns that are not perpendicular)
 ImageGeometry in_millimetres(const std::string& path, const ImageGeometry& geometry, const RunContext& run);
 
-/// The current date and time, in UTC, or those given by the environment variable SOURCE_DATE_EPOCH.
+/// The current local date and time or, if the environment variable SOURCE_DATE_EPOCH is set, those that it gives, in
+/// UTC.
 struct DicomTime {
     std::string date, time;
 };

@@ -14,8 +14,10 @@ namespace covol::detail {
 std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run);
 
 /// NIfTI-1 in one file (.nii, .nii.gz). The positions of voxels are taken from the sform if sform_code > 0, else from
-/// the qform if qform_code > 0, else from pixdim with the image's centre at 0, as in nibabel. A warning is reported if
-/// the sform is not invertible (the qform is then used), or if both forms differ by more than half a voxel.
+/// the qform if qform_code > 0, else from pixdim with the image's centre at 0, as in nibabel. If the sform is
+/// not invertible, the qform is used and a warning is reported; without a qform this is an error. A warning is also
+/// reported if both codes are positive and the forms differ by more than half a voxel, or if the sform is used and
+/// pixdim states another spacing.
 std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
 /// ITK's reader for files with this extension.

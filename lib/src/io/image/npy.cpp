@@ -18,7 +18,8 @@ struct NpyHeader {
     std::uint64_t end = 0;  ///< position of the first value
 };
 
-/// The value of a key in the header's dictionary, without quotes and parentheses at its end; empty if there is none.
+/// The value of a key in the header's dictionary, without quotes and without a closing parenthesis; empty if there
+/// is none.
 std::string value_of(const std::string& dictionary, const std::string& key) {
     std::size_t at = dictionary.find("'" + key + "'");
     if (at != std::string::npos) at = dictionary.find(':', at);

@@ -88,12 +88,13 @@ public:
         return true;
     }
 
-    /// Chunks of one slice are read together: a strip is as wide as the page, and is unpacked once for all its chunks.
+    /// Chunks of one slice are read together: a strip is as wide as the page, and is unpacked once for neighbours.
     [[nodiscard]] bool in_layers() const noexcept override { return true; }
 
     void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const override {
         const Index3& n = chunk_size();
-        // Neighbouring chunks of a row are read together: no strip is unpacked twice, and none that is not needed.
+        // Neighbouring chunks of a row are read together: a strip is unpacked once for all of them, and only if it is
+        // needed.
         for (std::size_t first = 0; first < chunks.size();) {
             std::size_t last = first + 1;
             while (last < chunks.size() && chunks[last][1] == chunks[first][1] &&

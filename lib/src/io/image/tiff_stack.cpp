@@ -215,8 +215,9 @@ double ome_unit_in_metres(const std::string& text) {
     return 0;
 }
 
-/// Sets the unit: that of the axes if it is the same for all, otherwise the micrometre. An axis whose unit the schema
-/// does not define has no spacing; lengths in "reference frame" or "pixel" have no unit.
+/// Sets the unit: that of the axes if it is the same for all and unit_in_metres() knows it, otherwise the micrometre.
+/// An axis whose unit the schema does not define has no spacing. There is no unit if that of all axes is "reference
+/// frame" or that of all is "pixel".
 void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     const bool alike = texts[0] == texts[1] && texts[1] == texts[2];
     if (alike && (texts[0] == "reference frame" || texts[0] == "pixel")) return;

@@ -49,8 +49,8 @@ struct TiffFacts {
     std::function<std::uint64_t(const std::string& path)> count_pages;
 };
 
-/// Determines how the pages form an image. Without such a description, the spacing is unknown, because the resolution
-/// of plain TIFFs is that of a scanner or a screen.
+/// Determines how the pages form an image. Without a description by ImageJ, OME or tifffile, the spacing is unknown,
+/// because the resolution of plain TIFFs is that of a scanner or a screen.
 /// @throws Error InvalidInput, Io (a file of a set is missing).
 TiffStack describe_tiff(const TiffFacts& facts);
 

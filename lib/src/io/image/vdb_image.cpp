@@ -8,7 +8,8 @@
 namespace covol::detail {
 namespace {
 
-// Maximum ratio of voxels in the bounding box to active voxels; exceeded by grids with a few distant voxels.
+// Maximum ratio of the requested voxels to the active voxels of the grid. The bounding box of a grid with a few distant
+// voxels exceeds it.
 constexpr std::uint64_t kSparsest = 10000;
 
 class VdbImage : public ImageFile {

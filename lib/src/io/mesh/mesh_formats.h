@@ -28,7 +28,7 @@ void write_off(Output& out, const Prepared& in);
 void write_stl(Output& out, const Prepared& in);
 void write_glb(Output& out, const Prepared& in);
 
-/// Removes the line breaks within each comment.
+/// Replaces the line breaks within each comment with blanks, and applies safe_text().
 std::vector<std::string> one_line_each(std::vector<std::string> comments);
 /// Scales a vertex or a mesh's origin, and rotates it if the options require that y points up.
 template <typename Real>

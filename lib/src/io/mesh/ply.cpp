@@ -174,8 +174,8 @@ private:
     }
 
     /// Calls visit() for each row; value() and values() then refer to that row.
-    /// @param wanted  number of properties that every line of an ASCII file must have. Later properties may be missing;
-    ///                but if a list in the last line is incomplete, the file is truncated
+    /// @param wanted  number of properties, from the first, that every line of an ASCII file must have. Later ones may
+    ///                be missing; but if a list in the last line is incomplete, the file is truncated
     template <typename Visit>
     void for_each_row(const PlyElement& element, std::size_t wanted, const Visit& visit) {
         if (element.properties.empty()) return;

@@ -143,7 +143,7 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
 /// Whether a part of this size is mapped or decoded on demand, not read as a whole.
 bool is_worth_mapping(std::uint64_t bytes);
 
-/// Requests the operating system to read mapped pages in advance.
+/// Advises the operating system to read mapped pages in advance.
 void prefetch_pages(const void* begin, std::uint64_t bytes);
 
 /// Releases the physical memory of mapped pages; they are read from the file again when they are accessed.
@@ -152,8 +152,9 @@ void release_pages(const void* begin, std::uint64_t bytes);
 /// Reverses the bytes of each of `count` values of `width` bytes.
 void swap_bytes(void* data, std::uint64_t count, std::uint64_t width);
 
-/// The usual symbol of a unit, for example "um" for every spelling of the micrometre; the text itself if it is not a
-/// known unit.
+/// Covol's name of a unit, for example "um" for every spelling of the micrometre; empty for pixels, voxels and the
+/// "reference frame" of OME. If the text is not a known unit, it is returned in lower case and without enclosing blanks
+/// and quotes.
 std::string normal_unit(const std::string& text);
 
 /// Length in metres of a unit as returned by normal_unit(); 0 if the unit is unknown.

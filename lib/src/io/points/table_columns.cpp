@@ -48,8 +48,8 @@ public:
         const auto found = units_.find(name);
         return found != units_.end() && means_voxels(found->second);
     }
-    /// The unit of length at the end of a column's name. "m" and "in" count only in brackets, because "x_m" may be a
-    /// mean, and "x in" an input.
+    /// The unit of length at the end of a column's name. "m" and "in" count only in brackets or after a slash,
+    /// because "x_m" may be a mean, and "x in" an input.
     [[nodiscard]] std::string length_unit(const std::string& name) const {
         const auto found = units_.find(name);
         if (found == units_.end()) return {};

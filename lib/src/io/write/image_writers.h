@@ -14,7 +14,7 @@ void write_raw(const std::string& path, const std::string& extension, const Pixe
 /// One page per z, deflated: classic with strips, or BigTIFF with tiles. Spacing, unit and origin as in ImageJ's files.
 /// TIFF cannot store a direction.
 /// @param ome  OME-TIFF: with its XML instead of ImageJ's description, without an origin
-/// @param classic_limit  a BigTIFF is written if the unpacked size in bytes is at least this
+/// @param classic_limit  a BigTIFF is written if the unpacked size in bytes is larger than this
 inline constexpr std::uint64_t kClassicTiff = std::uint64_t(4000) << 20;
 void write_tiff(const std::string& path, const PixelSource& source, bool ome, const RunContext& run,
                 std::uint64_t classic_limit = kClassicTiff);

@@ -22,7 +22,8 @@ std::string imagej_description(const ImageGeometry& geometry, const std::optiona
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
     if (geometry.spacing_known) description += "spacing=" + shortest(geometry.spacing[2]) + "\n";
-    // ImageJ's origin is the position of the world's point 0 in voxels of the rounded spacing that ImageJ will read.
+    // ImageJ's origin is the position of the world's point 0 in voxels of the spacing that ImageJ will read,
+    // which is rounded for x and y.
     for (std::size_t a = 0; a < 3; ++a) {
         const double per_length = a < 2 ? resolution(geometry.spacing[a]) : 1 / geometry.spacing[a];
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)

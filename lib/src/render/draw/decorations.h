@@ -14,7 +14,8 @@ namespace covol::figure {
 /// "50 µm"; "50 units" if the unit is unknown.
 [[nodiscard]] std::string length_text(double length, const std::string& unit);
 
-/// A number with at most four decimals, fewer for larger numbers, and without trailing zeros.
+/// A number with at most four decimals, fewer for larger numbers, and without trailing zeros; below 1e-4 and from 1e6
+/// on, three significant digits and a power of ten.
 [[nodiscard]] std::string short_number(double value);
 
 struct BarStyle {

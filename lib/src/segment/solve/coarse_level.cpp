@@ -20,7 +20,7 @@ bool is_large(const Domain& d) {
     return minimum >= kFlow.min_coarsened;
 }
 
-/// The requested number of levels; by default one for a sphere or box in a large domain that was not grown, because
+/// The requested number of levels; by default one for a sphere or box that was not grown, in a large domain, because
 /// such a start may be far from the surface, and none for other starts.
 int levels_of(const SegmentOptions& options, const StartFacts& start) {
     if (options.coarse_levels) return *options.coarse_levels;

@@ -41,7 +41,7 @@ struct Length {
 [[nodiscard]] double parse_number(const std::string& flag, const std::string& text);
 [[nodiscard]] Vec3 parse_vec3(const std::string& flag, const std::string& text);
 [[nodiscard]] WorldBox parse_box(const std::string& flag, const std::string& text);
-/// Value of `--init`: tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE.
+/// Value of `--init`: auto, guess, cloud, tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE.
 /// `path` is the file that the start is read from, or empty.
 struct StartChoice {
     Start start;

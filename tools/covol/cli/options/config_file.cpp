@@ -261,7 +261,7 @@ std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const 
         if (!is_common) item.parents = {command};
         item.name = std::move(entry->name);
         item.inputs = std::move(entry->values);
-        // A list of values may be given by repeated lines with the same name.
+        // A list of values may be given by consecutive lines with the same name.
         if (!items.empty() && items.back().name == item.name && items.back().parents == item.parents)
             items.back().inputs.insert(items.back().inputs.end(), item.inputs.begin(), item.inputs.end());
         else

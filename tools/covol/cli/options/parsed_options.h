@@ -13,7 +13,8 @@ namespace covol::tool {
 [[nodiscard]] std::vector<std::string> names_of(const CLI::App& command, OptionRole role);
 /// Names of the options that the command line or a configuration file gave, without dashes.
 [[nodiscard]] std::vector<std::string> given_names(const CLI::App& command);
-/// The values of all options by name: as given by the user, otherwise the default.
+/// The values of the options by name: as given by the user, otherwise the default. Options without a value are left
+/// out.
 [[nodiscard]] Json values_of_options(const CLI::App& command);
 /// Files and folders that the command line names as inputs: every existing path in the values of settings and inputs.
 /// A path may be preceded by the name of a structure or the kind of a start (NAME=FILE, mesh:FILE), and followed by the

@@ -145,7 +145,7 @@ const std::vector<std::string>& Outputs::files_of(const std::string& input, cons
         try {
             entry->second = list_image_files(input);
         } catch (const Error& error) {
-            // The input is not an image, or cannot be read. The error is reported when the input is read.
+            // The input is not an image, or it is one that cannot be read, which is reported when it is read.
             if (error.code() == Errc::Cancelled) throw;
         }
     }

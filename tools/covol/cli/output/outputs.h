@@ -35,8 +35,8 @@ public:
     void protect(const std::vector<std::string>& inputs);
 
     /// Checks the ending of the name, that the folder exists, is writable and is not locked, and that the path is
-    /// neither an input nor another output. An existing path must be a regular file, for .zarr a Zarr store, and for
-    /// texts also a device. An empty path is an output that was not requested.
+    /// neither an input nor another output. An existing path must be a regular file or, for .zarr, a Zarr store; texts
+    /// and tables may also go to a device, pipe or stream. An empty path is an output that was not requested.
     /// @throws Error InvalidOptions, Io, Cancelled.
     void check(const std::string& flag, const std::string& path, OutputKind kind);
 

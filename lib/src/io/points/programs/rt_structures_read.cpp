@@ -21,7 +21,7 @@ constexpr std::uint32_t kRoiContours = 0x30060039, kContours = 0x30060040, kCont
 constexpr std::uint32_t kPointCount = 0x30060046, kContourData = 0x30060050, kReferencedRoi = 0x30060084;
 
 /// Splits a curve that touches itself at a vertex into its loops. This separates a hole that is joined to its outline
-/// by a channel of zero width ("keyhole", PS3.3 C.8.8.6.3). Loops that enclose no area are omitted.
+/// by a channel of zero width ("keyhole", PS3.3 C.8.8.6.3). Loops of fewer than three points are omitted.
 std::vector<std::vector<Vec3>> loops_of(const std::vector<Vec3>& curve) {
     std::vector<std::vector<Vec3>> loops;
     std::vector<Vec3> walked;

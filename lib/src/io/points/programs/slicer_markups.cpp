@@ -100,7 +100,7 @@ PointTable parse_markups(const std::string& path, const std::string& text, const
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
-    std::string system = "RAS";  // files of Slicer before 4.11 state no system and use RAS
+    std::string system = "RAS";  // for files that state no system, as written before Slicer 4.11
     bool stated = false;
     std::array<std::size_t, 3> at{1, 2, 3};
     std::size_t label = 11;  // index of the column with labels, unless the file names the columns
