@@ -1,5 +1,4 @@
 // Image Cytometry Standard, byte by byte as libics writes it.
-#include <zlib.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -10,6 +9,7 @@
 
 #include "covol/image.h"
 #include "covol/image_files.h"
+#include "support/deflated.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -65,19 +65,7 @@ void check_counts(const Image& image, int first = 0) {
     CHECK(wrong == 0);
 }
 
-std::string gzipped(const std::string& text) {
-    z_stream stream{};
-    REQUIRE(deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY) == Z_OK);
-    std::string packed(deflateBound(&stream, text.size()) + 64, '\0');
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-    stream.avail_in = uInt(text.size());
-    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_out = uInt(packed.size());
-    REQUIRE(deflate(&stream, Z_FINISH) == Z_STREAM_END);
-    packed.resize(stream.total_out);
-    deflateEnd(&stream);
-    return packed;
-}
+std::string gzipped(const std::string& text) { return test::deflated(text, 16 + MAX_WBITS); }
 
 }  // namespace
 

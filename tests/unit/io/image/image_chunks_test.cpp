@@ -1,7 +1,6 @@
 // Large files are decoded in parts: the values are those that were written, and damage is an Error.
 #include <tbb/parallel_for.h>
 #include <tiffio.h>
-#include <zlib.h>
 
 #include <catch2/catch.hpp>
 #include <cstring>
@@ -9,6 +8,7 @@
 #include "io/image/tiff_pages.h"
 #include "io/pixels/inflate.h"
 #include "io/pixels/packed_chunks.h"
+#include "support/deflated.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -19,19 +19,7 @@ namespace {
 constexpr int kAdler = 15, kGzip = 15 + 16;
 
 /// Compressed by zlib in one stream.
-std::string packed(const std::string& bytes, int kind) {
-    z_stream stream{};
-    REQUIRE(deflateInit2(&stream, 1, Z_DEFLATED, kind, 8, Z_DEFAULT_STRATEGY) == Z_OK);
-    std::string out(deflateBound(&stream, bytes.size()), '\0');
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream.avail_in = uInt(bytes.size());
-    stream.next_out = reinterpret_cast<Bytef*>(out.data());
-    stream.avail_out = uInt(out.size());
-    REQUIRE(deflate(&stream, Z_FINISH) == Z_STREAM_END);
-    out.resize(stream.total_out);
-    deflateEnd(&stream);
-    return out;
-}
+std::string packed(const std::string& bytes, int kind) { return test::deflated(bytes, kind, 1); }
 
 constexpr Index3 kSize{310, 205, 170};
 

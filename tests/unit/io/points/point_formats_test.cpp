@@ -1,4 +1,3 @@
-#include <zlib.h>
 
 #include <array>
 #include <catch2/catch.hpp>
@@ -8,6 +7,7 @@
 
 #include "covol/point_structures.h"
 #include "covol/points.h"
+#include "support/deflated.h"
 #include "support/scratch.h"
 
 // Each format, byte by byte according to its specification.
@@ -110,24 +110,10 @@ std::string roi(const RoiSpec& spec) {
     return w.text();
 }
 
-std::string deflated(const std::string& text) {
-    z_stream stream{};
-    REQUIRE(deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) == Z_OK);
-    std::string packed(deflateBound(&stream, text.size()), '\0');
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-    stream.avail_in = uInt(text.size());
-    stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-    stream.avail_out = uInt(packed.size());
-    REQUIRE(deflate(&stream, Z_FINISH) == Z_STREAM_END);
-    packed.resize(stream.total_out);
-    deflateEnd(&stream);
-    return packed;
-}
-
 std::string zip(const std::vector<std::pair<std::string, std::string>>& files, bool deflate = true) {
     Writer w(false), directory(false);
     for (const auto& [name, content] : files) {
-        const std::string packed = deflate ? deflated(content) : content;
+        const std::string packed = deflate ? test::deflated(content, -MAX_WBITS) : content;
         const auto crc = std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(content.data()), uInt(content.size())));
         directory.put(std::uint32_t(0x02014b50)).put(std::uint16_t(20)).put(std::uint16_t(20)).put(std::uint16_t(0));
         directory.put(std::uint16_t(deflate ? 8 : 0)).put(std::uint32_t(0)).put(crc).put(std::uint32_t(packed.size()));
