@@ -203,7 +203,8 @@ class Bodies(ContoursCase):
         self.assertLess(report["fit"]["points_to_surface"]["max"], 1)
 
     def test_a_thin_bright_body_is_no_line(self):
-        # The rod is as wide as its opposite marks are apart: the other wall must not be taken for the other side of a line.
+        # The marks lie on the wall of a thin rod, not on a bright line. The position inside that is compared with a mark must
+        # not lie beyond the opposite wall, where the image is as dark as outside.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         image = self.inputs / "rod.nrrd"
         write_nrrd(image, 30 + 180 * np.clip((1 - np.hypot(x, y) / 2.2) * 2.2 / 0.5 + 0.5, 0, 1))

@@ -85,7 +85,7 @@ class ControlGroups(Limited):
         self.run_covol("distance", "t.ply", "--like", "t.nrrd", "-o", "d.vdb", "--max-distance", "8vx")
         self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "3vx")
         before = self.files()
-        # Without a limit they use 210 to 450 MB.
+        # Without a limit, each of these jobs uses 210 to 450 MB, which is more than the group allows (LIMIT, 200 MiB).
         jobs = {
             "convert": ["convert", "t.nrrd", "o.vdb"],
             "distance": ["distance", "t.ply", "--like", "t.nrrd", "-o", "o.vdb", "--max-distance", "90vx"],

@@ -104,18 +104,20 @@ def newest_c_library(root):
 
 def packages_of(origins):
     """{copy: (package, version)}"""
+    candidates = {origin: [origin, origin.removeprefix("/usr") if origin.startswith("/usr/lib") else "/usr" + origin]
+                  for origin in origins.values()}
+    # One call for all paths, because each call reads the file lists of all installed packages. Its exit code is 1: most libraries are
+    # known by one of their two paths only.
+    done = subprocess.run(["dpkg", "-S", *(path for paths in candidates.values() for path in paths)], capture_output=True, text=True)
+    owners = dict(reversed(line.split(": ", 1)) for line in done.stdout.splitlines())
     found = {}
     for copy, origin in origins.items():
-        candidates = [origin, origin.removeprefix("/usr")] if origin.startswith("/usr/lib") else [origin, "/usr" + origin]
-        for candidate in candidates:
-            done = subprocess.run(["dpkg", "-S", candidate], capture_output=True, text=True)
-            if done.returncode == 0:
-                package = done.stdout.split(": ")[0]
-                found[copy] = (package, run("dpkg-query", "-W", "-f", "${Version}", package))
-                break
-        else:
+        found[copy] = next((owners[path] for path in candidates[origin] if path in owners), None)
+        if not found[copy]:
             fail(f"{origin} is of no Debian package, so its licence is not known")
-    return found
+    rows = run("dpkg-query", "-W", "-f", "${binary:Package}\t${Version}\n", *sorted(set(found.values()))).splitlines()
+    versions = dict(row.split("\t") for row in rows)
+    return {copy: (package, versions[package]) for copy, package in found.items()}
 
 
 def licence_names(text):

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Makes covol-VERSION-py3-none-manylinux_GLIBC_MACHINE.whl from the bundle: the program, and a package for every Python from 3.9 on.
 
-    /usr/bin/python3 tools/packaging/wheel.py covol-0.1.0-linux-x86_64.tar.xz [--output FOLDER]
+    /usr/bin/python3 tools/packaging/wheel.py covol-0.1.0-linux-x86_64.tar.xz [--output FOLDER] [--level 0..9]
     pip install covol-0.1.0-py3-none-manylinux_2_36_x86_64.whl
 
 The package has the same interface as the module that is compiled for Debian's Python, and shares its Python files; the compiled part
@@ -93,6 +93,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bundle", type=pathlib.Path, help="covol-VERSION-linux-MACHINE.tar.xz, as bundle.py makes it")
     parser.add_argument("--output", type=pathlib.Path, default=pathlib.Path("."), help="folder of the wheel [here]")
+    parser.add_argument("--level", type=int, default=9, choices=range(10), help="of deflate [9]")
     options = parser.parse_args()
     named = re.fullmatch(r"covol-([0-9.]+)-linux-(\w+)\.tar\.xz", options.bundle.name)
     if not named:
@@ -121,7 +122,7 @@ def main():
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"covol-{version}-{tag}.whl"
     partial = path.with_name(path.name + ".part")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as wheel:
+    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=options.level) as wheel:
         for name, data, executable in entries:
             info = zipfile.ZipInfo(name, stamp)
             info.external_attr = (0o100755 if executable else 0o100644) << 16

@@ -46,12 +46,15 @@ struct CloudSurface {
 
 /// Reconstructs the closed surface that a cloud samples, as a start (negative inside).
 ///
-/// Near the points, which orient_cloud() has oriented, the level set is the
-/// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise requires, and blended (implicit
-/// moving least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and
-/// others, Multi-level partition of unity implicits, 2003); elsewhere it follows the indicator's level 1/2. If the
-/// points enclose nothing, the surface is that of the screened indicator alone. If the indicator has fewer pieces and
-/// handles than the level set, the level set gets the indicator's topology.
+/// Near the points, the level set is a blend of the signed distances to local quadrics (implicit moving least squares;
+/// Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others, Multi-level
+/// partition of unity implicits, 2003). Each quadric is fitted to a neighbourhood that is as wide as the noise of the
+/// points requires. Elsewhere the level set follows the level 1/2 of the indicator, or of the screened indicator if
+/// there is one. If the points enclose nothing or fill a solid, the whole surface is this level.
+///
+/// If the level set has more pieces and handles in total than the indicator, it gets the indicator's topology, unless
+/// this would reduce the number of large pieces or change the sign of too many voxels.
+/// @param cloud  the result of orient_cloud()
 /// @throws Error InvalidInput (no surface), Cancelled.
 [[nodiscard]] COVOL_API CloudSurface surface_from_cloud(const Domain& domain, const CloudOrientation& cloud,
                                                         const RunContext& run = {});

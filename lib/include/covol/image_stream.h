@@ -46,8 +46,9 @@ public:
     /// the file is in exactly one such box.
     /// @param values  of the box; null: all voxels have the value `uniform`
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
-    /// Key/value pairs, for NRRD. Called before and after the voxels are written: the second time the texts may be
-    /// shorter, but not longer.
+    /// Key/value pairs for the header of a NRRD file. Some of them may be known only after all voxels are written.
+    /// Therefore this is called before the voxels are written, to reserve space for the header, and again at the end,
+    /// to overwrite the header, which must not have become longer.
     [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> metadata() const;
     /// The meaning of the values, for OME-Zarr and DICOM.
     [[nodiscard]] virtual std::vector<NamedLabel> label_names() const;

@@ -36,9 +36,11 @@ struct StructuresResult {
     double separate_seconds = 0;              ///< duration of separate() and the repeated measurements
 };
 
-/// A function that solves one structure; the default calls segment() or reconstruct().
+/// Computes the surface of one structure. segment_structures() calls solve_structure() unless another function is
+/// given, for example one that solves large structures in bricks.
 using StructureSolver = std::function<SegmentResult(const std::optional<Image>& image, const StructureInput& structure,
                                                     const RunContext& run)>;
+/// Calls segment(), or reconstruct() if there is no image.
 [[nodiscard]] COVOL_API SegmentResult solve_structure(const std::optional<Image>& image,
                                                       const StructureInput& structure, const RunContext& run);
 

@@ -316,7 +316,8 @@ private:
     std::string repaired_;
 };
 
-/// Reads the image of a study from its journal, without opening the study for changes. @throws Error Io, InvalidInput.
+/// Reads the path and the geometry of a study's image from its journal; the image itself is not read. Another program
+/// may have the study open. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyImage read_study_image(const std::string& folder);
 /// Reads the current structures of a study, which another program may have open. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyState read_study(const std::string& folder);

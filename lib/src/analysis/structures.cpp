@@ -158,8 +158,8 @@ private:
         return g;
     }
 
-    /// The minimum of the distances to the other structures at a leaf's voxels; it matters if the leaf is in one of
-    /// them or close to one.
+    /// For each voxel of a leaf, the minimum of the signed distances to the other structures. `matters` is false if the
+    /// leaf lies outside all of them and their narrow bands; the leaf is then left unchanged.
     struct Nearest {
         std::array<float, kLeafSize> value;
         bool matters = false;

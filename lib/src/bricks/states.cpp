@@ -17,7 +17,9 @@ using openvdb::CoordBBox;
 constexpr int kFrameLayers = 4;  // layers that are held fixed: the scheme reads two, redistancing one more; one spare
 constexpr int kBlend = 8;        // voxels by which states extend beyond their cores
 constexpr int kSeamLayers = 3;   // layers of a brick, next to another one, in which their surfaces are compared
-constexpr double kUnboundedVoxels = 1e3;  // voxels: so far away that a bound has no effect
+// [voxels] Where the level set may move, the bounds of a Frame are this far below and above 0, so that they have no
+// effect.
+constexpr double kUnboundedVoxels = 1e3;
 
 CoordBBox bounds(const VoxelBox& box) { return {Coord(box.min.data()), Coord(box.max.data())}; }
 

@@ -159,7 +159,9 @@ private:
     std::size_t n_;
 };
 
-/// Whether the surface can cross the columns along w over a node and its next nodes along x and y.
+/// Whether the surface can cross this interval over the grid's cell between the nodes (i, j) and (i + 1, j + 1). It
+/// cannot if the four corners are all inside, or all outside, at both ends of the interval. For shifted sections this
+/// is not tested, because the corners of the two slices do not correspond to each other.
 bool Interval::may_cross(int i, int j) const {
     if (is_shifted()) return true;
     const SliceGrid& grid = data_.grid;

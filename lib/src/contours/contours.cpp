@@ -339,7 +339,8 @@ void Densifier::make_solid() {
         polygons.back().push_back(std::move(polygon));
     }
     fill_slices(*data, polygons);
-    // A slice whose contours enclose no node of the grid gives no information about the body.
+    // A slice whose contours enclose no node of the grid is removed. Its level would be negative nowhere, so that the
+    // body would end at this slice although it has a contour there.
     for (std::size_t n = data->slices.size(); n-- > 0;)
         if (data->slices[n].depth == 0) {
             data->slices.erase(data->slices.begin() + std::ptrdiff_t(n));

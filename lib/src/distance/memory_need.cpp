@@ -18,7 +18,7 @@ namespace {
 constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
 constexpr double kBandBytes = 200;       ///< for each active voxel of a band on which a flow is solved
 constexpr double kCoarseVoxels = 1e6;    // of the grid on which volumes are measured
-constexpr double kBandVoxels = 10;       // width of a following band, including the leaves that it cuts
+constexpr double kBandVoxels = 10;       // width of a band that moves with the surface, with all leaves that it cuts
 constexpr double kLeafVoxels = 4;        // mean distance by which a tube's leaves extend beyond it
 constexpr double kGrowth = 1.02;         // of the voxel size, in the search for one that fits
 constexpr double kBaseBytes = 8e7;       // of a program before any computation

@@ -64,7 +64,9 @@ private:
 
     BorderProfile profile_;
     std::vector<BorderTable> tables_, held_out_;  // tables_: by place, or one for all; held_out_: by place
-    double radius_ = 0;                           // standard deviation of the weights of a local profile
+    // Standard deviation of the Gaussian by which marks are weighted with their distance, if the profile varies with
+    // the position.
+    double radius_ = 0;
     bool local_ = false;
     Trust trust_;
     double gain_ = 0, gain_error_ = 0;

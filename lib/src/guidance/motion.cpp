@@ -299,7 +299,9 @@ void Motion::match() {
     }
 }
 
-/// Fits the offsets as a smooth field, and estimates its deviation by expectation maximisation.
+/// Fits a smooth field of offsets to the measured ones. The standard deviation of the field, whose mean is 0, and the
+/// weights of the measurements are estimated at the same time by expectation maximisation.
+/// @param precision  1 / variance of the measured offsets; 0: unknown
 void Motion::fit(const OffsetField& field, const std::vector<double>& measured, const std::vector<double>& precision) {
     const std::size_t count = patches_.size();
     const std::vector<OffsetEvidence> none(count);
@@ -339,7 +341,8 @@ bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, con
     return both > 0 && 2 * both >= all;
 }
 
-/// The new image along the moved surface, scaled to the intensities of the previous one.
+/// Reads the templates of the new image along the normals of the surface, moved by the present translation and offsets.
+/// Their intensities are mapped linearly to those of the previous image; both_ receives the statistics of both.
 std::vector<Template> Motion::read_now() {
     std::vector<Template> now(patches_.size());
     std::vector<Moments> best(now.size());

@@ -44,7 +44,8 @@ public:
 
     /// A bit for each axis along which a point lies on a face of the clip.
     [[nodiscard]] unsigned faces(const Position& p) const;
-    /// Whether the clip has faces and the point is so close to two of them that it belongs to the chamfer between them.
+    /// Whether the point is so close to two faces of the clip that meet that it belongs to the narrow chamfer by which
+    /// extract_mesh() replaces their common edge.
     [[nodiscard]] bool on_chamfer(const Position& p) const;
 
 private:

@@ -309,7 +309,8 @@ void mean_gradient(const float* u, float* out) {
     for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
-/// A front that arrives along one axis, from a position at the distance of 1/q voxels whose value is v.
+/// The eikonal equation along one axis: the front comes from a position at which the distance is v, and which is 1/q
+/// voxels away: a neighbour (q = 1), or a cut of the voxel's edge by the surface (v = 0, q >= 1).
 struct Arrival {
     Lanes v, q;
 };

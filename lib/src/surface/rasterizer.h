@@ -21,7 +21,9 @@ public:
     /// @param out  i fastest
     void fill(const VoxelBox& box, std::uint8_t label, std::uint8_t* out) const;
 
-    /// True if all voxels of the box are inside, false if all are outside, none if the tree's tiles do not show either.
+    /// True if all voxels of the box are inside, false if all are outside. Only the tiles of the level set's tree are
+    /// examined, not single voxels; none if they do not determine the answer, or if all voxels are inside according to
+    /// them but the surface's clip does not contain the whole image.
     [[nodiscard]] std::optional<bool> uniform(const VoxelBox& box) const;
 
 private:

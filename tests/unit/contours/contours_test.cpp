@@ -296,7 +296,8 @@ TEST_CASE("a cylinder's level is the distance to its wall in all three planes, i
         middle[u] = 40;
         middle[v] = 45;
         CHECK(widest_gap(*c.solid, all_points(c), g.index_to_world(middle), 30) < step);
-        // The slices are one world unit apart, and each dome adds half a unit: 10 + 2 * 1/2.
+        // The slices are one world unit apart and span ten units. The dome at each end is one unit high, and its volume
+        // is half of that of a cylinder of this height: 10 + 2 * 1/2.
         CHECK(volume(*c.solid, 0.5) == Approx(kPi * r * r * 11).epsilon(0.01));
     }
 }

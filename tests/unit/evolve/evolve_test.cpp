@@ -25,7 +25,9 @@ constexpr double kH = 0.5;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Points and image around an asymmetric surface, in a band whose outline does not follow the leaves.
+/// A problem with both terms of the flow: a distance to points and an edge detector. The start is an ellipsoid beside
+/// the centre, so that exchanged axes change the result. The active voxels are those near its surface, not whole
+/// leaves, so that partly active leaves are tested, too.
 Problem everything_on(int n = 28, int first = -5) {
     Problem p;
     p.domain = cube_domain(n, kH, first);

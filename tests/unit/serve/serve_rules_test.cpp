@@ -165,7 +165,8 @@ TEST_CASE("pages of other sites do not lead here") {
     CHECK(status_of(two) == 403);
     const std::string right = "/?token=" + kToken;
     CHECK(status_of(with(good_head(right), "Sec-Fetch-Site", "cross-site")) == 403);
-    // A link on another page, or in a file, that a person follows.
+    // An exception: the user follows a link on another page or in a file. It may replace the whole window, but not load
+    // a part of a page, and only the address with the token may be opened in this way.
     const auto link = [&](std::string_view target, std::string_view mode, std::string_view to) {
         return with(with(with(good_head(target), "Sec-Fetch-Site", "cross-site"), "Sec-Fetch-Mode", mode),
                     "Sec-Fetch-Dest", to);

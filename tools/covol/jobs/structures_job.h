@@ -5,7 +5,8 @@
 #include "jobs/structure_inputs.h"
 #include "jobs/structure_outputs.h"
 
-// Runs a job on one image or on a cloud without an image, with one or several structures.
+// Runs a job with one or several structures on one image, or with a single structure on points or contours without an
+// image.
 namespace covol::tool {
 
 /// Prepares the structures of one image for output: adds the requested evidence and corrected mask, and prints a

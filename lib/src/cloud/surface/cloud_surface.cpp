@@ -40,7 +40,8 @@ struct Complexity {
     int all = 0;
 };
 
-/// Gives a level set the topology of an indicator that has fewer pieces and handles.
+/// Gives a level set the topology of an indicator's surface, but only if that surface has fewer pieces and handles in
+/// total than the level set.
 struct TopologyOf {
     Complexity own;
     std::size_t minimum;  // minimum number of points on a piece

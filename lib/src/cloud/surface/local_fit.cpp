@@ -197,8 +197,8 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     return best;
 }
 
-/// The sheets that meet near a node, if there are any. Points on the other side of a thin body are excluded by their
-/// normals.
+/// The sheets that meet near `place`; none if one quadric fits the points almost as well: fit_crease(). Points whose
+/// normals differ from `normal` by 120 degrees or more are left out, because they are on the other side of a thin body.
 std::optional<Crease> crease_at(const Level& level, const Vec3& place, const Vec3& normal, Scratch& scratch) {
     level.cells.find(place, level.radius, scratch.ranges);
     std::vector<CreasePoint>& points = scratch.crease;

@@ -41,8 +41,10 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
 /// BigDataViewer: tNNNNN/sNN/L/cells, with voxel sizes in an XML file of the same name. https://imagej.net/plugins/bdv/
 std::optional<Hdf5Layout> big_data_viewer_layout(const Hdf5File& file, const std::string& inside);
 
-/// The dataset at `inside`, or the only dataset with at least three dimensions. If it has ilastik's attribute axistags,
-/// this states the meaning of each dimension. https://www.ilastik.org/documentation/basics/dataselection
+/// The dataset at `inside`. If `inside` is empty or a group: the only dataset of numbers there with at least three
+/// dimensions. The meaning of each dimension is taken from ilastik's attribute axistags, otherwise from HDF5's
+/// dimension labels; otherwise the order is z, y, x. https://www.ilastik.org/documentation/basics/dataselection
+/// Unlike the functions above, this one throws an error if the file does not have the layout.
 Hdf5Layout plain_layout(const Hdf5File& file, const std::string& inside);
 
 }  // namespace covol::detail

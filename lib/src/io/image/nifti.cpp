@@ -156,7 +156,8 @@ NiftiAffine qform_of(const NiftiHeader& header) {
     return qform;
 }
 
-/// The affine map if sform_code and qform_code are both 0: x points to the left, and the centre of the image is at 0.
+/// The map to RAS coordinates if sform_code and qform_code are both 0. As in nibabel, the image's first axis points to
+/// the patient's left, and the centre of the image is at 0.
 NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     const Vec3 step = pixdim_of(header);
     NiftiAffine base;

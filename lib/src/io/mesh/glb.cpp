@@ -1,4 +1,4 @@
-// Reader and writer of glTF 2.0 in one file (.glb).
+// Reads and writes the binary form of glTF 2.0 (.glb), in which one file holds the JSON description and the data.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

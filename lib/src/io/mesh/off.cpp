@@ -1,4 +1,5 @@
-// OFF in the variants of Geomview, in which colours or normals may follow the coordinates.
+// Reads and writes OFF meshes. Colours and normals, which follow the coordinates in variants of Geomview such as COFF
+// and NOFF, are ignored. Binary files and meshes with other than three dimensions are refused.
 #include <cmath>
 #include <string>
 #include <vector>

@@ -40,7 +40,8 @@ protected:
     ItkHeader header_;
 };
 
-/// @throws Error InvalidInput with the message `unusable`; Unsupported (types).
+/// Opens an image file with one of ITK's readers and reads its header. @throws Error InvalidInput if ITK cannot read
+/// it, with a message that begins with `unusable`; Unsupported if its values are not of one of the types in PixelType.
 using OpenWithItk = std::unique_ptr<ItkReader>(const std::string& path, const std::string& unusable);
 
 /// ITK's readers of NRRD and MetaImage, which depend on few libraries.

@@ -1,5 +1,7 @@
 #pragma once
-// From a start to the final surface. A flow that loses the surface is replaced by the start or by a guess.
+// Computes the final surface from a start. If the surface vanishes in the flow or leaves the marks, or if a start that
+// was grown to the image's edges loses more than half of its volume, the result is that start itself, or the result of
+// another flow from the start or from the guess.
 #include "segment/solve/flow.h"
 
 namespace covol::pipeline {

@@ -142,7 +142,7 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
     CHECK(cloud.hints.from_sensor);
     CHECK(cloud.hints.sensors == seen.points.size());
     CHECK(fraction_wrong(cloud.orientation.normals, seen.normals) < 0.002);
-    // From any position, half of the whole ball is hidden.
+    // At least half of a closed ball is hidden from any position outside it, so the sensor cannot have seen all points.
     const CloudOrientation whole = orient_cloud(s.points, PointHints{{}, towards(sensor, s.points)});
     CHECK_FALSE(whole.hints.used);
     CHECK(fraction_wrong(whole.orientation.normals, s.normals) < 0.001);

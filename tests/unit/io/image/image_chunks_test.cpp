@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kAdler = 15, kGzip = 15 + 16;
 
-/// Compressed by zlib in one stream.
+/// The bytes as a single stream, in the format that `kind` selects: kAdler (zlib) or kGzip.
 std::string packed(const std::string& bytes, int kind) { return test::deflated(bytes, kind, 1); }
 
 constexpr Index3 kSize{310, 205, 170};

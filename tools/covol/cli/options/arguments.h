@@ -63,7 +63,7 @@ struct Named {
 };
 [[nodiscard]] Named split_name(const std::string& text);
 
-/// Parses a number of bytes: "8G", "512M", "100k", or a number without a suffix.
+/// Parses a number of bytes, with or without a suffix k, M, G or T for a power of 1024: "8G", "512M", "100k", "4096".
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& flag, const std::string& text);
 /// Parses a width and a height: "1200x800".
 [[nodiscard]] std::array<int, 2> parse_size(const std::string& flag, const std::string& text);

@@ -22,7 +22,8 @@ enum class OptionRole {
 /// listed in job_options.cpp. An option of any other type is Conduct, and cannot be set by a file.
 [[nodiscard]] OptionRole role_of(const CLI::Option& option);
 
-/// A command and the options that were given to it with their values, in the order of the command's table.
+/// A command, and the names and values of options that were given to it. job_of() stores the settings and inputs, in
+/// the order in which the command defines its options.
 struct JobOptions {
     std::string command;
     std::vector<std::pair<std::string, std::vector<std::string>>> values;

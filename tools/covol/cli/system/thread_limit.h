@@ -8,9 +8,10 @@ struct ThreadCount {
     int wanted = 1, possible = 1;
 };
 
-/// Determines how many threads the system can create (ulimit -u, pids.max of a control group), and limits TBB to that
-/// number from now on: if TBB cannot create a thread, the exception may end the process.
-/// @param threads  the maximum requested; 0: one for each core
+/// Determines how many of the wanted threads the system can create (ulimit -u, pids.max of a control group). If it
+/// cannot create all of them, TBB is limited to that number until the process ends, because the exception that TBB
+/// throws when it cannot create a thread may end the process.
+/// @param threads  the maximum number wanted; 0: as many as TBB uses by default, one for each core
 [[nodiscard]] ThreadCount limit_threads(int threads);
 
 /// Messages for a lack of memory, or of threads.
