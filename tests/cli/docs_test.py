@@ -5,13 +5,14 @@
 Blocks that begin with ```bash are run, those of a page one after the other, in a folder that contains the sample data and an empty
 folder `out`; the program is on the path as covol. Blocks that begin with ```sh need the data of COVOL_DATA and are run if it is
 set. Other blocks are only checked. The commands make the pictures of the pages: if COVOL_PICTURES is set to a folder, the pictures
-are stored there.
+are stored there. A block that runs an example script is checked as in examples_test.py, which leaves this script out.
 """
 import json
 import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -31,6 +32,30 @@ def without_data(text):
     return re.sub(r"^```sh\n.*?^```\n\n!\[.*?\n", "", text, flags=re.M | re.S)
 
 
+def examples_in(block):
+    """Names of the example scripts that the block runs."""
+    return re.findall(r"\bbash houdini_free_examples/(\d\w*\.sh)", block)
+
+
+def check_example(test, done, out, folder):
+    """Checks what an example script printed, and that the files that it names are there. `out`: its COVOL_OUT, relative to `folder`."""
+    test.assertNotIn("warning", done.stderr)
+    output = done.stdout.split("== results", 1)
+    test.assertEqual(len(output), 2, done.stdout)
+    named = {folder / path for path in re.findall(rf"(?<![\w/.-]){re.escape(str(out))}/[\w/.-]*\w", output[1])}
+    test.assertTrue(named, "no file is named")
+    for path in named:
+        test.assertTrue(path.is_file() and path.stat().st_size > 0, f"{path} is named, but not there")
+    pictures = {picture for path in named for picture in path.parent.rglob("*.png")}
+    test.assertTrue(pictures, "no picture")
+    for picture in pictures:
+        data = picture.read_bytes()
+        test.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+        width, height = struct.unpack(">II", data[16:24])
+        # A picture of a single colour compresses to almost nothing.
+        test.assertGreater(len(data), width * height / 100, f"{picture} is empty")
+
+
 class Pages(unittest.TestCase):
     def run_page(self, page):
         folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-docs-"))
@@ -46,6 +71,9 @@ class Pages(unittest.TestCase):
             done = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, timeout=300, cwd=folder,
                                   env={**os.environ, "PATH": path})
             self.assertEqual(done.returncode, 0, f"{block}\n{done.stdout}\n{done.stderr}")
+            if examples := examples_in(block):
+                self.assertEqual(len(examples), 1, block)
+                check_example(self, done, "out", folder)
         text = page.read_text() if has_data else without_data(page.read_text())
         for picture in re.findall(r"\]\([./]*pictures/([\w.]+)\)", text):
             made = folder / "out" / picture

@@ -31,7 +31,7 @@ def fields_of(json_value, path=""):
 
 class Streams(Case):
     def test_results_go_to_standard_output_and_messages_do_not(self):
-        self.segment("--mesh", "m.ply", "--quiet")
+        self.segment("--mesh", "m.ply", "--quiet", points=self.sparse)
         for words, expected_text in ((("info", "s.vdb"), "surface: Tree_float"), (("info", self.image), "spacing 0.5 x 0.5 x 0.5"),
                             (("compare", "s.vdb", "m.ply"), "Dice"), (("compare", "s.vdb", self.points), "points to surface"),
                             (("check", "m.ply"), "no problem"), (("check", self.image), "the file states no unit"),
@@ -41,22 +41,22 @@ class Streams(Case):
                 self.assertIn(expected_text, done.stdout)
                 self.assertNotIn(expected_text, done.stderr)
                 self.assertEqual(self.run_covol(*words, "--quiet").stderr, "")
-        done = self.segment()
+        done = self.segment(points=self.sparse)
         self.assertEqual(done.stdout, "")
         self.assertIn("wrote s.vdb", done.stderr)
 
     def test_a_report_on_standard_output_is_alone_there(self):
-        self.segment("--quiet")
+        self.segment("--quiet", points=self.sparse)
         done = self.run_covol("info", "s.vdb", "--json", "-")
         self.assertEqual(json.loads(done.stdout)["kind"], "vdb")
         self.assertIn("surface: Tree_float", done.stderr)
 
     def test_points_from_standard_input(self):
+        self.run_covol("reconstruct", self.points, "-o", "d.vdb", "--quiet")
         for text in self.points.read_text(), "x,y,z\n" + self.points.read_text().replace(" ", ","):
             done = subprocess.run([COVOL, "reconstruct", "-", "-o", "c.vdb", "--quiet"], input=text, text=True, cwd=self.out,
                                   capture_output=True)
             self.assertEqual((done.returncode, done.stderr), (0, ""))
-            self.run_covol("reconstruct", self.points, "-o", "d.vdb", "--quiet")
             self.assertEqual(self.report("compare", "c.vdb", "d.vdb")["compare"]["dice"], 1)
         done = subprocess.run([COVOL, "segment", str(self.image), "--points", "-", "-o", "e.vdb", "--quiet"],
                               input=self.points.read_text(), text=True, cwd=self.out, capture_output=True)
@@ -201,7 +201,7 @@ class Outputs(Case):
         volume = self.report("info", "start.ply")["mesh"]["volume"]
         self.assertAlmostEqual(volume / (4 / 3 * math.pi * 27), 1, 1)
         # A successful run keeps nothing.
-        self.segment("--keep-failed", "none.vdb", "--quiet")
+        self.segment("--keep-failed", "none.vdb", "--quiet", points=self.sparse)
         self.assertNotIn("none.vdb", self.files())
 
 

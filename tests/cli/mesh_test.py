@@ -58,6 +58,6 @@ class Meshes(Case):
                 self.check("t.ply", *topology)
 
     def test_adaptive_has_a_bound(self):
-        self.segment()
+        self.segment(points=self.sparse)
         (self.out / "s.vdb").rename(self.inputs / "s.vdb")
         self.refuse("mesh", self.inputs / "s.vdb", "-o", "m.ply", "--adaptive", "3vx", code=3, expected_text="at most two voxels")

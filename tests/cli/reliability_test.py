@@ -159,11 +159,12 @@ class Memory(Case):
 
     def test_is_not_passed(self):
         self.run_covol("phantom", "torus", "--size", 224, "--count", 150000, "-o", "t.nrrd", "--points", "t.ply")
+        self.run_covol("phantom", "torus", "--size", 64, "--count", 30000, "-o", "c.nrrd", "--points", "c.ply")
         self.run_covol("segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "--max-steps", 1, "-o", "t.vdb", "--mesh", "m.ply",
                        "--mask", "k.nrrd")
         jobs = {
             "tagged": ["segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "-o", "o.vdb"],
-            "cloud": ["reconstruct", "t.ply", "-o", "o.vdb"],
+            "cloud": ["reconstruct", "c.ply", "-o", "o.vdb"],
             "edge": ["edge", "t.nrrd", "--band", "t.vdb", "-o", "o.vdb"],
             "mesh": ["mesh", "t.vdb", "-o", "o.ply", "--target-edge", "2vx"],
             "repair": ["mesh", "t.vdb", "-o", "o.ply", "--repair"],
@@ -185,7 +186,7 @@ class Memory(Case):
         self.stay_within({
             "distance": ["distance", "t.ply", "--like", "t.nrrd", "-o", "o.vdb", "--max-distance", "30vx"],
             "band": ["band", "d.vdb", "-o", "o.vdb", "--tag-distance", "3vx"],
-            "evolve": ["evolve", "b.vdb", "--distance", "d.vdb", "-o", "o.vdb", "--rho", 0],
+            "evolve": ["evolve", "b.vdb", "--distance", "d.vdb", "-o", "o.vdb", "--rho", 0, "--max-steps", 3],  # all take the same memory
             "surface": ["surface", "b.vdb", "-o", "o.vdb"],
             "convert": ["convert", "t.nrrd", "o.vdb"],
             "fine mesh": ["mesh", "b.vdb", "-o", "o.ply"],

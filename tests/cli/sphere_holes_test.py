@@ -29,15 +29,16 @@ KINDS = ("round", "square", "slit")
 
 @unittest.skipIf(MISSING, MISSING)
 class SphereHoles(unittest.TestCase):
-    def setUp(self):
-        self.out = pathlib.Path(tempfile.mkdtemp(prefix="covol-holes-"))
-        self.addCleanup(shutil.rmtree, self.out)
+    @classmethod
+    def setUpClass(cls):
+        cls.out = pathlib.Path(tempfile.mkdtemp(prefix="covol-holes-"))
+        cls.addClassCleanup(shutil.rmtree, cls.out)
+        for kind in KINDS:
+            cls.run_covol("phantom", f"sphere-{kind}", "--size", 130, "-o", f"{kind}.nrrd", "--points", f"{kind}.xyz")
 
-    def run_covol(self, *args):
-        subprocess.run([COVOL, *map(str, args), "--quiet"], check=True, cwd=self.out, timeout=600)
-
-    def phantom(self, kind, size=130):
-        self.run_covol("phantom", f"sphere-{kind}", "--size", size, "-o", "i.nrrd", "--points", "p.xyz")
+    @classmethod
+    def run_covol(cls, *args):
+        subprocess.run([COVOL, *map(str, args), "--quiet"], check=True, cwd=cls.out, timeout=600)
 
     def expect_points_met(self, image, points, kind, voxel):
         self.run_covol("segment", image, "--points", points, *START, "--attraction-range", "5vx", "-o", "s.vdb", "--mesh", "m.ply")
@@ -48,9 +49,8 @@ class SphereHoles(unittest.TestCase):
     def test_points_complete_the_sphere(self):
         for kind in KINDS:
             with self.subTest(kind=kind):
-                self.phantom(kind)
                 # The shell is two voxels thick, and its two edges appear as one: between them the surface is within the shell.
-                self.assertLess(self.expect_points_met("i.nrrd", "p.xyz", kind, 0.02), 2)
+                self.assertLess(self.expect_points_met(f"{kind}.nrrd", f"{kind}.xyz", kind, 0.02), 2)
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
     def test_points_complete_the_sphere_at_260(self):
@@ -72,8 +72,7 @@ class SphereHoles(unittest.TestCase):
 
     def test_the_image_alone_spans_flat_discs(self):
         # The minimal surface across a round hole is the disc bounded by its rim; the cap of the sphere is 2.7 voxels higher.
-        self.phantom("round")
-        self.run_covol("segment", "i.nrrd", "--theta", 0, *START, "-o", "s.vdb", "--mesh", "m.ply")
+        self.run_covol("segment", "round.nrrd", "--theta", 0, *START, "-o", "s.vdb", "--mesh", "m.ply")
         vertices = quality.read_vertices(self.out / "m.ply")
         axis = np.abs(vertices).argmax(1)
         rows = np.arange(len(vertices))

@@ -72,12 +72,16 @@ class Structures(Case):
         both = np.maximum(ball_image(cls.LEFT, cls.RADIUS), ball_image(cls.RIGHT, cls.RADIUS))
         write_nrrd(cls.scene, (SIZE,) * 3, both.tobytes(), spacing=H, origin=ORIGIN)
         cls.left, cls.right = cls.inputs / "left.xyz", cls.inputs / "right.xyz"
-        write_points(cls.left, ball_points(cls.LEFT, cls.RADIUS))
-        write_points(cls.right, ball_points(cls.RIGHT, cls.RADIUS))
+        cls.few_left, cls.few_right = cls.inputs / "few_left.xyz", cls.inputs / "few_right.xyz"
+        for count, left, right in ((1500, cls.left, cls.right), (100, cls.few_left, cls.few_right)):
+            write_points(left, ball_points(cls.LEFT, cls.RADIUS, count))
+            write_points(right, ball_points(cls.RIGHT, cls.RADIUS, count))
 
-    def two(self, *more):
-        return ("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--rho", 0,
-                "--delta", "0.2vx", "-o", "s.vdb", *more)
+    def two(self, *more, few=False):
+        """@param few  with a hundred marks on each ball, which take less time, where a test is about the files"""
+        left, right = (self.few_left, self.few_right) if few else (self.left, self.right)
+        return ("segment", self.scene, "--points", f"left={left}", f"right={right}", "--rho", 0, "--delta", "0.2vx", "-o", "s.vdb",
+                *more)
 
     def expected_volume(self):
         """A ball without the cap beyond the middle plane."""
@@ -127,7 +131,7 @@ class Structures(Case):
             self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.02)
 
     def test_labels_meet_without_overlap_or_slit(self):
-        self.run_covol(*self.two("--mask", "m.tif"))
+        self.run_covol(*self.two("--mask", "m.tif", few=True))
         self.assertEqual(self.files(), ["m.tif", "m_labels.txt", "s.vdb"])
         labels = tifffile.imread(self.out / "m.tif")
         self.assertEqual(sorted(np.unique(labels)), [0, 1, 2])
@@ -145,14 +149,14 @@ class Structures(Case):
 
     def test_names_beside_masks_of_long_endings(self):
         for mask, labels in (("m.nii.gz", "m_labels.txt"), ("M.OME.TIF", "M_labels.txt"), ("a.b.mha", "a.b_labels.txt")):
-            self.run_covol(*self.two("--mask", mask, "--max-steps", 1))
+            self.run_covol(*self.two("--mask", mask, "--max-steps", 1, few=True))
             self.assertIn("left", (self.out / labels).read_text())
             self.assertEqual(self.files(), sorted([mask, labels, "s.vdb"]))
             for name in self.files():
                 (self.out / name).unlink()
 
     def test_segmentation_for_slicer(self):
-        self.run_covol(*self.two("--mask", "m.seg.nrrd"))
+        self.run_covol(*self.two("--mask", "m.seg.nrrd", few=True))
         keys = nrrd_keys(self.out / "m.seg.nrrd")
         self.assertEqual((keys["Segment0_Name"], keys["Segment1_Name"]), ("left", "right"))
         self.assertEqual((keys["Segment0_LabelValue"], keys["Segment1_LabelValue"]), ("1", "2"))
@@ -164,12 +168,12 @@ class Structures(Case):
         self.assertEqual(keys["Segmentation_MasterRepresentation"], "Binary labelmap")
 
     def test_one_mesh_file_with_two_objects(self):
-        self.run_covol(*self.two("--mesh", "m.obj"))
+        self.run_covol(*self.two("--mesh", "m.obj", few=True))
         self.assertEqual(self.files(), ["m.obj", "s.vdb"])
         text = (self.out / "m.obj").read_text()
         self.assertEqual(re.findall(r"(?m)^o (.*)$", text), ["left", "right"])
         self.assertEqual(self.report("info", "m.obj")["command"], "info")
-        self.run_covol(*self.two("--mesh", "m.glb"))
+        self.run_covol(*self.two("--mesh", "m.glb", few=True))
         data = (self.out / "m.glb").read_bytes()
         header = json.loads(data[20:20 + int.from_bytes(data[12:16], "little")])
         self.assertEqual([n["name"] for n in header["nodes"]], ["left", "right"])
@@ -211,17 +215,17 @@ class Structures(Case):
 
     def test_names(self):
         self.refuse("segment", self.scene, "--points", f"left={self.left}", self.right, "-o", "s.vdb", code=2, expected_text="name")
-        self.refuse("segment", self.scene, "--points", f"a={self.left}", f"b={self.left}", "--rho", 0, "-o", "s.vdb", code=3,
+        self.refuse("segment", self.scene, "--points", f"a={self.few_left}", f"b={self.few_left}", "--rho", 0, "-o", "s.vdb", code=3,
                     expected_text="same solid")
         self.refuse("segment", self.scene, "--points", "a=none.xyz", "-o", "s.vdb", code=4, expected_text="none.xyz")
         self.refuse("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--init", "sphere:0,0,0,5",
                     "-o", "s.vdb", code=2, expected_text="--init")
         # A file whose own name contains the sign.
         odd = self.inputs / "left=1.xyz"
-        odd.write_bytes(self.left.read_bytes())
+        odd.write_bytes(self.few_left.read_bytes())
         report = self.report("segment", self.scene, "--points", odd, "-o", "s.vdb", "--rho", 0)
         self.assertNotIn("structures", report)
-        self.assertEqual(report["input"]["points"]["count"], 1500)
+        self.assertEqual(report["input"]["points"]["count"], 100)
         done = self.run_covol("segment", self.scene, "--points", "left=1.xyz", "-o", self.out / "s.vdb", "--rho", 0, cwd=self.inputs)
         self.assertNotIn("left: ", done.stderr)
 
@@ -233,7 +237,7 @@ class Structures(Case):
         self.refuse("segment", self.scene, "--points", f"line={line}", f"right={broken}", "-o", "s.vdb", code=3, expected_text="broken.xyz")
 
     def test_one_named_structure(self):
-        report = self.report("segment", self.scene, "--points", f"the left={self.left}", "-o", "s.vdb", "--rho", 0, "--mesh",
+        report = self.report("segment", self.scene, "--points", f"the left={self.few_left}", "-o", "s.vdb", "--rho", 0, "--mesh",
                              "m.ply", "--mask", "m.nrrd")
         self.assertEqual(report["structures"][0]["name"], "the left")
         self.assertEqual([g["name"] for g in self.report("info", "s.vdb")["grids"]], ["surface"])
@@ -284,13 +288,14 @@ class TimeLapse(Case):
             cls.singles.append(cls.inputs / f"single{t}.tif")
             tifffile.imwrite(cls.singles[-1], frame, imagej=True, resolution=(1 / H, 1 / H),
                              metadata={"axes": "ZYX", "spacing": H, "unit": "um"})
-            write_points(cls.inputs / f"marks_{t:03d}.xyz", cls.marks(t))
-        cls.first = cls.inputs / "marks_000.xyz"
+            write_points(cls.inputs / f"marks_{t:03d}.xyz", cls.marks(t, 1500))
+            write_points(cls.inputs / f"few_{t:03d}.xyz", cls.marks(t, 100))  # enough for the first frame of a run
+        cls.first = cls.inputs / "few_000.xyz"
 
     @classmethod
-    def marks(cls, t):
+    def marks(cls, t, count):
         center, r = cls.ball_at(t)
-        return ball_points(np.asarray(center) + cls.middle, r)
+        return ball_points(np.asarray(center) + cls.middle, r, count)
 
     def check_radius(self, volume, t):
         r = (3 * volume / (4 * math.pi)) ** (1 / 3)
@@ -307,7 +312,7 @@ class TimeLapse(Case):
         for t, (frame, row) in enumerate(zip(report["frames"], rows)):
             self.assertEqual((frame["status"], row["status"]), ("ok", "ok"))
             self.assertEqual(row["structure"], "surface")
-            self.assertEqual(frame["input"]["points"]["count"], 1500 if t == 0 else 0)
+            self.assertEqual(frame["input"]["points"]["count"], 100 if t == 0 else 0)
             self.assertEqual(frame["resolved"]["delta"], 0.5 * H)
             self.check_radius(frame["surface"]["volume"], t)
             self.assertAlmostEqual(float(row["volume (um^3)"]), frame["surface"]["volume"], delta=1e-5 * frame["surface"]["volume"])
@@ -323,11 +328,11 @@ class TimeLapse(Case):
             np.testing.assert_allclose(where, np.asarray(self.ball_at(t)[0]) + self.middle, atol=0.3 * H)
 
     def test_a_range_and_one_frame(self):
-        report = self.report("segment", self.movie, "--points", self.inputs / "marks_002.xyz", "--frame", "2-3", "-o", "s.vdb",
+        report = self.report("segment", self.movie, "--points", self.inputs / "few_002.xyz", "--frame", "2-3", "-o", "s.vdb",
                              "--delta", "0.3vx")
         self.assertEqual(self.files(), ["s_t002.vdb", "s_t003.vdb"])
         self.check_radius(report["frames"][1]["surface"]["volume"], 3)
-        report = self.report("segment", self.movie, "--points", self.inputs / "marks_004.xyz", "--frame", "4", "-o", "one.vdb",
+        report = self.report("segment", self.movie, "--points", self.inputs / "few_004.xyz", "--frame", "4", "-o", "one.vdb",
                              "--delta", "0.3vx")
         self.assertIn("one.vdb", self.files())
         self.check_radius(report["surface"]["volume"], 4)

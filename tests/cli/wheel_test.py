@@ -34,13 +34,17 @@ def run(*words, **more):
 @unittest.skipUnless(shutil.which("patchelf") and shutil.which("dpkg"), "needs patchelf and dpkg")
 class Wheel(unittest.TestCase):
     @classmethod
+    def make(cls, output):
+        run("/usr/bin/python3", ROOT / "tools/packaging/wheel.py", cls.bundle, "--output", output, "--level", "1")
+
+    @classmethod
     def setUpClass(cls):
         cls.work = pathlib.Path(tempfile.mkdtemp(prefix="covol-wheel-"))
         cls.addClassCleanup(shutil.rmtree, cls.work)
         run("cmake", "--build", BUILD, "--target", "covol_packed")
         run("/usr/bin/python3", ROOT / "tools/packaging/bundle.py", BUILD, "--output", cls.work, "--level", "0")
         [cls.bundle] = cls.work.glob("*.tar.xz")
-        run("/usr/bin/python3", ROOT / "tools/packaging/wheel.py", cls.bundle, "--output", cls.work)
+        cls.make(cls.work)
         [cls.wheel] = cls.work.glob("*.whl")
         cls.zip = zipfile.ZipFile(cls.wheel)
         cls.addClassCleanup(cls.zip.close)
@@ -87,7 +91,7 @@ class Wheel(unittest.TestCase):
 
     def test_the_same_bundle_gives_the_same_bytes(self):
         again = self.work / "again"
-        run("/usr/bin/python3", ROOT / "tools/packaging/wheel.py", self.bundle, "--output", again)
+        self.make(again)
         self.assertEqual((again / self.wheel.name).read_bytes(), self.wheel.read_bytes())
 
     def test_installed_and_used(self):

@@ -9,7 +9,8 @@ import sys
 
 
 def findings(root):
-    listed = set(re.findall(r"[a-z0-9_]+_test(?:\.[A-Za-z]+)?\b", (root / "tests/CMakeLists.txt").read_text()))
+    text = re.sub(r"#.*", "", (root / "tests/CMakeLists.txt").read_text())  # a test program named in a comment runs nothing
+    listed = set(re.findall(r"(?<![\w/])[a-z0-9_]+_test(?:\.[A-Za-z]\w*)?(?=[\s)]|\.\$)", text))  # .$: of a loop
     files = sorted((root / "tests/cli").glob("*_test.py"))
     if len(files) < 20:
         yield f"{root}: expected the tests of the command line"

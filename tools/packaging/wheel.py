@@ -93,7 +93,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bundle", type=pathlib.Path, help="covol-VERSION-linux-MACHINE.tar.xz, as bundle.py makes it")
     parser.add_argument("--output", type=pathlib.Path, default=pathlib.Path("."), help="folder of the wheel [here]")
-    parser.add_argument("--level", type=int, default=9, choices=range(10), help="of deflate [9]")
+    parser.add_argument("--level", type=int, default=6, choices=range(10), help="of deflate [6]")
     options = parser.parse_args()
     named = re.fullmatch(r"covol-([0-9.]+)-linux-(\w+)\.tar\.xz", options.bundle.name)
     if not named:
@@ -122,12 +122,12 @@ def main():
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"covol-{version}-{tag}.whl"
     partial = path.with_name(path.name + ".part")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=options.level) as wheel:
+    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as wheel:
         for name, data, executable in entries:
             info = zipfile.ZipInfo(name, stamp)
             info.external_attr = (0o100755 if executable else 0o100644) << 16
             info.compress_type = zipfile.ZIP_DEFLATED
-            wheel.writestr(info, data)
+            wheel.writestr(info, data, compresslevel=options.level)
     partial.replace(path)
     print(f"wheel: wrote {path}: {path.stat().st_size / 1e6:.1f} MB, {len(entries)} files, glibc {c_library[1]}.{c_library[2]} or later")
     return 0
