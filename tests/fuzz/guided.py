@@ -250,7 +250,7 @@ def main():
     parser.add_argument("--keep", type=pathlib.Path, default=pathlib.Path("fuzz-findings"))
     parser.add_argument("--corpus", type=pathlib.Path)
     parser.add_argument("--pack", type=pathlib.Path, help="fuzz nothing: make this .tar.xz of the best files of --corpus")
-    parser.add_argument("--pack-most", type=int, default=60, help="files of a format")
+    parser.add_argument("--pack-max", type=int, default=60, help="files of a format")
     options = parser.parse_args()
     found = []
     with tempfile.TemporaryDirectory(prefix="covol-seeds-") as name:

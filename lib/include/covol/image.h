@@ -203,10 +203,10 @@ struct ImageInfo {
 };
 
 /// Reads a 3D image: TIFF (including descriptions by ImageJ, OME and tifffile; BigTIFF, tiles, several files), NRRD,
-/// NIfTI, MetaImage, MRC, ICS, a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and 3 (the folder
-/// of the image, or of one level), HDF5 (Imaris, BigDataViewer, ITK's, or a dataset: "FILE.h5:/path/to/dataset"), a
-/// float grid of a .vdb file ("FILE.vdb:name", or its first one; the image is the box of its active voxels). Warns if a
-/// file states no spacing.
+/// NIfTI, MetaImage, MRC, ICS, NumPy (.npy), a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and
+/// 3 (the folder of the image, or of one level), HDF5 (Imaris, BigDataViewer, ITK's, or a dataset:
+/// "FILE.h5:/path/to/dataset"), a float grid of a .vdb file ("FILE.vdb:name", or its first one; the image is the box
+/// of its active voxels). Warns if a file states no spacing.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; a roi outside of
 /// the image), Unsupported (several channels, frames or series and none chosen: the message lists them; an unknown
 /// format).

@@ -90,7 +90,8 @@ private:
             list.push_back(
                 {{"name", part.name}, {"formats", part.formats}, {"path", part.path}, {"problem", part.problem}});
         }
-        session.print("formats that need no separate reader: TIFF, NIfTI, OME-Zarr, MRC, ICS, OpenVDB, meshes, tables");
+        session.print(
+            "formats that need no separate reader: TIFF, NIfTI, OME-Zarr, MRC, ICS, NumPy, OpenVDB, meshes, tables");
         return list;
     }
 

@@ -9,8 +9,8 @@ void add_segment(Session& session) {
     in_group(*command, Group::Input);
     command
         ->add_option("image", job->images,
-                     "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, ICS, HDF5, .vdb; several are a "
-                     "time-lapse [the study's]")
+                     "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, ICS, HDF5, NumPy, .vdb; several "
+                     "are a time-lapse [the study's]")
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
         ->description(

@@ -208,7 +208,8 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         command
             .add_option("--structure-column", structure_column,
                         "what names the structure of each mark in a file with several structures: a column, a group, "
-                        "counter or type of Fiji, or a label or node of 3D Slicer")
+                        "counter or type of Fiji, a label or node of 3D Slicer, a label of .csl sections, or the roi "
+                        "of DICOM")
             ->type_name("NAME");
     }
     if (with_image) painted.bind(command);

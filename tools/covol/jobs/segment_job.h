@@ -82,7 +82,7 @@ struct SegmentJob {
                                             const std::optional<ImageGeometry>& geometry, Session& session) const;
     /// Whether an output, or the processing of the surface, needs its relaxed mesh.
     [[nodiscard]] bool needs_mesh() const;
-    /// Checks, before any file is read, for options that are invalid for every voxel size. @throws UsageError, Error
+    /// Checks, before the image is read, for options that are invalid for every voxel size. @throws UsageError, Error
     void check_options() const;
     /// Like check_options(), for a job in bricks: options of a mesh are accepted without a mesh, because another step
     /// of the job may write it.

@@ -371,7 +371,7 @@ LevelSet._repr_html_ = _html.level_set
 read_image.__doc__ = """Reads a 3D image in its own number type.
 
 Args:
-    path: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, ICS, HDF5 or .vdb, see docs/formats.md.
+    path: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, ICS, HDF5, NumPy or .vdb, see docs/formats.md.
     spacing: instead of the file's. channel, frame: of images with several. roi: two corners in world coordinates.
 
 Returns:

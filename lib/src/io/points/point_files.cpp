@@ -148,7 +148,7 @@ PointTable read_point_table(const std::string& path, const std::string& structur
             Errc::InvalidInput,
             path + ": `structure_column`: expected a table with a column " + quote(structures_by) +
                 ", Fiji's selections with group or counter, its Cell Counter with type, 3D Slicer's markups with "
-                "label or node, or a DICOM RT structure set with roi; a " +
+                "label or node, .csl sections with label, or a DICOM RT structure set with roi; a " +
                 extension + " file has no '" + structures_by + "'",
             "structure_column");
     return table;
