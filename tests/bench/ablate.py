@@ -15,7 +15,7 @@ A mechanism is switched off by COVOL_SCALE (base/heuristics.h), which makes its 
   distance from the points to the surface, or, for a ball, from the surface to the sphere.
 - jobs: all small jobs of sensitivity_jobs.JOBS: clouds, scans of one side, given normals, contours, painted slices, guesses, growth.
 
-`--scale "layers.max_gain=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
+`--scale "layers.farthest_layer=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
 """
 import argparse
 import concurrent.futures
@@ -55,13 +55,10 @@ MECHANISMS = {
     "iterations": ("the second iteration of guidance", "guidance.iterations=0.5", ("marks", "jobs")),
     "level_blur": ("blur over levels of intensity", "guidance.level_blur=0.001", ("marks", "jobs")),
     "sagitta": ("error of the guess by the sagitta", "guidance.fraction_of_sagitta=0", ("marks",)),
-    "layers": ("layers of a scan below others", "layers.max_gain=0", ("jobs",)),
-    "patches": ("turning of patches", "iteration.patch_off=100", ("clouds", "jobs")),
+    "layers": ("layers of a scan below others", "layers.farthest_layer=0", ("jobs",)),
     "joining": ("joining of torn pieces", "join_pieces.max_gap=0", ("clouds", "jobs")),
-    "creases": ("sheets that meet", "crease.misfit_ratio=0", ("clouds",)),
+    "creases": ("sheets that meet", "crease.radius=0", ("clouds",)),
     "folds": ("folds by the indicator", "local_fit.off_indicator=1e9", ("clouds",)),
-    "bias": ("bias of noise along curved surfaces", "local_fit.max_unbent=0", ("clouds",)),
-    "contradicted": ("given normals that others contradict are turned", "given_sides.speaks_against=1000", ("jobs",)),
     "clear": ("growth: a clear edge", "grow.clear=0", ("jobs",)),
     "snapping": ("vertices beside a cut are moved onto it", "cut.close=0", ("jobs",)),
 }

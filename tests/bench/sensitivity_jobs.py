@@ -338,15 +338,15 @@ REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) fo
 DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
 PLAN = {  # step: the jobs that exercise it
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
-    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "orientation", "iteration", "torn", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
+    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "orientation", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
-    **dict.fromkeys(("tag_distance", "tagging", "scan_noise"), TAGGED),
+    **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": CORRECTED,
     "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": REAL_FEW, "doubts": DOUBTED,
-    **dict.fromkeys(("contours", "painted", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
-    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]), "pieces": GUESSED,
+    **dict.fromkeys(("contours", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
+    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]),
     "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
-    **dict.fromkeys(("holes", "cut", "relax", "decimate", "level"), MESHES),
+    **dict.fromkeys(("holes", "cut", "relax", "decimate"), MESHES),
 }
 
 

@@ -31,7 +31,7 @@ ALLOWED = {
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinFraction", "meshing/relax.cpp:kGain", "meshing/relax.cpp:kStep", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMaxCaps",
-    "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain", "tagging/tagging.cpp:kBall",
+    "start/other_lattice.cpp:kSame", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kBucketsPerVoxel", "tagging/cores.cpp:kOutsideDomain", "tagging/tagging.cpp:kBall",
 }
 
 

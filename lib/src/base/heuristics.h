@@ -67,6 +67,8 @@ struct CommonHeuristics {
     /// [voxels] Distance by which a surface is continued beyond a cut, so that its band is correct up to the cut: twice
     /// the half width of a band.
     double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
+    /// [ratio] Of the margin around points, contours or a body to their longest side.
+    double margin = heuristic("common.margin", 0.2);
     /// [voxels] Precision of a position that is given by voxels, and thus the smallest length that has to be resolved.
     double precision_voxels = heuristic("common.precision_voxels", 0.5);
     /// [ratio] Of a distance to the relevant length; below it, two positions count as equal.

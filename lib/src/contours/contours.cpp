@@ -83,7 +83,7 @@ private:
     void check_inside(const Line& line) const;
     /// Maximum deviation of marks from their common slice: relative to the image's spacing, or else to a length.
     [[nodiscard]] double same_slice(double spacing, double length) const {
-        return has_image_ ? kContours.same_slice * spacing : kCommon.same_place * length;
+        return has_image_ ? kCommon.precision_voxels * spacing : kCommon.same_place * length;
     }
     void find_planes(Line& line) const;
     void choose_plane();
@@ -144,7 +144,7 @@ void Densifier::check_inside(const Line& line) const {
     const Vec3* first = nullptr;
     for (const Vec3& p : line.index)
         for (int a = 0; a < 3; ++a)
-            if (p[a] < -0.5 - kContours.same_slice || p[a] > geometry_.size[a] - 0.5 + kContours.same_slice) {
+            if (p[a] < -0.5 - kCommon.precision_voxels || p[a] > geometry_.size[a] - 0.5 + kCommon.precision_voxels) {
                 ++outside;
                 if (first == nullptr) first = &p;
                 break;
@@ -339,8 +339,7 @@ void Densifier::make_solid() {
         polygons.back().push_back(std::move(polygon));
     }
     fill_slices(*data, polygons);
-    // A slice whose contours enclose no node of the grid is removed. Its level would be negative nowhere, so that the
-    // body would end at this slice although it has a contour there.
+    // Slices whose contours enclose no node of the grid are removed: the body would end there in spite of the contour.
     for (std::size_t n = data->slices.size(); n-- > 0;)
         if (data->slices[n].depth == 0) {
             data->slices.erase(data->slices.begin() + std::ptrdiff_t(n));

@@ -59,7 +59,7 @@ SliceGrid grid_around(const std::vector<Polygon>& polygons, double cell) {
                 low[a] = std::min(low[a], p[a]);
                 high[a] = std::max(high[a], p[a]);
             }
-    const double margin = kContours.network_around * std::max(high[0] - low[0], high[1] - low[1]) + 2 * cell;
+    const double margin = kCommon.margin * std::max(high[0] - low[0], high[1] - low[1]) + 2 * cell;
     const double width = high[0] - low[0] + 2 * margin, height = high[1] - low[1] + 2 * margin;
     SliceGrid grid;
     grid.cell = std::max(cell, std::sqrt(width * height / double(kMaxSectionNodes)));

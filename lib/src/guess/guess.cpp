@@ -142,7 +142,7 @@ bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     if (marks.size() < kCommon.ring) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
-    return double(surrounded) < kGuess.surrounded_fraction * double(marks.size());
+    return double(surrounded) < kCommon.minority * double(marks.size());
 }
 
 /// Depth of a mark in the body's section, measured within the plane of the cut: negative inside, positive outside.

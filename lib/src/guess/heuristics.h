@@ -14,10 +14,6 @@ struct GuessHeuristics {
     /// [pi] Minimum angle between the directions to neighbouring marks in a cut that counts as a gap: beside a straight
     /// line of marks it is pi.
     double way_out = heuristic("guess.way_out", 5.0 / 6);
-    /// [of the marks beside a face that cuts the body] Maximum fraction of marks that have others all around them
-    /// (guess.way_out), if the marks are only along the outline of the cut: of twelve or more marks all over the cut,
-    /// at least a sixth have.
-    double surrounded_fraction = heuristic("guess.surrounded_fraction", 0.125);
 };
 COVOL_HEURISTICS GuessHeuristics kGuess{};
 

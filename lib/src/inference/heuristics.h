@@ -29,10 +29,8 @@ struct InferenceHeuristics {
     double max_off = heuristic("inference.max_off", 0.2);
     /// [of the marks] Fraction that is expected to be wrong. Parts of a body near a smaller fraction are dropped.
     double wrong = heuristic("inference.wrong", 0.05);
-    /// [of the distance by which it misses a mark] Radius around the mark within which a guess is redrawn.
-    double redrawn = heuristic("inference.redrawn", 1.8);
     /// [voxels] Maximum distance by which a guess may miss a mark.
-    double farthest_miss = heuristic("inference.farthest_miss", 30);
+    double farthest_miss = limit("inference.farthest_miss", 30);
     /// [bits] Minimum information that the image gives about the two sides of a guess; with less it is not redrawn.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
     /// [1 - Dice] Expected value for a result whose error times its area equals its volume. It was fitted to 118 runs

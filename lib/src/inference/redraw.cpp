@@ -95,7 +95,7 @@ private:
         const Miss& miss = *nearest_[n];
         if (miss.outside == is_inside(n)) return 1;
         const double deep = std::abs(double(distance_[n])) / miss.off;
-        return std::clamp(std::max((double(freedom_[n]) - 1) / (kInference.redrawn - 1), 2 * (deep - 1)), 0.0, 1.0);
+        return std::clamp(std::max((double(freedom_[n]) - 1) / (kCommon.clear_ratio - 1), 2 * (deep - 1)), 0.0, 1.0);
     }
     /// Nodes at most one cell from a position.
     [[nodiscard]] std::vector<std::size_t> nodes_beside(const Vec3& place) const {
@@ -116,7 +116,7 @@ private:
         return nodes;
     }
     [[nodiscard]] bool is_inside(std::size_t n) const { return guess_.inside[n] != 0; }
-    [[nodiscard]] bool is_free(std::size_t n) const { return double(freedom_[n]) <= kInference.redrawn; }
+    [[nodiscard]] bool is_free(std::size_t n) const { return double(freedom_[n]) <= kCommon.clear_ratio; }
     void drop_loose_parts(std::vector<char>& body, bool of_inside) const;
 
     const RunContext& run_;
@@ -222,7 +222,7 @@ FloatGridPtr Redrawing::on(const FloatGrid& guess) const {
         for (int j = first(1); j <= last(1); ++j)
             for (int k = first(2); k <= last(2); ++k) {
                 const Vec3 place = to_frame(geometry_, domain.index_to_world({double(i), double(j), double(k)}));
-                if (nearest_miss(place).first > kInference.redrawn) continue;
+                if (nearest_miss(place).first > kCommon.clear_ratio) continue;
                 accessor.setValueOn({i, j, k}, float(std::clamp(lattice_.value(level_, place), -clamp, clamp)));
             }
     return start_from_grid(domain, *result, run_);
@@ -259,7 +259,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
             maximum = std::max(maximum, miss.off);
         }
         const Lattice lattice =
-            around(geometry, misses, (kInference.redrawn + 1) * maximum + kCommon.beyond_voxels * voxel);
+            around(geometry, misses, (kCommon.clear_ratio + 1) * maximum + kCommon.beyond_voxels * voxel);
         if (is_too_large(lattice, geometry, run)) {
             result.reason = "the image's box around the marks that the guess misses is too large to be read as a whole";
             return;

@@ -26,12 +26,4 @@ struct DecimateHeuristics {
 };
 COVOL_HEURISTICS DecimateHeuristics kDecimate{};
 
-/// Projection of vertices onto the level set: level.cpp.
-struct LevelHeuristics {
-    /// [fraction of the slope of a distance] Lower bound of the slope in estimates of the distance, because the slope
-    /// vanishes midway between two walls.
-    double min_slope = heuristic("level.min_slope", 0.5);
-};
-COVOL_HEURISTICS LevelHeuristics kLevel{};
-
 }  // namespace covol

@@ -7,7 +7,6 @@
 
 #include "base/heuristics.h"
 #include "grid/leaf_band.h"
-#include "meshing/heuristics.h"
 
 namespace covol::meshing {
 namespace {
@@ -164,7 +163,8 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
 
 double Level::distance(const Vec3& world) const {
     const Sample here = sample(world);
-    return std::abs(here.value) / std::max(length(here.gradient), kLevel.min_slope);
+    // The slope, 1 for a distance, vanishes midway between two walls.
+    return std::abs(here.value) / std::max(length(here.gradient), kCommon.minority);
 }
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {

@@ -4,14 +4,6 @@
 
 namespace covol {
 
-/// Interpretation of painted labels: painted.cpp, whole_runs.cpp.
-struct PaintedHeuristics {
-    /// [ratio] Width of the widest patch over the number of adjacent painted slices, from which on the slices count as
-    /// painted one by one.
-    int thin_run = heuristic("painted.thin_run", 3);
-};
-COVOL_HEURISTICS PaintedHeuristics kPainted{};
-
 /// Outlines of patches: outline.cpp. Measured on digitised discs of radius 1.5 to 40 at 20 positions each: the mean
 /// error is below 0.025 voxel (0.44 with a Gaussian of 1 voxel at radius 1.5), the root mean square 0.10 to 0.13 from
 /// radius 5 on, compared to 0.235 for the staircase.

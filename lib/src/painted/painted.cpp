@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "base/file.h"
+#include "base/heuristics.h"
 #include "covol/error.h"
-#include "painted/heuristics.h"
 #include "painted/outline.h"
 #include "painted/paint.h"
 #include "painted/segments.h"
@@ -101,8 +101,8 @@ bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) 
     if (paint.longest_run == 1) return true;
     const auto [x, y] = Paint::plane(axis);
     const double across = std::max(geometry.spacing[x], geometry.spacing[y]) * paint.widest;
-    return kPainted.thin_run * paint.longest_run <= paint.widest &&
-           kPainted.thin_run * paint.longest_run * geometry.spacing[axis] <= across;
+    return kCommon.clear_ratio * paint.longest_run <= paint.widest &&
+           kCommon.clear_ratio * paint.longest_run * geometry.spacing[axis] <= across;
 }
 
 /// Adds small patches that are alone in their slice, away from other paint: tips of tapering structures.

@@ -28,13 +28,8 @@ struct ScanNoiseHeuristics {
     /// [voxels] Maximum mean distance of points from the local plane at which a voxel size is large enough for the
     /// layer of points to appear as one surface.
     double thin_fraction = heuristic("scan_noise.thin_fraction", 0.35);
-    /// [voxels] The same maximum if it has been exceeded at all larger voxel sizes, as on curved surfaces; scans with
-    /// noise as large as their spacing have 0.3 to 0.45.
-    double clean_fraction = heuristic("scan_noise.clean_fraction", 0.25);
     /// [voxels] Radius of the neighbourhood to which the local plane is fitted.
     double plane_voxels = heuristic("scan_noise.plane_voxels", 2.5);
-    /// [steps] Number of factors common.growth between the spacing and the largest voxel size that is tried.
-    int coarsest = heuristic("scan_noise.coarsest", 5);
     /// [passes] Number of times that average_layers() projects all points onto local planes.
     int passes = heuristic("scan_noise.passes", 2);
 };

@@ -135,18 +135,18 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     ScanVoxelSize choice{spacing, 0};
     if (!(spacing > 0) || points.empty()) return choice;
     const double widest = second_longest_edge(bounding_box(points)) / 2;
-    bool any = false, thin = false, thick = false;
+    bool any = false, thin = false;
     // Starts from the largest size: a ball with a radius of a few spacings contains so few points that a plane fits
     // them even if they fill space.
-    for (int k = kScan.coarsest; k >= 0; --k) {
+    for (int k = kCommon.rounds; k >= 0; --k) {
         const double h = spacing * std::pow(kCommon.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;
         const ScanVoxelSize finer{h, measure_layer_thickness(points, kScan.plane_voxels * h, run)};
-        const bool holds = finer.thickness <= (thick && !thin ? kScan.clean_fraction : kScan.thin_fraction) * h;
+        const bool holds = finer.thickness <= kScan.thin_fraction * h;
         if (thin && !holds) break;
         if (holds || !any) choice = finer;
         any = true;
-        (holds ? thin : thick) = true;
+        thin |= holds;
     }
     return choice;
 }

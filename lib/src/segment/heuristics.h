@@ -87,8 +87,6 @@ COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 struct StartsHeuristics {
     /// [voxels] Weight of curvature for a start that was grown to the image's edges.
     double grown_delta_voxels = heuristic("starts.grown_delta_voxels", 0.1);
-    /// [longest sides] Margin of the domain around the box of points without an image. The surface is cut at its end.
-    double margin_fraction = heuristic("starts.margin_fraction", 0.2);
 };
 COVOL_HEURISTICS StartsHeuristics kStarts{};
 

@@ -145,13 +145,13 @@ public:
                 best_edge_ = edge();
                 best_count_ = order_.size();
             }
-            if (edge() < kGrow.passed * best_edge_ && is_clear()) break;
+            if (kCommon.clear_ratio * edge() < best_edge_ && is_clear()) break;
             if (order_.size() % 65536 == 0) run.check();
         }
     }
 
     [[nodiscard]] bool is_clear() const { return best_edge_ > kGrow.clear * inside_.width; }
-    [[nodiscard]] bool starts_at_edge() const { return start_edge_ > kGrow.passed * best_edge_; }
+    [[nodiscard]] bool starts_at_edge() const { return kCommon.clear_ratio * start_edge_ > best_edge_; }
     [[nodiscard]] double growth() const { return double(best_count_) / double(std::max<std::size_t>(start_count_, 1)); }
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }

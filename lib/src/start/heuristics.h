@@ -7,9 +7,6 @@ namespace covol {
 /// Growing to the image's edges: grow.cpp. The front is that of Malladi, Sethian and Vemuri, Shape modeling with front
 /// propagation, IEEE Trans. Pattern Anal. Mach. Intell. 17(2), 1995; the stopping criterion differs.
 struct GrowHeuristics {
-    /// [of the best front's edge] A start with a stronger edge than this already lies at an edge. A front with a weaker
-    /// edge stops, because it has passed the best one.
-    double passed = heuristic("grow.passed", 0.5);
     /// [spreads] Minimum mean change across the front, relative to the spread of the image inside the start, for an
     /// edge.
     double clear = heuristic("grow.clear", 0.3);

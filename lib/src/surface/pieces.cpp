@@ -12,10 +12,10 @@
 #include <unordered_map>
 
 #include "base/disjoint_sets.h"
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "grid/leaf_columns.h"
 #include "grid/sign_masks.h"
-#include "surface/heuristics.h"
 
 namespace covol::detail {
 namespace {
@@ -380,7 +380,7 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
         std::int64_t maximum = 0;
         for (const ActivePieces::Piece& piece : pieces.all()) maximum = std::max(maximum, piece.voxels);
         for (const ActivePieces::Piece& piece : pieces.all()) {
-            if (double(piece.voxels) > kPieces.small * double(maximum)) continue;
+            if (double(piece.voxels) > kCommon.negligible * double(maximum)) continue;
             CoordBBox box;
             pieces.for_voxels(piece,
                               [&](const Leaf& leaf, openvdb::Index at) { box.expand(leaf.offsetToGlobalCoord(at)); });

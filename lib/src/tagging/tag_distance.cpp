@@ -63,7 +63,7 @@ MainCores judge(const Cores& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    return area < kTagDistance.structure_fraction * cloud_area(verdict.saddle) ? MainCores{} : verdict;
+    return area < kCommon.minority * cloud_area(verdict.saddle) ? MainCores{} : verdict;
 }
 
 }  // namespace
@@ -89,7 +89,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         with_threads(run, [&] { analysis = detail::find_cores(*tube.grid, radius, exterior_seeds); });
         const MainCores verdict = judge(analysis);
         if (verdict.cores > 0) {
-            choice.tag_distance = std::max((kTagDistance.margin * verdict.saddle + 0.5) * a, 1.5 * h);
+            choice.tag_distance = std::max((verdict.saddle + 0.5) * a, 1.5 * h);
             choice.encloses = true;
             reason.str({});
             reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores")

@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "base/heuristics.h"
-#include "tagging/heuristics.h"
 
 namespace covol::detail {
 namespace {
@@ -19,7 +18,7 @@ namespace {
 bool is_structure(double core, double enclosed, double distance) {
     constexpr double kBall = 4.0 / 3.0 * std::numbers::pi;
     const double radius = std::cbrt(core / kBall);
-    return radius > kTagging.significant_radius * distance &&
+    return radius > kCommon.minority * distance &&
            kBall * std::pow(radius + distance, 3) > kCommon.negligible * enclosed;
 }
 

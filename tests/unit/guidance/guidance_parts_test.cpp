@@ -8,13 +8,13 @@
 #include <random>
 #include <vector>
 
+#include "base/heuristics.h"
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "guidance/patches.h"
 #include "guidance/wide_distance.h"
 #include "support/clouds.h"
 #include "support/shapes.h"
-#include "surface/heuristics.h"
 #include "surface/pieces.h"
 
 using namespace covol;
@@ -143,7 +143,7 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
             const bool marked = std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
                 return around.isInside(Coord::round(openvdb::Vec3d(m[0], m[1], m[2])));
             });
-            if (marked || double(pieces[n].size()) > kPieces.small * double(pieces[0].size())) continue;
+            if (marked || double(pieces[n].size()) > kCommon.negligible * double(pieces[0].size())) continue;
             ++gone;
             for (const Coord& c : pieces[n]) expected[c] = inside ? 0.5F : -0.5F;
         }

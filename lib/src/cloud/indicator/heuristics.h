@@ -14,6 +14,8 @@ struct CloudHeuristics {
     /// [ratio] Maximum ratio of the distances of points from a sheet to the radius of their neighbourhood, for points
     /// of the sheet.
     double flat = heuristic("cloud.flat", 0.25);
+    /// [cosine] Minimum between the normals of two parts of one sheet; with a smaller one, they meet in a crease.
+    double same_sheet = heuristic("cloud.same_sheet", 0.9);
     /// [fraction of the points] Fraction below which deviations are attributed to single points.
     double few = heuristic("cloud.few", 0.002);
     /// [fraction of the points, or of the area] Fraction above which deviations are not attributed to noise.
@@ -26,8 +28,6 @@ COVOL_HEURISTICS CloudHeuristics kCloud{};
 
 /// The grids of the indicator function: indicator.cpp.
 struct IndicatorHeuristics {
-    /// [longest sides] Margin of the lattice around the points.
-    double beyond = heuristic("indicator.beyond", 0.2);
     /// [cells] Minimum number of cells along the longest side.
     int min_cells = heuristic("indicator.min_cells", 48);
     /// [square roots of the area that a point represents] Maximum cell size at the point, unless the finest grid is
@@ -48,21 +48,9 @@ struct IterationHeuristics {
     int patch_cycles = heuristic("iteration.patch_cycles", 2);
     /// [1 - cosine] Mean change of the normals below which the iteration ends.
     double steady = heuristic("iteration.steady", 1e-4);
-    /// [V-cycles] Number of multigrid cycles in each iteration.
-    int cycles = heuristic("iteration.cycles", 1);
     /// [V-cycles] Number of multigrid cycles in the last iteration.
     int last_cycles = heuristic("iteration.last_cycles", 4);
 };
 COVOL_HEURISTICS IterationHeuristics kIteration{};
-
-/// Repair of normals that are reversed or tangential to their sheet, for clouds without noise: torn.cpp.
-struct TornHeuristics {
-    /// [ratio] Maximum ratio of the smallest to the middle variance of the neighbours' positions, for neighbours that
-    /// form a sheet.
-    double flat = heuristic("torn.flat", 0.06);
-    /// [cosine] Minimum between the normals of the sheets at neighbouring points that are on one sheet.
-    double same_sheet = heuristic("torn.same_sheet", 0.9);
-};
-COVOL_HEURISTICS TornHeuristics kTorn{};
 
 }  // namespace covol

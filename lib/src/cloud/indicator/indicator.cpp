@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "cloud/indicator/heuristics.h"
 #include "covol/points.h"
@@ -60,7 +61,7 @@ void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const
 namespace cloud {
 
 double indicator_side(const std::vector<Vec3>& points) {
-    return longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond);
+    return longest_side(bounding_box(points)) * (1 + 2 * kCommon.margin);
 }
 
 double indicator_cell(const std::vector<Vec3>& points, double cell) {
@@ -78,7 +79,7 @@ std::shared_ptr<const GridStack> grid_around(const std::vector<Vec3>& points, co
     for (std::size_t n = 0; n < areas.size(); ++n)
         levels[n] = std::uint8_t(
             std::clamp(std::floor(std::log2(kIndicator.local_cells * std::sqrt(areas[n]) / cell)), 0.0, 31.0));
-    return std::make_shared<const GridStack>(points, levels, cell, kIndicator.beyond);
+    return std::make_shared<const GridStack>(points, levels, cell, kCommon.margin);
 }
 
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {

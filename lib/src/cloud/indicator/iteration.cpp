@@ -39,9 +39,8 @@ std::vector<int> sides_of(const std::vector<double>& off) {
 
 }  // namespace
 
-Iteration::Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double initial_cells,
-                     const RunContext& run)
-    : points_(points), areas_(areas), initial_cells_(initial_cells), run_(run) {}
+Iteration::Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, const RunContext& run)
+    : points_(points), areas_(areas), run_(run) {}
 
 void Iteration::run(const Stage& stage, Orientation& result) {
     WindingField field(indicator_grid(points_, areas_, stage.cell));
@@ -50,7 +49,7 @@ void Iteration::run(const Stage& stage, Orientation& result) {
     if (result.normals.empty()) estimate_normals(stage.cell, result);
     for (int n = 0; n < stage.iterations; ++n) {
         ++result.iterations;
-        if (turn(field, result, kIteration.cycles) < kIteration.steady) break;
+        if (turn(field, result, 1) < kIteration.steady) break;
     }
     turn_patches(field, result);
     if (stage.is_last) turn(field, result, kIteration.last_cycles);
@@ -64,7 +63,7 @@ void Iteration::mend(double spacing, Orientation& result) {
 
 void Iteration::estimate_normals(double cell, Orientation& result) const {
     const StackField density =
-        spread(grid_around(points_, areas_, initial_cells_ * cell), points_, std::vector<double>(points_.size(), 1.0));
+        spread(grid_around(points_, areas_, kCloud.coarse * cell), points_, std::vector<double>(points_.size(), 1.0));
     result.normals.resize(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
         const Vec3 g = density.at(points_[n]).gradient;

@@ -21,10 +21,7 @@ struct Stage {
 class Iteration {
 public:
     /// @param points, areas  must outlive the object; areas in world units squared
-    /// @param initial_cells  [cells of the first stage] cell size of the density grid from which the initial normals
-    /// are computed
-    Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double initial_cells,
-              const RunContext& run);
+    Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, const RunContext& run);
 
     /// @throws Error Cancelled
     void run(const Stage& stage, Orientation& result);
@@ -41,7 +38,6 @@ private:
 
     const std::vector<Vec3>& points_;
     const std::vector<double>& areas_;  // unlike Orientation::areas, not scaled with the indicator
-    double initial_cells_;
     const RunContext& run_;
     Stage stage_{};
     std::optional<WindingField> last_;

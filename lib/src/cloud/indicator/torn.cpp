@@ -32,7 +32,7 @@ public:
             const double count = double(near.size()) + 1;  // 1: the point itself
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count -
                                                                        sum * sum.transpose() / (count * count));
-            if (shape.eigenvalues()[0] > kTorn.flat * shape.eigenvalues()[1]) return;
+            if (shape.eigenvalues()[0] > kCloud.flat * kCloud.flat * shape.eigenvalues()[1]) return;
             const Eigen::Vector3d axis = shape.eigenvectors().col(0);
             axes_[point] = {axis[0], axis[1], axis[2]};
         });
@@ -45,7 +45,7 @@ public:
     template <typename Visit>
     void for_beside(std::size_t n, Visit visit) const {
         for (const std::uint32_t other : beside_[n])
-            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kTorn.same_sheet) visit(other);
+            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kCloud.same_sheet) visit(other);
     }
 
 private:

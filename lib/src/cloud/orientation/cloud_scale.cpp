@@ -108,7 +108,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const double nearest = scale.nearest = measure_spacing(points).median;
     scale.spacing = 2 * nearest;  // approximate ratio for points at random positions on a surface
     if (!(nearest > 0)) return scale;
-    const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kCommon.sample);
     double radius = kCloudScale.first_spacings * nearest, best = 1;
     const cloud::PointCells cells(points, kCellRadii * radius);
     const std::vector<Around> closest = measure_nearest(points, cells, nearest, step);
@@ -129,7 +129,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
         }
         // Stops when the neighbourhoods are sheets, or when the deviation relative to the radius increases again,
         // because the surface's curvature then contributes to the deviation.
-        if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
+        if (best < kCloudScale.sheet || noise / radius > (1 + kCommon.minority) * best) break;
     }
     return scale;
 }

@@ -57,7 +57,7 @@ bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunCont
     const auto all = double(points.size());
     if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth is less than 12 rings
     const PointCells cells(points, spacing);
-    std::vector<Neighbourhood> around(std::min(points.size(), kFilled.samples));
+    std::vector<Neighbourhood> around(std::min(points.size(), kCommon.sample));
     // The sampled points are not at regular intervals of the order, which in rows of points would select the same
     // position of each row.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };

@@ -79,7 +79,7 @@ public:
             compute_indicator(std::vector<char>(points_.size(), 1));
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
-                if (falls_along(p) * field_.indicator().stack().cell() > -kGivenSides.speaks_against) continue;
+                if (falls_along(p) * field_.indicator().stack().cell() > -kCommon.minority) continue;
                 oriented_.normals[p] = times(-1, oriented_.normals[p]);
                 ++turned;
             }
@@ -125,7 +125,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
     for_nearest(cells, spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         for (const Neighbour& other : near) {
             const double up = dot(minus(cells.sorted()[other.at], points[point]), normals[point]);
-            if (up * up < kGivenSides.flat * kGivenSides.flat * other.squared &&
+            if (up * up < kCloud.flat * kCloud.flat * other.squared &&
                 dot(normals[point], normals[cells.order()[other.at]]) < -kCommon.turn)
                 is_torn[point] = 1;
         }
@@ -150,7 +150,7 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool i
     HeldOutHints held_out(points, given, scale, run);
     result.report.predicted = held_out.predicted(result.report, is_outward);
     result.report.why_not.clear();
-    if (result.report.predicted < kGivenSides.min_predicted) {
+    if (result.report.predicted < kGivenSides.min_right) {
         result.report.why_not = "one half of them does not predict the sides of the other half";
         return false;
     }
@@ -215,7 +215,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
         return result;
     run.check();
     if (double(result.report.sensors) < minimum || result.report.sensors == 0) return result;
-    if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_free_views) {
+    if (fraction_free(points, hints.to_sensor, scale) < kGivenSides.min_right) {
         if (result.report.normals == 0) result.report.why_not = "most points are not visible from the sensor";
         return result;
     }

@@ -20,16 +20,13 @@ double finest_cell(const CloudScale& scale, std::size_t points) {
 double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
     return std::max(finest_cell(scale, points.size()), indicator_side(points) / kOrientation.first_along);
 }
-namespace {
 
-double weighted_doubt(const Orientation& o, double weight) {
-    return o.turned + weight * std::max(0.0, o.off_half - kCloud.some);
-}
+bool is_clean(const CloudScale& scale) { return scale.noise < kCloud.flat * scale.spacing; }
 
-}  // namespace
+double miss_reach(const CloudScale& scale) { return kOrientation.passed_reach * std::max(scale.spacing, scale.noise); }
 
-double doubt(const Orientation& o) { return weighted_doubt(o, kOrientation.off_weight); }
-bool is_settled(const Orientation& o) { return weighted_doubt(o, 1) < kCloud.few; }
+double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kCloud.some); }
+bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }
 
 double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     std::vector<char> passed(points.size());

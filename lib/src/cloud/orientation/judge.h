@@ -12,6 +12,13 @@ namespace covol::cloud {
 /// smaller ones.
 [[nodiscard]] double first_cell(const CloudScale& scale, const std::vector<Vec3>& points);
 
+/// Whether the noise is small compared to the spacing, so that the nearest points are on the sheet of a point, not
+/// above or below it.
+[[nodiscard]] bool is_clean(const CloudScale& scale);
+
+/// Distance from a point beyond which a surface misses it, world units.
+[[nodiscard]] double miss_reach(const CloudScale& scale);
+
 /// Measure of doubt in an orientation: the fraction of normals that turned in the last iteration, plus a penalty if the
 /// mean of the indicator at the points differs from 1/2, as it does if the normals of whole parts are reversed.
 [[nodiscard]] double doubt(const Orientation& orientation);

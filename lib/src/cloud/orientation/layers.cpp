@@ -116,8 +116,10 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
+        // The far side of a cavity is not much larger than its near side, unlike the hole of a ring.
         const double gain = (bare - level.bare) * cell * cell;
-        if (!(gain > 0 && gain < kLayers.max_gain * area) || double(away) > kLayers.max_away * double(patch.size())) {
+        if (!(gain > 0 && gain < kCommon.clear_ratio * area) ||
+            double(away) > kCommon.minority * double(patch.size())) {
             turn(patch, orientation);
             continue;
         }

@@ -7,8 +7,10 @@
 #include <tuple>
 #include <utility>
 
+#include "base/heuristics.h"
 #include "cloud/indicator/areas.h"
 #include "cloud/indicator/consistency.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/indicator/iteration.h"
 #include "cloud/indicator/torn.h"
@@ -38,7 +40,7 @@ struct Attempt {
 /// A spatially even subset of the points, with the area of the surface that each represents.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
-        : step(every), order(cloud::PointCells(all, kOrientation.sample_spacings * spacing).order()) {
+        : step(every), order(cloud::PointCells(all, kCloud.coarse * spacing).order()) {
         for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
         areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
     }
@@ -90,21 +92,21 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double first = first_cell(scale, points);
         // Parts thinner than the first cells require cells as small as the points allow.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
-        const double fraction = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
-                                         kOrientation.max_sampled / double(points.size()));
-        const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
-        const double maximum = std::max(1.0, double(points.size() / kOrientation.min_sampled));
+        // As many points as determine the indicator: several in each cell that the surface crosses.
+        const double cells = kCloud.coarse * scale.spacing / cell;
+        const double fraction = std::min(cells * cells, kOrientation.max_sampled / double(points.size()));
+        const double maximum = std::max(1.0, double(points.size() / kCommon.sample));
         const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / fraction, 1.0, maximum)));
-        const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
+        const double reach = cloud::miss_reach(scale);
         std::optional<cloud::Consistency> consistency;
         std::vector<std::tuple<double, double, bool>> lattices;
         std::vector<AttemptResult> tried;
+        // Noise may make the first cells wider than thin walls.
         std::vector<Attempt> attempts{{1, kOrientation.enclosed, true},
                                       {1, kOrientation.surely_enclosed, false},
-                                      {kOrientation.strain_cells, kOrientation.surely_enclosed, true},
-                                      {kOrientation.thin_cells, kOrientation.enclosed, false}};
-        if (first > kOrientation.coarse * finest)
-            attempts.push_back({finest / first, kOrientation.surely_enclosed, true});
+                                      {1 / kCommon.growth, kOrientation.surely_enclosed, true},
+                                      {1 / (kCommon.growth * kCommon.growth), kOrientation.enclosed, false}};
+        if (first > kCommon.growth * finest) attempts.push_back({finest / first, kOrientation.surely_enclosed, true});
         const auto evaluated = [&](Orientation orientation, std::vector<Vec3> normals) {
             std::vector<double> off = consistency->off(normals);
             const double mean_off = std::accumulate(off.begin(), off.end(), 0.0) / double(off.size());
@@ -113,19 +115,18 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const std::vector<Vec3> propagated =
             cloud::propagated_normals(sample.points, scale, scale.spacing * std::sqrt(double(sample.step)));
         for (const Attempt& attempt : attempts) {
-            const double tried_cell = cloud::indicator_cell(
-                points, std::max(first * attempt.cell, kOrientation.min_spacings * scale.spacing));
+            const double tried_cell = cloud::indicator_cell(points, first * attempt.cell);
             const std::tuple lattice{tried_cell, attempt.enclosed, attempt.is_propagated};
             if (std::count(lattices.begin(), lattices.end(), lattice) > 0) continue;
             lattices.push_back(lattice);
             Orientation now;
             now.areas = sample.areas;
             if (attempt.is_propagated) now.normals = propagated;
-            Iteration iteration(sample.points, sample.areas, kOrientation.first_cells, run);
+            Iteration iteration(sample.points, sample.areas, run);
             for (const Stage& stage : {Stage{1.5 * tried_cell, 12, false, attempt.enclosed},
                                        Stage{tried_cell, 8, true, kOrientation.surely_enclosed}})
                 iteration.run(stage, now);
-            if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
+            if (cloud::is_clean(scale)) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             std::vector<Vec3> normals = normals_of(*now.indicator, points, kOrientation.surely_enclosed);
@@ -135,7 +136,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                 break;
             }
             if (!consistency) {
-                consistency.emplace(points, sample.all_areas(), kOrientation.strain_cells * finest, reach, run);
+                consistency.emplace(points, sample.all_areas(), finest / kCommon.growth, reach, run);
                 // Iterations may reverse initially correct normals near thin parts, so the propagated normals are
                 // compared as well.
                 tried.push_back(evaluated(now, cloud::propagated_normals(points, scale, scale.spacing)));

@@ -65,9 +65,9 @@ struct Edge {
 
 std::vector<Edge> edges_of(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
-    std::vector<Edge> edges(points.size() * kPropagation.neighbours);
-    for_nearest(cells, spacing, kPropagation.neighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        std::size_t at = point * kPropagation.neighbours;
+    std::vector<Edge> edges(points.size() * kCommon.ring);
+    for_nearest(cells, spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+        std::size_t at = point * kCommon.ring;
         for (const Neighbour& neighbour : near) {
             const std::uint32_t other = cells.order()[neighbour.at];
             const Vec3 way = unit(minus(points[other], points[point]));

@@ -19,7 +19,7 @@ constexpr std::size_t kBeside = 16;
 
 /// Median distance to the last of kCommon.ring neighbours, over a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
-    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kCommon.sample);
     std::vector<double> reach(count, -1);
     for_nearest(
         cells, spacing, kCommon.ring,
@@ -55,7 +55,7 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
 std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
     if (points.size() <= 2 * kCommon.ring) return stray;
-    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, kStray.cell_noises * scale.noise));
+    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, scale.noise));
     const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> isolated(points.size());

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "cloud/indicator/areas.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
@@ -32,9 +33,9 @@ std::vector<Vec3> directions() {
     return all;
 }
 
-/// The unit vectors of mean free directions; 0 if about as many directions are free on one side as on the other.
+/// The unit vectors of mean free directions; 0 if nearly as many directions are free on one side as on the other.
 std::vector<Vec3> towards(std::vector<Vec3> free) {
-    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.min_free ? unit(way) : Vec3{0, 0, 0};
+    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kCloud.some ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
 
@@ -54,8 +55,9 @@ public:
 
     [[nodiscard]] double cell() const { return cell_; }
 
+    /// Whether no cell with points lies in the direction. The ray begins beyond the sheet on which `from` lies.
     [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
-        for (double t = kViews.first_step;; ++t) {
+        for (double t = kCloud.coarse;; ++t) {
             const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1],
                                              from[2] + t * cell_ * direction[2]});
             if (at < 0) return true;
@@ -121,13 +123,14 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
                 double(end - begin) * (occupied.is_free(from, rays[r]) - occupied.is_free(from, times(-1, rays[r])));
         }
     });
+    // In a scan with a common direction of view, the sky, more points are seen from there than from the opposite side.
     Vec3 sky{0, 0, 0};
-    if (*std::max_element(seen.begin(), seen.end()) > kViews.sky * double(points.size())) {
+    if (*std::max_element(seen.begin(), seen.end()) > kCloud.some * double(points.size())) {
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
         sky = unit(sky);
     }
     std::vector<Vec3> all = towards(free_directions(points, cell));
-    for (Vec3& way : all) way = plus(sky, times(kViews.beside_sky, way));
+    for (Vec3& way : all) way = plus(sky, times(kCommon.minority, way));
     return all;
 }
 
@@ -145,7 +148,7 @@ double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& d
 
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
                   const StackField* start, Orientation& result, const RunContext& run) {
-    WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * apart(scale)));
+    WindingField fine(indicator_grid(points, result.areas, 0.5 * kCloud.coarse * apart(scale)));
     const double cell = fine.indicator().stack().cell();
     // A view determines only the side of a normal; its direction is taken from the indicator's gradient.
     std::vector<double> screen(points.size());
@@ -171,7 +174,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
-    WindingField coarse(indicator_grid(points, result.areas, kViews.coarse_spacings * between));
+    WindingField coarse(indicator_grid(points, result.areas, kCloud.coarse * between));
     solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;

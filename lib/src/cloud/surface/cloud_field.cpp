@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/surface/blend_kernel.h"
@@ -31,14 +32,15 @@ public:
     Pieces(std::vector<Quadric> quadrics, double h)
         : quadrics_(std::move(quadrics)), h_(h), cells_(feet(quadrics_), 4 * h) {
         std::vector<Quadric> sorted;
+        // Beyond the next nodes, even if the voxels are wider than the neighbourhoods.
+        const double shortest = kCloud.coarse * kBlend.node_voxels * h;
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
             const double wanted = std::max(
                 {kBlend.reach_voxels * h, kBlend.reach_of_min * q.min_radius, kBlend.reach_of_radius * q.radius});
-            reach_.push_back(float(std::max(
-                kBlend.min_reach_voxels * h,
-                std::min({wanted, kBlend.max_of_radius * q.radius, kBlend.max_of_curvature / q.curvature()}))));
+            // The quadric was not fitted to points beyond the radius.
+            reach_.push_back(float(std::max(shortest, std::min(wanted, q.radius / kCommon.growth))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
         quadrics_ = std::move(sorted);
@@ -52,7 +54,7 @@ public:
     /// surface continues.
     [[nodiscard]] double own_radius(std::size_t n) const {
         const Quadric& q = quadrics_[n];
-        return std::max({kBlend.beside_of_min * q.min_radius, kBlend.min_reach_voxels * h_, kCloud.coarse * q.apart});
+        return std::max(q.min_radius, kCloud.coarse * q.apart);
     }
     /// Half the edges of a box around the foot that contains the part of the narrow band within own_radius() and
     /// reach().
@@ -232,7 +234,7 @@ public:
                            domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
         gather(box);
         const double limit = kHalfWidthVoxels * h;
-        blend(near_.data(), near_.size(), float(h), float(kBlend.far_bands * limit), leaf_);
+        blend(near_.data(), near_.size(), float(h), float(limit), leaf_);
         for (int at = 0; at < 512; ++at) {
             double own = 0, trust = 0;
             const std::size_t n = std::size_t(at);
@@ -371,11 +373,11 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
 /// Moves those points to the indicator's surface that are no farther from it than noise may have displaced them.
 /// Otherwise there would be nodes throughout the layer of points.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
-    const double maximum = kBlend.max_noises * noise;
+    const double maximum = kCommon.errors * noise;
     points.squares_off.clear();
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
-        for (int step = 0; step < kBlend.level_steps; ++step) {
+        for (int step = 0; step < kCommon.rounds; ++step) {
             const auto [inside, gradient, cell] = indicator.at(place);
             const double steep = dot(gradient, gradient);
             if (!(steep > 0)) return;

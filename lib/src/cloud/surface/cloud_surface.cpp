@@ -8,9 +8,9 @@
 #include <cmath>
 
 #include "base/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/surface/cloud_field.h"
-#include "cloud/surface/heuristics.h"
 #include "cloud/surface/hold_topology.h"
 #include "cloud/surface/join_pieces.h"
 #include "covol/error.h"
@@ -71,7 +71,7 @@ struct TopologyOf {
 /// Whether a considerable part of the surface is far from all points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const RunContext& run) {
     constexpr std::uint64_t kTriangles = 100000;  // sufficient for a fraction accurate to a thousandth
-    const double reach = kBlend.far_spacings * points.scale.spacing;
+    const double reach = kCloud.coarse * points.scale.spacing;
     const cloud::PointCells cells(points.points, reach);
     double all = 0, bare = 0;
     detail::measure_pieces(level_set, 0, run, [&](const StreamedMesh& mesh, const detail::MeshPiece& piece) {
@@ -93,15 +93,14 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
             bare += is_bare[n] * area[n];
         }
     });
-    return bare > kBlend.open_fraction * all;
+    return bare > kCommon.minority * all;
 }
 
 }  // namespace
 
 void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     const Orientation& orientation = cloud.orientation;
-    const double fraction = cloud.encloses ? kBlend.min_resting_fraction : kBlend.min_resting_open,
-                 noises = report.noise / report.spacing;
+    const double fraction = cloud.encloses ? kCloud.few : kCloud.some, noises = report.noise / report.spacing;
     const auto minimum = std::size_t(
         std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);
@@ -118,9 +117,8 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
                   report);
     // Around gaps between the points, cells as small as their spacing create small handles.
     if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
-        topology.hold(
-            field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),
-            report);
+        topology.hold(field, *cloud::indicator_of(cloud.points, orientation, kCloud.coarse * cloud.scale.spacing, run),
+                      report);
     if (topology.own.pieces > 1) join();
 }
 

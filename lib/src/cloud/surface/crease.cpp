@@ -7,7 +7,9 @@
 #include <limits>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/surface/heuristics.h"
 
 namespace covol::cloud {
@@ -140,7 +142,7 @@ bool divide(Parts& parts, std::size_t count) {
                 next = p.normal;
             }
         }
-        if (c == 1 && farthest > kCrease.smooth_cosine) return false;
+        if (c == 1 && farthest > kCloud.same_sheet) return false;
         if (c == 0) centres.clear();
         centres.push_back(next);
     }
@@ -239,7 +241,7 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
     }
     for (std::size_t s = 0; s < count; ++s)
         for (std::size_t o = 0; o < s; ++o)
-            if (dot(crease.sheets[s].axes[2], crease.sheets[o].axes[2]) > kCrease.smooth_cosine) return {};
+            if (dot(crease.sheets[s].axes[2], crease.sheets[o].axes[2]) > kCloud.same_sheet) return {};
     return crease;
 }
 
@@ -258,7 +260,7 @@ std::optional<Crease> fit_crease(const std::vector<CreasePoint>& points, const V
     std::optional<Crease> best;
     for (std::size_t count = 2; count <= 3; ++count) {
         std::optional<Crease> crease = fit_sheets(points, radius, count, misfit);
-        if (!crease || !(crease->misfit < kCrease.misfit_ratio * misfit)) continue;
+        if (!crease || !(kCommon.clear_ratio * crease->misfit < misfit)) continue;
         misfit = crease->misfit;
         best = std::move(crease);
         if (misfit < kFlat * radius) break;

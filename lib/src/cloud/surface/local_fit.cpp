@@ -181,7 +181,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         });
         if (!agrees) break;
         if (seen.empty() &&
-            (std::abs(now.c[0]) > kFit.max_height * level.radius || dot(best.axes[2], normal) < kFit.min_cosine))
+            (std::abs(now.c[0]) > kFit.max_height * level.radius || dot(best.axes[2], normal) < kCommon.turn))
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
@@ -192,8 +192,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     }
     // Noise along a curved surface displaces points to positions where the surface is lower or higher. This changes
     // their mean height by half the variance times the surface's Laplacian.
-    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), maximum = kFit.max_unbent * best.noise;
-    best.c[0] -= std::clamp(lower, -maximum, maximum);
+    best.c[0] -= best.noise * best.noise * (best.c[3] + best.c[5]);
     return best;
 }
 
@@ -304,7 +303,7 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
                     const Quadric& q = quadrics[cells.order()[at]];
                     const Vec3 to = minus(p, cells.sorted()[at]);
                     covered[n] = dot(to, to) < q.apart * q.apart &&
-                                 dot(nodes.normals[n], q.axes[2]) > (q.crease ? 0 : kFit.same_sheet);
+                                 dot(nodes.normals[n], q.axes[2]) > (q.crease ? 0 : kCommon.turn);
                 }
         }
     });
@@ -335,13 +334,13 @@ std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
         std::vector<PointCells::Range> ranges;
         for (std::size_t n = part.begin(); n < part.end(); ++n) {
             const double r = minimum[n];
-            if (r <= kFit.lone * usual) continue;
+            if (r <= kCommon.clear_ratio * usual) continue;
             const Vec3& p = feet[n];
             cells.find(p, r, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
                     const Vec3 to = minus(cells.sorted()[at], p);
-                    lone[n] = dot(to, to) < r * r && kFit.lone * minimum[cells.order()[at]] < r;
+                    lone[n] = dot(to, to) < r * r && kCommon.clear_ratio * minimum[cells.order()[at]] < r;
                 }
         }
     });
@@ -430,12 +429,11 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
         const bool is_last = !(times > 1);
-        const double minimum = is_last ? 0 : kFit.wide_of_apart * apart,
-                     min_of_crease = is_last ? 0 : kCrease.wide_of_apart * apart;
-        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > min_of_crease, run);
+        const double minimum = is_last ? 0 : kFit.wide_of_apart * apart;
+        std::vector<Quadric> found = fitter.fit(nodes, fitter.crease_radius() > minimum, run);
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
         for (Quadric& q : found) {
-            if (!(q.radius > (q.crease ? min_of_crease : minimum))) continue;
+            if (!(q.radius > minimum)) continue;
             q.apart = apart;
             all.push_back(q);
         }

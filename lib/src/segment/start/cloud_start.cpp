@@ -8,7 +8,6 @@
 #include "cloud/surface/cloud_field.h"
 #include "covol/start.h"
 #include "holes/heuristics.h"
-#include "segment/heuristics.h"
 #include "segment/solve/fields.h"
 #include "segment/start/starts.h"
 
@@ -83,8 +82,7 @@ void report_cloud(const CloudReport& report, std::size_t points, Remarks& remark
 }  // namespace
 
 Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<Vec3>& points) {
-    return problem.domain(h, points,
-                          kStarts.margin_fraction * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h);
+    return problem.domain(h, points, kCommon.margin * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h);
 }
 
 StartSurface start_from_cloud(const Problem& problem, const Choices& choices, MarkSets marks) {

@@ -9,7 +9,6 @@
 #include "distance/memory_need.h"
 #include "grid/levels_at.h"
 #include "guess/guess_in_image.h"
-#include "segment/heuristics.h"
 #include "segment/solve/fields.h"
 #include "segment/start/starts.h"
 
@@ -123,7 +122,7 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     StartFacts& facts = start.facts;
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
-    facts.domain = problem.domain(h, points, kStarts.margin_fraction * longest_side(box) + kCommon.beyond_voxels * h);
+    facts.domain = problem.domain(h, points, kCommon.margin * longest_side(box) + kCommon.beyond_voxels * h);
     // A body that the image cuts is continued beyond the image and clipped later: if it ended at the image's end, it
     // would be closed by a cap there, and the image would be evaluated at that cap.
     if (problem.image != nullptr && !problem.options.roi)

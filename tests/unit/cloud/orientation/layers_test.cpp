@@ -29,7 +29,7 @@ struct Layers {
     std::vector<char> turn(double spacing) {
         orientation.areas = areas_of(points, spacing);
         WindingField field(
-            indicator_grid(points, {}, longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond) / 80));
+            indicator_grid(points, {}, longest_side(bounding_box(points)) * (1 + 2 * kCommon.margin) / 80));
         solve(field, points, orientation, kIndicator.cycles_from_nothing, {});
         const double half = scale_to_half(field, points);
         for (double& area : orientation.areas) area *= half;
