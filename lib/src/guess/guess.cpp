@@ -142,6 +142,7 @@ bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     if (marks.size() < kCommon.ring) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
+    // Of twelve or more marks all over the cut, at least a sixth have others all around them.
     return double(surrounded) < kCommon.minority * double(marks.size());
 }
 

@@ -145,6 +145,7 @@ public:
                 best_edge_ = edge();
                 best_count_ = order_.size();
             }
+            // The front has passed the best edge if its present one is clearly weaker.
             if (kCommon.clear_ratio * edge() < best_edge_ && is_clear()) break;
             if (order_.size() % 65536 == 0) run.check();
         }

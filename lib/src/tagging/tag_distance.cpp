@@ -63,6 +63,7 @@ MainCores judge(const Cores& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
+    // With less of the cloud's area, the cores are pockets.
     return area < kCommon.minority * cloud_area(verdict.saddle) ? MainCores{} : verdict;
 }
 

@@ -11,8 +11,8 @@
 namespace covol::detail {
 namespace {
 
-/// Whether a core is a structure and not a pocket: its radius is large compared to the tag distance, and its volume,
-/// after dilation by the tag distance, is not negligible compared to the enclosed volume.
+/// Whether a core is a structure and not a pocket: its radius is not small compared to the tag distance, and its
+/// volume, after dilation by the tag distance, is not negligible compared to the enclosed volume.
 /// @param core, enclosed  volumes, voxels
 /// @param distance        voxels
 bool is_structure(double core, double enclosed, double distance) {

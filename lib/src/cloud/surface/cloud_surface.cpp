@@ -100,6 +100,8 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
 
 void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     const Orientation& orientation = cloud.orientation;
+    // Noise creates spurious pieces with few points. If the points enclose nothing, a separate piece is not a thin part
+    // of a solid, and must have more.
     const double fraction = cloud.encloses ? kCloud.few : kCloud.some, noises = report.noise / report.spacing;
     const auto minimum = std::size_t(
         std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
