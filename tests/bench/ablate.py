@@ -56,6 +56,7 @@ MECHANISMS = {
     "level_blur": ("blur over levels of intensity", "guidance.level_blur=0.001", ("marks", "jobs")),
     "sagitta": ("error of the guess by the sagitta", "guidance.fraction_of_sagitta=0", ("marks",)),
     "layers": ("layers of a scan below others", "layers.farthest_layer=0", ("jobs",)),
+    "patches": ("turning of patches", "iteration.patch_off=100", ("clouds", "jobs")),
     "joining": ("joining of torn pieces", "join_pieces.max_gap=0", ("clouds", "jobs")),
     "creases": ("sheets that meet", "crease.radius=0", ("clouds",)),
     "folds": ("folds by the indicator", "local_fit.off_indicator=1e9", ("clouds",)),
