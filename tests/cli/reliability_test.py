@@ -132,14 +132,17 @@ class Inputs(Case):
         self.refuse("reconstruct", path, "-o", "o.vdb", code=3, expected_text="points: (1e+07, 3, 4) lies")
 
     def test_small_parts_far_apart(self):
-        """Two balls 10^4 radii apart need no more than their points do."""
-        apart = 0.01 * (np.array(sphere_points(6000)) - CENTER) / RADIUS
-        apart[::2] += (100, 0, 0)
+        """Two balls up to 10^4 radii apart need no more than their points do."""
         path = self.inputs / "cloud.xyz"
-        np.savetxt(path, apart, "%.9g")
-        report = self.report("reconstruct", path, "-o", "o.vdb")
-        self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (2, 0))
-        self.assertAlmostEqual(report["surface"]["volume"], 2 * 4 / 3 * np.pi * 1e-6, delta=0.01 * 8.4e-6)
+        for place in (1, 0, 0), (20, -30, 7), (30, 50, 80), (100, 0, 0):
+            with self.subTest(place=place):
+                apart = 0.01 * (np.array(sphere_points(6000)) - CENTER) / RADIUS
+                apart[::2] += place
+                np.savetxt(path, apart, "%.9g")
+                report = self.report("reconstruct", path, "-o", "o.vdb")
+                self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (2, 0))
+                self.assertAlmostEqual(report["surface"]["volume"], 2 * 4 / 3 * np.pi * 1e-6, delta=0.01 * 8.4e-6)
+                self.assertLess(report["peak_rss_bytes"], 200e6)
 
 
 class Memory(Case):

@@ -15,6 +15,8 @@ struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation of the points from the surface, along its normal
     double nearest = 0;  ///< median distance to the nearest other point
+    /// longest side of the bounding box of the largest part, in a cloud of several parts that are far apart
+    double part = 0;
     /// for groups of a point and its eleven nearest neighbours: median of the groups' radius, and of their standard
     /// deviation from a quadric, which is 0.33 of the radius if the points fill a ball
     double near_reach = 0, near_noise = 0;

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <unordered_map>
 
 #include "base/disjoint_sets.h"
@@ -155,10 +154,10 @@ private:
         Label label;
     };
     struct Row {
+        int i, j;                 // of its blocks
         std::size_t first, last;  // indices of leaves
         std::vector<Gap> gaps;
     };
-    using RowKey = std::pair<int, int>;
 
     Label new_label(bool inside) {
         parents_.push_back(Label(parents_.size()));
@@ -205,22 +204,29 @@ private:
         });
     }
 
+    /// The positions of leaves along an axis, in units of blocks, and one before, after, and in each range between
+    /// them: no surface is there.
+    [[nodiscard]] std::vector<int> positions(int axis) const {
+        std::vector<int> all;
+        for (const Leaf* leaf : leaves_)
+            for (int beside = -1; beside <= 1; ++beside) all.push_back(leaf->origin()[axis] / kDim + beside);
+        std::sort(all.begin(), all.end());
+        all.erase(std::unique(all.begin(), all.end()), all.end());
+        return all;
+    }
+
     /// Finds the gaps before, between and after the leaves of each row of blocks; each gap has one sign.
     void find_gaps() {
         if (leaves_.empty()) return;
-        int low[3], high[3];
-        for (int a = 0; a < 3; ++a) low[a] = high[a] = leaves_.front()->origin()[a] / kDim;
-        for (const Leaf* leaf : leaves_)
-            for (int a = 0; a < 3; ++a) {
-                low[a] = std::min(low[a], leaf->origin()[a] / kDim);
-                high[a] = std::max(high[a], leaf->origin()[a] / kDim);
-            }
+        const std::vector<int> along_i = positions(0), along_j = positions(1), along_k = positions(2);
+        columns_ = along_j.size();
+        const int low = along_k.front(), high = along_k.back();
         const auto values = level_set_.getConstAccessor();
         std::size_t next = 0;
-        for (int i = low[0] - 1; i <= high[0] + 1; ++i)
-            for (int j = low[1] - 1; j <= high[1] + 1; ++j) {
-                Row row{next, next, {}};
-                int from = low[2] - 1;
+        for (const int i : along_i)
+            for (const int j : along_j) {
+                Row row{i, j, next, next, {}};
+                int from = low;
                 const auto add_gap = [&](int to) {
                     if (from < to)
                         row.gaps.push_back(
@@ -234,33 +240,22 @@ private:
                     from = k + 1;
                 }
                 row.last = next;
-                add_gap(high[2] + 2);
+                add_gap(high + 1);
+                const bool is_around =
+                    i == along_i.front() || i == along_i.back() || j == along_j.front() || j == along_j.back();
                 for (const Gap& gap : row.gaps)
-                    if (!is_inside_[gap.label] && (i < low[0] || i > high[0] || j < low[1] || j > high[1] ||
-                                                   gap.begin < low[2] || gap.end > high[2] + 1))
+                    if (!is_inside_[gap.label] && (is_around || gap.begin == low || gap.end == high + 1))
                         unite(kAround, gap.label);
-                rows_.emplace(RowKey{i, j}, std::move(row));
+                rows_.push_back(std::move(row));
             }
     }
 
     void join() {
-        for (const auto& [key, row] : rows_)
-            for (const auto& [axis, other] : {std::pair{0, rows_.find({key.first + 1, key.second})},
-                                              std::pair{1, rows_.find({key.first, key.second + 1})}}) {
-                if (other == rows_.end()) continue;
-                for (std::size_t x = 0, y = 0; x < row.gaps.size() && y < other->second.gaps.size();) {
-                    const Gap &one = row.gaps[x], &two = other->second.gaps[y];
-                    if (std::max(one.begin, two.begin) < std::min(one.end, two.end)) unite_equal(one.label, two.label);
-                    if (one.end < two.end)
-                        ++x;
-                    else
-                        ++y;
-                }
-                join_faces(row, other->second, axis);
-                join_to_gaps(row, other->second.gaps, axis, true);
-                join_to_gaps(other->second, row.gaps, axis, false);
-            }
-        for (const auto& [key, row] : rows_) {
+        for (std::size_t n = 0; n < rows_.size(); ++n) {
+            if (n + columns_ < rows_.size()) join_rows(rows_[n], rows_[n + columns_], 0);
+            if ((n + 1) % columns_ != 0) join_rows(rows_[n], rows_[n + 1], 1);
+        }
+        for (const Row& row : rows_) {
             for (std::size_t n = row.first; n + 1 < row.last; ++n)
                 if (leaves_[n + 1]->origin().z() == leaves_[n]->origin().z() + kDim) join_face(n, n + 1, 2);
             for (std::size_t n = row.first; n < row.last; ++n)
@@ -270,6 +265,21 @@ private:
                     if (gap.end == k) join_to_gap(n, 2, false, gap);
                 }
         }
+    }
+
+    /// @param upper  the next row along the axis
+    void join_rows(const Row& lower, const Row& upper, int axis) {
+        for (std::size_t x = 0, y = 0; x < lower.gaps.size() && y < upper.gaps.size();) {
+            const Gap &one = lower.gaps[x], &two = upper.gaps[y];
+            if (std::max(one.begin, two.begin) < std::min(one.end, two.end)) unite_equal(one.label, two.label);
+            if (one.end < two.end)
+                ++x;
+            else
+                ++y;
+        }
+        join_faces(lower, upper, axis);
+        join_to_gaps(lower, upper.gaps, axis, true);
+        join_to_gaps(upper, lower.gaps, axis, false);
     }
 
     void unite_equal(Label x, Label y) {
@@ -348,18 +358,19 @@ private:
         for (std::size_t n = 0; n < leaves_.size(); ++n)
             for (int v = 0; v < kVoxels; ++v)
                 if (is_removed[parents_[labels_[n][std::size_t(v)]]]) leaves_[n]->setValueOnly(openvdb::Index(v), now);
-        for (const auto& [key, row] : rows_)
+        for (const Row& row : rows_)
             for (const Gap& gap : row.gaps)
                 if (is_removed[parents_[gap.label]])
                     for (int k = gap.begin; k < gap.end; ++k)
-                        level_set_.tree().addTile(1, {kDim * key.first, kDim * key.second, kDim * k},
+                        level_set_.tree().addTile(1, {kDim * row.i, kDim * row.j, kDim * k},
                                                   inside ? level_set_.background() : -level_set_.background(), false);
     }
 
     FloatGrid& level_set_;
     std::vector<Leaf*> leaves_;  // sorted by origin
     std::vector<std::array<Label, kVoxels>> labels_;
-    std::map<RowKey, Row> rows_;
+    std::vector<Row> rows_;    // for each position along i, those at the positions along j
+    std::size_t columns_ = 0;  // number of positions along j
     std::vector<Label> parents_;
     std::vector<char> is_inside_;
     std::vector<std::size_t> surface_;  // number of active voxels of each region

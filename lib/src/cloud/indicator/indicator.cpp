@@ -60,12 +60,10 @@ void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const
 
 namespace cloud {
 
-double indicator_side(const std::vector<Vec3>& points) {
-    return longest_side(bounding_box(points)) * (1 + 2 * kCommon.margin);
-}
+double indicator_side(double longest) { return longest * (1 + 2 * kCommon.margin); }
 
 double indicator_cell(const std::vector<Vec3>& points, double cell) {
-    return std::min(cell, indicator_side(points) / kIndicator.min_cells);
+    return std::min(cell, indicator_side(longest_side(bounding_box(points))) / kIndicator.min_cells);
 }
 
 std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points, const std::vector<double>& areas,

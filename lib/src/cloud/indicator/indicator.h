@@ -6,7 +6,8 @@
 namespace covol::cloud {
 
 /// The longest side of the box in which the indicator is computed.
-[[nodiscard]] double indicator_side(const std::vector<Vec3>& points);
+/// @param longest  that of the points' box
+[[nodiscard]] double indicator_side(double longest);
 /// `cell`, or a smaller cell size if the longest side would have too few cells.
 [[nodiscard]] double indicator_cell(const std::vector<Vec3>& points, double cell);
 /// Grids around the points with a margin wide enough for the indicator to be 0 at its end, coarser around sparse

@@ -43,8 +43,8 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double spacing = cloud.scale.spacing;
     // If the orientation is settled, the cells may be as small as the points allow.
-    const double first =
-        is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
+    const double first = is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size())
+                                       : first_cell(cloud.scale, cloud.points.size());
     const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && is_clean(cloud.scale) &&
@@ -63,7 +63,7 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
                                               cloud::towards_sky(cloud.points, cloud.scale));
     hints.is_outward = true;
     cloud::GivenSides sheets =
-        cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
+        cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points.size()), run);
     if (!sheets.report.used || sheets.torn > kCloud.few) return false;
     cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
     if (fraction_missed(*sheets.orientation.screened, cloud.points, reach) >
@@ -111,7 +111,7 @@ bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::Give
 /// by the points alone, and by propagation or views if the points then enclose nothing.
 void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunContext& run) {
     const auto checked = [&] {
-        return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
+        return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points.size()), run);
     };
     cloud::GivenSides given = checked();
     if (given.report.used && drop_enclosed(cloud, hints, given)) given = checked();

@@ -49,7 +49,7 @@ struct OrientationHeuristics {
     /// [spacings] Cell of the finest grid: with smaller cells, normals of single points may be reversed; larger cells
     /// lose thin parts.
     double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
-    /// [cells] Maximum along the longest side in the first attempts.
+    /// [cells] Maximum along the longest side of the largest part in the first attempts.
     double first_along = limit("orientation.first_along", 192);
     /// [points] Maximum number that the iteration uses: limits the time.
     double max_sampled = limit("orientation.max_sampled", 100000);

@@ -17,8 +17,8 @@ double finest_cell(const CloudScale& scale, std::size_t points) {
     return std::max(kOrientation.cell_spacings * apart, scale.noise);
 }
 
-double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
-    return std::max(finest_cell(scale, points.size()), indicator_side(points) / kOrientation.first_along);
+double first_cell(const CloudScale& scale, std::size_t points) {
+    return std::max(finest_cell(scale, points), indicator_side(scale.part) / kOrientation.first_along);
 }
 
 bool is_clean(const CloudScale& scale) { return scale.noise < kCloud.flat * scale.spacing; }

@@ -10,7 +10,7 @@ namespace covol::cloud {
 [[nodiscard]] double finest_cell(const CloudScale& scale, std::size_t points);
 /// Cell size of the first attempts, world units. With larger cells, fewer normals are reversed; only thin parts require
 /// smaller ones.
-[[nodiscard]] double first_cell(const CloudScale& scale, const std::vector<Vec3>& points);
+[[nodiscard]] double first_cell(const CloudScale& scale, std::size_t points);
 
 /// Whether the noise is small compared to the spacing, so that the nearest points are on the sheet of a point, not
 /// above or below it.

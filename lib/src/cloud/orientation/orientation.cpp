@@ -89,7 +89,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     with_threads(run, [&] {
         // If normals keep turning, the cause may be noise or thin parts, which are hard to distinguish; smaller cells
         // may resolve thin parts.
-        const double first = first_cell(scale, points);
+        const double first = first_cell(scale, points.size());
         // Parts thinner than the first cells require cells as small as the points allow.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
         // As many points as determine the indicator: several in each cell that the surface crosses.
