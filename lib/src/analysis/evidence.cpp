@@ -196,8 +196,10 @@ private:
             for (int axis = 0; axis < 3; ++axis) sum[axis] += from[axis] + x * (to[axis] - from[axis]);
             ++count;
         }
-        // The plane may touch only a corner.
-        if (count == 0) return mesh_.place(t[0]);
+        // The plane may touch only the highest corner.
+        if (count == 0)
+            return mesh_.place(*std::max_element(
+                t.begin(), t.end(), [&](std::uint32_t a, std::uint32_t b) { return levels_[a] < levels_[b]; }));
         for (double& x : sum) x /= count;
         return sum;
     }

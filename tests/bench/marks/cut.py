@@ -156,7 +156,7 @@ def summary(rows, keys):
 
 
 def cell(key, value):
-    if not isinstance(value, float) or key == "share":
+    if not isinstance(value, float) or key == "fraction":
         return str(value)
     return f"{100 * (value - 1):+.1f} %" if key in ("end_slice", "volume") else f"{value:.2f}"
 
@@ -172,12 +172,12 @@ def main():
                 for on_the_cut in ON_THE_CUT:
                     for how, options in OPTIONS.items():
                         for draw in range(bench.draws):
-                            what = {"shape": shape, "spacing": name, "faces": faces, "share": fraction, "marks_on_the_cut": on_the_cut,
+                            what = {"shape": shape, "spacing": name, "faces": faces, "fraction": fraction, "marks_on_the_cut": on_the_cut,
                                     "with": how, "draw": draw}
                             rows.append(what | bench.once(what.values(), lambda: run(
                                 bench, shape, spacing, faces, fraction, on_the_cut, options, draw), version))
     bench.write("cut_draws", rows)
-    keys = ("shape", "spacing", "faces", "share", "marks_on_the_cut", "with")
+    keys = ("shape", "spacing", "faces", "fraction", "marks_on_the_cut", "with")
     reported = summary(rows, keys)
     bench.write("cut", reported)
     shown = (*keys, "end_slice", "volume", "collar", "beyond", "cap", "failures", "accepted")

@@ -17,6 +17,7 @@ constexpr double kMinVoxels = 2e5;
 }  // namespace
 
 double memory_of_band(double active_voxels) { return kBaseBytes + kBandBytes * active_voxels; }
+double memory_of_brick(double active_voxels) { return memory_of_band(kLayerFactor * active_voxels); }
 
 double memory_of_joined(double active_voxels) { return kBaseBytes + kJoinBytes * active_voxels; }
 double memory_of_joined_mesh(double active_voxels) { return kBaseBytes + kMeshBytes * active_voxels; }

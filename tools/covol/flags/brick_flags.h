@@ -18,6 +18,8 @@ struct BrickFlags : Given<BrickOptions> {
 
 /// Memory for solving a band with this number of voxels, including the program itself, bytes.
 [[nodiscard]] double memory_of_band(double active_voxels);
+/// The same for a brick with this number of voxels, which is solved with layers of its neighbours.
+[[nodiscard]] double memory_of_brick(double active_voxels);
 /// Memory for joining the bricks of such a band, without and with the whole mesh, bytes.
 [[nodiscard]] double memory_of_joined(double active_voxels);
 [[nodiscard]] double memory_of_joined_mesh(double active_voxels);

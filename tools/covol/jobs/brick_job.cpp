@@ -179,7 +179,7 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
 void print_plan(const BrickPlan& plan, Session& session) {
     std::int64_t largest = 0;
     for (const Brick& brick : plan.bricks) largest = std::max(largest, brick.active_voxels);
-    const double memory = memory_of_band(1.3 * double(largest));
+    const double memory = memory_of_brick(double(largest));
     Json& json = session.report()["plan"];
     json = {{"bricks", plan.bricks.size()},
             {"active_voxels", plan.active_voxels()},

@@ -12,7 +12,7 @@ from . import _files, _program, _values
 from ._errors import Error
 from ._lapse import Frames
 from ._program import PROGRAM, Folder, read_json, run as run_program  # noqa: F401 - PROGRAM is for covol.mark()
-from ._values import Call, Image, LevelSet, Mesh, Points, list_options  # noqa: F401
+from ._values import Call, Image, LevelSet, Mesh, Points, file_and_grid, list_options  # noqa: F401
 from ._version import __version__  # noqa: F401
 
 _WITHOUT = "%s: not available in this package, which runs the program covol; %s"
@@ -233,7 +233,8 @@ def distances(points, triangles, call):
 
 
 def read_level_set(path):
-    made = LevelSet(os.path.abspath(path.rsplit(":", 1)[0]) + (":" + path.rsplit(":", 1)[1] if ":" in path else ""), None)
+    file, grid = file_and_grid(path)
+    made = LevelSet(os.path.abspath(file) + (":" + grid if grid else ""), None)
     made.voxel_size  # raises an Error now if the file has no level set
     return made
 
@@ -273,7 +274,7 @@ def copy_level_set(source, path, half):
     """Writes a grid of a .vdb file to a separate file."""
     if half:
         return run_program(["convert", source, path, "--half"])
-    file, _, grid = source.rpartition(":") if ":" in os.path.basename(source) else (source, "", "")
+    file, grid = file_and_grid(source)
     if grid in ("", "surface"):
-        return shutil.copyfile(file or source, path)
+        return shutil.copyfile(file, path)
     return run_program(["convert", source, path])

@@ -347,6 +347,13 @@ class Mesh:
         return path
 
 
+def file_and_grid(source):
+    """Splits FILE.vdb[:GRID], in which folders may contain colons."""
+    folder, name = os.path.split(source)
+    name, _, grid = name.partition(":")
+    return os.path.join(folder, name), grid
+
+
 class LevelSet:
     """A level set of OpenVDB, negative inside; accepted by mesh(), mask(), compare(), init= and guess=."""
 
@@ -355,7 +362,7 @@ class LevelSet:
 
     def _about(self):
         if self._facts is None:
-            file, grid = (self._source.rsplit(":", 1) + [""])[:2] if ":" in os.path.basename(self._source) else (self._source, "")
+            file, grid = file_and_grid(self._source)
             grids = info_of(file)["grids"]
             found = [g for g in grids if g["name"] == grid] or grids
             self._facts = found[0]
