@@ -23,7 +23,7 @@ def inside(x, y, z):  # an ellipsoid, rotated about z: the value is 1 on its sur
     return np.sqrt((a / radii[0]) ** 2 + (b / radii[1]) ** 2 + (dz / radii[2]) ** 2)
 level = inside(x, y, z)
 random = np.random.default_rng(1)
-fade = np.clip((40 - x) / 15, 0, 1)  # to the right the background is as bright as the structure
+fade = np.clip((40 - x) / 15, 0, 1)  # for large x, the background is as bright as the structure, so that there is no edge
 image = 60 + 120 * np.maximum(np.clip((1 - level) * 10 + 0.5, 0, 1), 1 - fade) + random.normal(0, 15, level.shape)
 header = dict(imagej=True, resolution=(1 / pixel, 1 / pixel), metadata={"axes": "ZYX", "spacing": step, "unit": "um"})
 tifffile.imwrite(f"{out}/stack.tif", np.clip(image, 0, 255).astype(np.uint8), **header)

@@ -10,7 +10,7 @@ data=houdini_free_examples/data
 mkdir -p "$out"
 
 echo "== one run, several files"
-# Here from the marks alone; 00_quickstart.sh uses the image as well.
+# The surface is computed from the marks alone; 00_quickstart.sh uses the image as well.
 "$covol" reconstruct "$data/celegans_marks.csv" --voxel-size 4 -o "$out/surface.vdb" --density "$out/fog.vdb" \
   --mesh "$out/embryo.ply"
 "$covol" mesh "$out/surface.vdb" -o "$out/embryo.glb" --up y --unit-scale 0.01

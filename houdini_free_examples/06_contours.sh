@@ -15,7 +15,7 @@ import sys
 import numpy as np, tifffile
 out, pixel, step, center = sys.argv[1], 0.5, 1.0, np.array((27.0, 25.0, 22.0))
 shapes = {"core": (8, 0.15, 3), "layer": (16, 0.1, 2)}  # radius, height and number of bumps
-def radius(name, azimuth, up):  # of the border in a direction; up: cosine of the angle to the axis
+def radius(name, azimuth, up):  # distance of the border from the centre in a direction; up: cosine of the angle to the z axis
     size, bump, count = shapes[name]
     return size * (1 + bump * np.cos(count * azimuth + 4 * up) * (1 - up ** 2))
 k, j, i = np.meshgrid(np.arange(45), np.arange(100), np.arange(108), indexing="ij")
@@ -36,7 +36,7 @@ def outline(name, slice):
     if not inside[:, 0].all(): return []  # the slice does not meet the border
     turn, s = azimuth[:, 0], 0.01 * inside.sum(axis=1)
     return (np.stack([np.cos(turn), np.sin(turn)], 1) * s[:, None] + center[:2]) / pixel + random.normal(0, 0.4, (24, 2))
-for name, borders in (("core", ["core"]), ("layer", ["layer", "core"])):  # the inner outline is the hole of the layer
+for name, borders in (("core", ["core"]), ("layer", ["layer", "core"])):  # the outline of the core is the inner border of the layer, a hole
     rows = [(slice, n, *mark) for slice in range(2, 45, 5) for n, border in enumerate(borders) for mark in outline(border, slice)]
     np.savetxt(f"{out}/{name}.csv", rows, "%.5g", ",", header="slice,contour,x_px,y_px", comments="")
 PYTHON

@@ -24,8 +24,8 @@ int main(int argc, char** argv) {
         return 2;
     }
     try {
-        // Read the files. Points become world positions; points outside of the image cause an error that suggests a
-        // remedy.
+        // Read the files. Points are converted to world positions. If points are outside of the image, check_inside()
+        // throws an error that suggests a remedy.
         const covol::Image image = covol::read_image(argv[1]);
         const covol::PointCloud cloud = covol::read_points(argv[2]);
         covol::check_inside(cloud, image.geometry());
@@ -37,19 +37,20 @@ int main(int argc, char** argv) {
         const covol::Domain domain = covol::make_domain(image.geometry().world_box(), h);
         points = covol::merge_close_points(points, h / 4);
 
-        // 1. Distance to the points, in a tube around them. D closes the gaps that the points leave.
+        // 1. Distance to the points, in a tube around them. D, the tag distance, is chosen so that gaps between points
+        // that are narrower than 2 D are closed.
         const covol::TagDistanceChoice choice = covol::choose_tag_distance(points, domain, {});
         const double D = choice.tag_distance;
         const covol::DistanceResult d = covol::compute_distance(points, domain, {D + 5 * h});
         std::printf("D = %g (%s)\n", D, choice.reason.c_str());
 
-        // 2. Tagging: positions that a flood from outside cannot reach are inside. u starts as a clamped signed
-        // distance.
+        // 2. Tagging: voxels that a flood fill from outside cannot reach through {d > D} are inside. The level set u
+        // starts as a clamped signed distance.
         covol::BandResult tagged = covol::tag_interior(*d.grid, {D, {}});
         if (tagged.report.leaks)
             std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
 
-        // 3. The edge detector, only within the band.
+        // 3. The edge detector g of the image, computed only within the narrow band.
         const covol::EdgeResult g = covol::detect_edges(image, *tagged.grid);
 
         // 4. The flow: points, image edges and curvature move u until it is steady.
@@ -60,7 +61,7 @@ int main(int argc, char** argv) {
         const covol::EvolveReport solved = covol::evolve(*u, fields);
         std::printf("%d steps, %s\n", solved.steps, covol::to_string(solved.stop_reason));
 
-        // 5. A true signed distance, and the results made from it.
+        // 5. The zero level of u as a true signed distance, and the mesh and label image made from it.
         const covol::FloatGridPtr surface = covol::extract_surface(*u);
         const covol::TriangleMesh mesh = covol::extract_mesh(*surface);
         const covol::MeshMeasures measures = covol::measure(mesh);

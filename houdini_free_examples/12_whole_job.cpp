@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
 
         const covol::Image image = covol::read_image(argv[1], {}, run);
         const covol::PointCloud marks = covol::read_points(argv[2]);
-        covol::check_inside(marks, image.geometry(), run);  // or an error that suggests a remedy
+        covol::check_inside(marks, image.geometry(), run);  // throws an error that suggests a remedy
 
         covol::SegmentOptions options;
         options.voxel_size = 3 * image.geometry().spacing[0];  // other options are chosen automatically

@@ -23,9 +23,9 @@ if "bool" not in vars(np):
     np.bool = bool
 
 MESH_TOLERANCE = 1e-5  # relative to the largest side: PLY and GLB have the same single-precision numbers
-BOX_TOLERANCE = 0.5    # voxels, between a volume's surface and the mesh; the fog's level is met only at lattice lines
-MEAN_TOLERANCE = 0.1   # voxels
-NORMAL_TOLERANCE = 1   # degrees, from Blender's own mean over the triangles at a vertex
+BOX_TOLERANCE = 0.5    # voxels, between the bounding boxes of a volume's surface and of the mesh
+MEAN_TOLERANCE = 0.1   # voxels, mean distance of a level set's surface from the mesh
+NORMAL_TOLERANCE = 1   # degrees, between the normals in the .glb file and those that Blender computes from the triangles
 PICTURE = (800, 450)
 SAMPLES = 16
 GLOW = 16
@@ -112,7 +112,7 @@ def check(ply, glb, volumes):
     checks("PLY: inside out", 0 if volume > 0 else 1, 0, "")
     checks("PLY and GLB: volumes differ", abs(solid_volume(glb) / volume - 1), 1e-4, "of the volume")
 
-    # Blender's PLY importer ignores normals, its glTF importer uses them.
+    # Blender's glTF importer uses the normals of the file. Its PLY importer ignores them, so that Blender computes the PLY's normals.
     flat = sum(not p.use_smooth for p in glb.data.polygons)  # flat if all three normals of a triangle are equal
     checks("GLB: flat triangles", flat / len(glb.data.polygons), 0.25, "of all")
     checks("GLB: normals of its own are missing", 0 if glb.data.has_custom_normals else 1, 0, "")
@@ -126,13 +126,13 @@ def check(ply, glb, volumes):
     for obj in volumes:
         for grid in obj.data.grids:
             h = (obj.matrix_world @ grid.matrix_object).to_scale()[0]
-            # A fog volume is 0 on the surface and 1 three voxels inside, so that its level is met close to the surface.
+            # A fog volume is 0 on the surface and 1 three voxels inside: its level set 0.01 lies close to the surface.
             made = volume_to_mesh(obj, grid.name, 0.0 if grid.name == "surface" else 0.01)
             what = f"{obj.name}:{grid.name}"
             if len(made) == 0:
                 checks(f"{what}: has no surface", 1, 0, "")
                 continue
-            # Volume to Mesh places values at the corners of voxels, OpenVDB at their centres.
+            # Volume to Mesh takes values as those at the corners of voxels, OpenVDB as those at their centres: half a voxel is subtracted.
             made -= h / 2
             boxes = max(np.abs(made.min(0) - a.min(0)).max(), np.abs(made.max(0) - a.max(0)).max()) / h
             off = np.array([tree.find_nearest(Vector(v))[3] for v in made]) / h
@@ -200,7 +200,7 @@ def render(path, size, ply, volume, low, high):
     """Half of the mesh around the volume: misalignment would be visible along the cut."""
     a = corners(ply)
     box_min, box_max = a.min(0), a.max(0)
-    # The scene is scaled to two metres: lights, lens and clipping do not depend on the image's unit.
+    # The scene is scaled to two metres, so that lights, lens and clipping need not depend on the size and unit of the image.
     home = Matrix.Scale(2 / (box_max - box_min).max(), 4) @ Matrix.Translation(-(box_min + box_max) / 2)
     half = cut(ply, (box_min + box_max)[0] / 2)
     half.data.materials.append(surface_material((0.10, 0.36, 0.50)))
@@ -226,7 +226,7 @@ def render(path, size, ply, volume, low, high):
     scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", SAMPLES, 1
     scene.cycles.use_denoising = False  # Debian's Blender has no denoiser
     scene.cycles.max_bounces = 2
-    scene.cycles.volume_step_rate = 2  # voxels; enough for smooth emission
+    scene.cycles.volume_step_rate = 2  # step length in voxels; short enough for emission that varies smoothly
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.filepath = str(path)
@@ -264,7 +264,7 @@ def main():
         obj.hide_render = obj is not shown
     size = [int(n) for n in given["size"].split("x")] if "size" in given else PICTURE
     render(out / "blender.png", size, ply, shown, float(low), float(high))
-    bpy.context.preferences.filepaths.save_version = 0  # keeps no backup of an older scene
+    bpy.context.preferences.filepaths.save_version = 0  # Blender then keeps no backup of an older file with this name
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "blender.blend"), compress=True)
     return 0 if good else 1
 

@@ -25,7 +25,7 @@ ends = np.maximum(4 - z, z - 25)
 distance = np.maximum(off - 7, ends)
 random = np.random.default_rng(2)
 ct = 40 + 300 * np.clip(0.5 - distance / 0.6, 0, 1) + random.normal(0, 25, size)
-affine = np.diag([-spacing[0], -spacing[1], spacing[2], 1])  # LPS to RAS
+affine = np.diag([-spacing[0], -spacing[1], spacing[2], 1])  # NIfTI is in RAS: x and y of the LPS coordinates change their signs
 image = nibabel.Nifti1Image(ct.astype(np.int16), affine)
 image.header.set_xyzt_units("mm")
 nibabel.save(image, f"{out}/ct.nii.gz")

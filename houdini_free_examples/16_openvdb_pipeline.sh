@@ -36,7 +36,8 @@ points, quads = solid.convertToQuads(isovalue=0)
 print(f"surface: {solid.activeVoxelCount()} active voxels of {h:g}, {len(quads)} quadrilaterals")
 shell = solid.deepCopy()
 shell.name = "shell"
-# Up to 4 units from the surface; the half width is three voxels.
+# The level set of a shell: all positions up to 4 units from the surface are inside. The values are known there, because
+# the narrow band reaches three voxels of 4 units from the surface.
 shell.mapAll(lambda d: abs(d) - 4.0)
 shell.background = solid.background - 4.0
 vdb.write(f"{out}/shell.vdb", [shell])

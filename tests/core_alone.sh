@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the core on a system on which TIFF, ITK, GDCM and HDF5 cannot be found, checks that it links none of them, and
-# runs its tests.
+# Builds covol's core, that is covol without COVOL_IO, while CMake is prevented from finding TIFF, ITK and HDF5. Checks
+# that the library links none of them, nor GDCM, and runs the tests of the core.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

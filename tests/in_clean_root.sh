@@ -1,13 +1,12 @@
 #!/usr/bin/env bash
-# Tests an installation from scratch: in fresh Debian systems without a compiler, from a distributed file to the results
-# of the quickstart's job and the page of covol mark, as an unprivileged user. Run it as root, with debootstrap
-# installed.
+# Tests the installation of a distributed file in fresh Debian systems without a compiler: installs it, and runs the job
+# of the quickstart and covol mark as an unprivileged user. Run this script as root, with debootstrap installed.
 #
 #     bash tests/in_clean_root.sh BUNDLE.tar.xz|COVOL.whl|COVOL.deb [RELEASE...]
 #
-# A bundle runs in bookworm and trixie by default, a wheel and a package in bookworm. The measured time begins when the
-# fresh Debian is ready, with Python's venv and NumPy for a wheel; for a package it includes the downloads of apt-get.
-# The mirror is the one that this machine's apt uses, or COVOL_MIRROR.
+# By default, a bundle is tested in bookworm and trixie, a wheel and a package in bookworm. The printed time of the
+# installation begins when the fresh Debian is ready; for a wheel, this Debian includes Python's venv and NumPy. For a
+# package, the time includes the downloads of apt-get. The mirror is that of this machine's apt, or COVOL_MIRROR.
 set -euo pipefail
 file=$(realpath "$1")
 shift
@@ -65,7 +64,7 @@ for release in "${releases[@]}"; do
   as_person "d=houdini_free_examples/data; $covol segment \$d/celegans_embryo.tif --points \$d/celegans_marks.csv \
     --voxel-size 3 -o embryo.vdb --mesh embryo.ply --mask embryo_mask.tif --report embryo.html --quiet && \
     $covol compare embryo.vdb \$d/celegans_check.csv"
-  # The page answers only at the printed address.
+  # The page of covol mark is served at the printed address, which contains a secret, and refused at any other path.
   as_person "$covol"' mark houdini_free_examples/data/celegans_embryo.tif study --no-browser >mark.log 2>&1 & program=$!
     trap "kill -INT $program" EXIT
     for n in $(seq 100); do grep -q "http://" mark.log && break; sleep 0.1; done

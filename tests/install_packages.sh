@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the packages with which covol is built and tested: Debian 12 packages only. Does nothing if all are
-# installed. Packages on the command line are installed in addition (used by the benchmarks).
+# Installs the packages with which covol is built and tested, all from Debian 12. Does nothing if all are installed.
+# Further packages, such as those for the benchmarks, are given as arguments.
 set -euo pipefail
 
 packages=(

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs the Debian packages into a fresh Debian 12 and runs the quickstart and the Python module there. Run it as
-# root, with debootstrap installed; it takes some minutes and a GB, most of it for the packages on which covol depends.
+# Installs covol's Debian packages in a fresh Debian 12, and runs the quickstart and the Python module there. Run this
+# script as root, with debootstrap installed. It takes some minutes and a GB of disk space, most of it for the packages
+# on which covol depends.
 #
 #     bash tests/packages_in_clean_root.sh BUILD [FOLDER]      FOLDER: for the new root, below /tmp by default
 #

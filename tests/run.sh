@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is needed, builds with warnings as errors, runs every test. Tests on larger data use the folder
-# COVOL_DATA and print SKIPPED if it is not set.
+# Installs the packages that are needed, builds covol with warnings as errors, and runs all tests. Tests on larger data
+# use the folder in the environment variable COVOL_DATA, and print SKIPPED if it is not set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

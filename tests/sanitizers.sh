@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# The unit and property tests under the address and undefined-behaviour sanitizers.
+# Runs the unit and property tests under the address and undefined-behaviour sanitizers.
 #
 #   bash tests/sanitizers.sh [WORDS FOR CTEST ...]   all of them, and the lines of lib/ that they reach: an hour and more
 #   bash tests/sanitizers.sh --quick                 the programs that take less than 20 s (tests/CMakeLists.txt): for CI
 #
 # The quick pass leaves out the checks of pointer dereferences, which take a third of the compile time, because the
-# address sanitizer finds most of these errors, too. Leaks are detected, except for those of the HDF5 and OpenVDB
-# libraries with damaged files: the first keeps objects of the header, the second the node that it was reading. The
-# tests' own code is compiled with the address sanitizer only (COVOL_TEST_FLAGS in CMakePresets.json).
+# address sanitizer finds most of these errors, too. Leaks are detected, except for those of two libraries with damaged
+# files: HDF5 keeps objects of the header, and OpenVDB the node that it was reading. The tests' own code is compiled
+# with the address sanitizer only (COVOL_TEST_FLAGS in CMakePresets.json).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${COVOL_JOBS:-$(nproc)}
@@ -16,8 +16,8 @@ trap 'rm -f "$leaks"' EXIT
 printf 'leak:libhdf5\nleak:libopenvdb\n' > "$leaks"
 export LSAN_OPTIONS="suppressions=$leaks:print_suppressions=0" UBSAN_OPTIONS=print_stacktrace=1
 
-# Without address randomization if possible: with many random bits the sanitizer may find no address range for its
-# memory.
+# Address randomization is switched off if possible: with many random bits, the sanitizer may find no free range of
+# addresses for its own memory.
 fixed=(setarch --addr-no-randomize)
 "${fixed[@]}" true 2> /dev/null || fixed=()
 
@@ -25,7 +25,7 @@ if [[ ${1:-} == --quick ]]; then
     bash tests/install_packages.sh
     cmake --preset asan --log-level=WARNING
     cmake --build --preset asan --parallel "$jobs" --target quick_tests
-    # Runs the tests of each program in one process; the output is shown if it fails.
+    # Each program runs all its tests in one process; its output is shown only if it fails.
     run='text=$("$0" 2>&1) || { echo "$0: exit code $?"; printf "%s\n" "$text"; exit 1; }'
     "${fixed[@]}" xargs --max-args=1 --max-procs="$jobs" bash -c "$run" < build-asan/tests/quick_tests.txt
     echo "covol: $(wc -l < build-asan/tests/quick_tests.txt) test programs passed under the sanitizers"

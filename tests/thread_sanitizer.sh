@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# The unit and property tests under the thread sanitizer. Building and running take half an hour each on two cores:
-# meant for a weekly run.
+# Runs the unit and property tests under the thread sanitizer. Building and running take half an hour each on two cores,
+# so it is meant for a weekly run.
 #
 #   bash tests/thread_sanitizer.sh [WORDS FOR CTEST ...]
 #
-# TBB synchronizes by its own atomics, which the sanitizer sees only if TBB is compiled with it: the installed version
-# is therefore built from Debian's source (with deb-src lists made from the machine's own, in the build folder).
-# tests/thread_sanitizer.supp lists the suppressions and their reasons; OpenVDB's library is not instrumented, and its
-# races are not reported.
+# TBB synchronizes threads by its own atomics, which the sanitizer sees only in a TBB that is compiled with it.
+# Therefore the installed version of TBB is built from Debian's source; the deb-src lists for this are made from the
+# machine's apt lists, in the build folder. tests/thread_sanitizer.supp lists the suppressions and their reasons.
+# OpenVDB's library is not compiled with the sanitizer, and its races are not reported.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${COVOL_JOBS:-$(nproc)}
@@ -38,10 +38,10 @@ fi
 
 cmake --preset tsan --log-level=WARNING
 cmake --build --preset tsan --parallel "$jobs"
-# Left out: after an exception from std::call_once() the sanitizer's own pthread_once() waits forever.
+# This test is left out because the sanitizer's pthread_once() waits forever after an exception in std::call_once().
 left_out='chunks: NaN is an error of who asks for its chunk'
-# Without address randomization if possible: with many random bits the sanitizer may find no address range for its
-# memory.
+# Address randomization is switched off if possible: with many random bits, the sanitizer may find no free range of
+# addresses for its own memory.
 fixed=(setarch --addr-no-randomize)
 "${fixed[@]}" true 2> /dev/null || fixed=()
 TSAN_OPTIONS="suppressions=$PWD/tests/thread_sanitizer.supp ignore_noninstrumented_modules=1 second_deadlock_stack=1" \

@@ -22,8 +22,9 @@ sys.path.insert(0, str(HERE / "bench"))
 from quality import read_vertices, shell_errors  # noqa: E402
 from tables import markdown, provenance  # noqa: E402
 
-SIDE = 2.6  # of the cube of the phantoms
-R, MAJOR, MINOR, BOX = 0.8, 0.75, 0.3, np.array((0.9, 0.7, 0.5))  # half sides of the box; lib/src/analysis/phantom.cpp
+SIDE = 2.6  # side of the cube that the phantoms fill, in units of length
+# Radius of the sphere, radii of the torus, half sides of the box, as in lib/src/analysis/phantom.cpp.
+R, MAJOR, MINOR, BOX = 0.8, 0.75, 0.3, np.array((0.9, 0.7, 0.5))
 
 
 def off_box(p):
@@ -31,7 +32,7 @@ def off_box(p):
     return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
 
 
-SHAPES = {  # signed distance, volume, area
+SHAPES = {  # {name: (signed distance, volume, area)}
     "sphere": (lambda p: np.linalg.norm(p, axis=1) - R, 4 / 3 * np.pi * R**3, 4 * np.pi * R**2),
     "torus": (lambda p: np.hypot(np.hypot(p[:, 0], p[:, 1]) - MAJOR, p[:, 2]) - MINOR, 2 * np.pi**2 * MAJOR * MINOR**2,
               4 * np.pi**2 * MAJOR * MINOR),

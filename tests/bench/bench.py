@@ -56,7 +56,7 @@ class Run:
             while True:
                 status = pathlib.Path(f"/proc/{pid}/status").read_text()
                 if "VmHWM:" not in status:
-                    return  # ended
+                    return  # the process has ended
                 if os.readlink(f"/proc/{pid}/exe") != os.readlink("/proc/self/exe"):
                     self.peak = int(status.split("VmHWM:")[1].split()[0]) * 1024
                 time.sleep(0.01)
@@ -160,7 +160,8 @@ def part_stages(bench):
     known = {"baseline": "", "avx2": "avx2", "avx512": "avx512f"}
     for simd in [name for name, flag in known.items() if flag in flags] + [""]:
         pattern = "stage/time_step|stream/" if simd else "stage/[^t]|stage/tag|stream/"
-        # The time step itself takes the best of several runs.
+        # The stage time_step is not repeated here (simd not empty), because it takes the fastest of several runs
+        # itself.
         runs = google_benchmark(bench, pattern, 1 if simd else repetitions, 0.05, **({"COVOL_SIMD": simd} if simd else {}))
         bandwidth = measure_bandwidth(runs)
         for name in sorted((n for n in runs if n.startswith("stage/")), key=lambda n: (n.split("/")[1], n)):
@@ -206,11 +207,12 @@ def part_sphere(bench):
             errors[name] = shell_errors(run.mesh, kind, voxel)
 
     covol_round(kinds)
-    # The value at the start, which all other programs use on the same lattice.
+    # The constant K of the edge detector that covol computed. The other programs use the same value.
     k = runs["covol, one level, tau = h", 1][0].report["edge"]["edge_k"]
     common = ("--image", image, "--radius", START_RADIUS, "--edge-k", k)
 
-    # The dense solver: until it is steady in one octant; in the whole cube only a few steps, for the time per step.
+    # The dense solver runs until it is steady in one octant only, and for 3 steps in the whole cube, for the time per
+    # step.
     dense = [bench.programs / "bench_dense", *common, "--points", points]
     octant_mesh = bench.work / "octant.ply"
     octant = Run([*dense, "--octant", 1, "--mesh", octant_mesh, "--max-steps", 20 if bench.quick else 500]).json()
@@ -267,7 +269,7 @@ def part_sphere(bench):
     bench.write("sphere", [{"image": f"{size}^3"} | row for row in rows])
 
 
-# The best parameters for the shell among those tried on this phantom at 260^3.
+# Weights of ITK's filter: of all that were tried on this phantom at 260^3, those with the smallest error on the shell.
 ITK = {"propagation": -0.03, "curvature": 1, "advection": 1}
 
 
@@ -373,7 +375,8 @@ def part_embryo(bench):
     for (job, threads), done in runs.items():
         run = best(done)
         voxels = run.report["grid"]["active_voxels"]
-        held = run.peak - idle - (truth.size if image in jobs[job] else 0)  # the image has one byte per voxel
+        # Bytes for the level sets: without the image, at one byte per voxel.
+        held = run.peak - idle - (truth.size if image in jobs[job] else 0)
         rows.append({"job": job, "threads": threads, "seconds": run.wall, "cpu_seconds": run.cpu, "dice": dices[job],
                      "active_voxels": voxels, "peak_mib": run.peak / 2**20,
                      "bytes_per_active_voxel_without_image_and_libraries": held / voxels} |
@@ -465,7 +468,7 @@ def main():
     options = parser.parse_args()
     if options.results is None:
         options.results = pathlib.Path(options.build) / "quick" if options.quick else HERE / "results"
-    provenance()  # with the machine's load before the first part
+    provenance()  # first call: records the load of the machine before the measurements
     chosen = [part for part in options.only.split(",") if part]
     for part in chosen:
         if part not in PARTS:
@@ -479,7 +482,7 @@ def main():
             print(f"{part}: {PARTS[part].__doc__}", flush=True)
             try:
                 PARTS[part](bench)
-            except (RuntimeError, OSError, KeyError, ValueError) as error:  # the other parts still run
+            except (RuntimeError, OSError, KeyError, ValueError) as error:  # a part that fails does not end the others
                 failed.append(part)
                 print(f"{part}: FAILED: {type(error).__name__}: {error}", flush=True)
             print(f"{part}: {time.perf_counter() - begin:.0f} s", flush=True)

@@ -18,7 +18,7 @@ import plots
 from bench import Bench, Run, read_results
 
 NOISE, INSIDE, OUTSIDE = 6, 190, 40
-MARKS_A_VOXEL = 0.1  # of the surface
+MARKS_A_VOXEL = 0.1  # number of marks per square voxel of the surface
 
 
 def make_ball(folder, size, radius):

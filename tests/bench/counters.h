@@ -3,8 +3,8 @@
 
 namespace covol::bench {
 
-/// per_voxel (time), and, if the memory traffic is known, bytes_per_voxel and bytes_per_second. @param voxels  in one
-/// iteration
+/// Adds counters to a benchmark: voxels, per_voxel (seconds), and, if the memory traffic is known, bytes_per_voxel and
+/// bytes_per_second. @param voxels  number of voxels that one iteration processes
 inline void count_voxels(benchmark::State& state, double voxels, double bytes_per_voxel = 0) {
     using benchmark::Counter;
     state.counters["voxels"] = voxels;

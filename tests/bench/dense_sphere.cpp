@@ -1,5 +1,5 @@
-// A plain dense solver of covol's scheme in double precision, one thread, on every voxel of the image: the tests'
-// reference (support/dense_reference.h), with covol's stop rule. Benchmarks compare covol with it.
+// covol's scheme on every voxel of the image, in double precision, on one thread. Steps are those of the reference
+// solver of the tests (support/dense_reference.h); the stop rule is that of covol. Benchmarks compare covol with it.
 //
 //   bench_dense --image I.nrrd --points P.xyz --radius R --edge-k K [--sigma V --delta V --tau V --range V]
 //               [--octant 1] [--steps N | --max-steps N] [--mesh OUT.ply]
@@ -63,15 +63,16 @@ Problem make_problem(const bench::Arguments& arguments) {
     const double sigma = h * arguments.number("sigma", 1), time = 0.5 * sigma * sigma;
     test::dense_heat(p.edge, time, std::max(1, int(std::ceil(time / (0.5 * h * h) - 1e-9))));
     p.edge = test::dense_edge(p.edge, arguments.number("edge-k"));
-    // Beyond the range the points' potential is constant, so that the tube's background value can be used there.
+    // compute_distance() gives distances in a tube around the points, and a constant beyond it. Beyond attraction_range
+    // the points' potential does not depend on the distance, so that the constant is sufficient there.
     const auto points = read_points(arguments.text("points")).points;
     p.distance =
         test::to_dense(p.domain, *compute_distance(points, p.domain, {p.options.attraction_range + 2 * h}).grid);
     return p;
 }
 
-/// The same as covol's: the mean motion of the zero crossings along voxel edges in a step, in voxels; and over ten
-/// steps the number of voxels that changed sign per area of the surface.
+/// covol's rule for a steady surface. It uses the smaller of two motions per step, in voxels: the mean motion of the
+/// zero crossings along voxel edges, and the number of voxels that changed sign within ten steps, per area.
 class StopRule {
 public:
     explicit StopRule(double tolerance) : tolerance_(tolerance) {}

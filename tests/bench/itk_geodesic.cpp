@@ -3,8 +3,9 @@
 //   bench_itk --image I.nrrd --radius R --edge-k K [--sigma V] [--propagation P --curvature C --advection A]
 //             [--iterations N] [--rms E] [--threads T] [--mesh OUT.ply]
 //
-// The start is the signed distance to the sphere of radius R around the origin. The filter works in voxels (spacing 1):
-// sigma is in voxels, K is per world unit as covol reports it. One line of JSON goes to stdout.
+// The start is the signed distance to the sphere of radius R around the origin, in world units. The filter works in
+// voxels (spacing 1), and sigma is in voxels. K is the constant of the edge detector as covol reports it, per world
+// unit. One line of JSON goes to stdout.
 #include <itkGeodesicActiveContourLevelSetImageFilter.h>
 #include <itkGradientMagnitudeRecursiveGaussianImageFilter.h>
 #include <itkImageFileReader.h>
@@ -28,7 +29,7 @@ using Volume = itk::Image<float, 3>;
 using Iterator = itk::ImageRegionIteratorWithIndex<Volume>;
 
 struct Input {
-    Volume::Pointer image;  // in [0,1], spacing 1
+    Volume::Pointer image;  // values in [0, 1]; spacing 1
     Domain domain;
 };
 

@@ -1,5 +1,6 @@
-// The kernels on leaves, on every instruction set of this processor: in cache (8 leaves) and out of it (24^3 leaves, 7
-// million voxels), including the copying into padded buffers as in a step. Names are kernel/set/where/threads.
+// Times of the solver's kernels on leaves, for every instruction set of this processor: on 8 leaves, which fit into the
+// cache, and on 24^3 leaves (7 million voxels), which do not. The copying of leaves into padded buffers, as in a time
+// step, is included. Names of benchmarks are kernel/set/where/threads.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -20,11 +21,11 @@ namespace {
 using namespace covol::detail;
 using Leaves = LeafArray<float>;
 
-constexpr int kSmallSide = 2, kLargeSide = 24;  // leaves
+constexpr int kSmallSide = 2, kLargeSide = 24;  // leaves along each axis
 constexpr unsigned long long kAll = ~0ULL;
 constexpr std::array<unsigned long long, 8> kEveryVoxel = {kAll, kAll, kAll, kAll, kAll, kAll, kAll, kAll};
 
-/// A cube of leaves with all fields of a step: u is a distance with ripples.
+/// A cube of leaves with all fields that a time step needs; u is a distance with ripples.
 struct Cube {
     LeafBand band;
     HaloField u, phi, edge;
@@ -65,7 +66,7 @@ struct Cube {
     [[nodiscard]] Fraction* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
 };
 
-/// Created once: the time of a kernel does not depend on the values left by previous kernels.
+/// Each cube is created once and used by all kernels, because their times do not depend on the values in it.
 Cube& cube_of(int side) {
     static Cube small(kSmallSide), large(kLargeSide);
     return side == kSmallSide ? small : large;
@@ -92,7 +93,7 @@ void assemble(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
 
 template <int inner>
 void relax(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
-    // also returns the residual at the first sweep
+    // relax() returns the residual; without DoNotOptimize the compiler could omit its computation.
     benchmark::DoNotOptimize(kernels.relax(star_of(cube.u, leaf), cube.previous.leaf(leaf), cube.rows_of(leaf),
                                            kEveryVoxel.data(), 1.5F, inner, {}));
 }
@@ -114,18 +115,19 @@ void motion(const SchemeKernels&, Cube& cube, std::size_t leaf) {
 struct Kernel {
     const char* name;
     void (*run)(const SchemeKernels&, Cube&, std::size_t leaf);
-    double bytes;  // read and written per voxel, each of them once
+    double bytes;  // bytes per voxel that are read or written, if each value is moved once
 };
 
 constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Fraction);
 constexpr Kernel kKernels[] = {
-    {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // u, phi, edge; u before; rows
-    {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // u, u before, rows; u
+    {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // read u, phi, edge; write u before, rows
+    {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // read u, u before, rows; write u
     {"relax_2", relax<2>, 2 * kFloat + kRows + kFloat},  {"mean_step", mean_step, 3 * kFloat},
     {"mean_gradient", mean_gradient, 2 * kFloat},        {"motion", motion, 2 * kFloat},
 };
 
-/// Two colours, as in a step, so that no leaf reads what another thread writes.
+/// With several threads, first the even leaves and then the odd ones are visited, as in a time step, so that no leaf
+/// reads values that another thread writes at the same time.
 void run_on(benchmark::State& state, const Kernel& kernel, const SchemeKernels& set, int side, int threads) {
     Cube& cube = cube_of(side);
     tbb::task_arena arena(threads);

@@ -1,10 +1,11 @@
-// Mean curvature flow of a sphere: OpenVDB's LevelSetFilter against covol's evolve with theta = rho = 0, in turns
-// (A B A B ...), per active voxel and step.
+// Mean curvature flow of a sphere: the time per active voxel and step of OpenVDB's LevelSetFilter, and of covol's
+// evolve with theta = rho = 0. The two programs run in turns, so that changes of the machine's load affect both.
 //
 //   bench_curvature [--radius 100] [--steps 12] [--repetitions 3] [--threads T]
 //
-// A step of covol (delta = tau = 1 voxel) shrinks r² by 4 h²; an iteration of OpenVDB takes an explicit step of h²/3
-// under half the sum of the principal curvatures: r² shrinks by 2/3 h². One line of JSON goes to stdout.
+// A step of covol (delta = tau = 1 voxel) reduces the squared radius r² by 4 h². An iteration of OpenVDB is an explicit
+// step of time h²/3, with a speed of half the sum of the principal curvatures: r² decreases by 2/3 h². One line of JSON
+// goes to stdout.
 #include <openvdb/tools/LevelSetFilter.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <tbb/global_control.h>
@@ -25,9 +26,9 @@ using namespace covol;
 namespace {
 
 struct Outcome {
-    double ns = INFINITY, cpu_ns = INFINITY;  // per active voxel and step
+    double ns = INFINITY, cpu_ns = INFINITY;  // nanoseconds per active voxel and step; minimum over the repetitions
     double voxels = 0;
-    double radius = 0;  // of the ball with the enclosed volume, voxels
+    double radius = 0;  // radius of the ball with the same volume, in voxels
 
     void take(const bench::Stopwatch& watch, double voxel_steps) {
         ns = std::min(ns, 1e9 * watch.wall() / voxel_steps);
@@ -77,7 +78,7 @@ nlohmann::json to_json(const Outcome& outcome, double start, int steps, double s
             {"active_voxels", outcome.voxels},
             {"radius_error", outcome.radius - exact},
             {"radius_moved", start - exact},
-            // to shrink r² by 4 h², as one step of covol does
+            // seconds in which r² decreases by 4 h², as in one step of covol
             {"seconds_per_unit", 1e-9 * outcome.ns * outcome.voxels * 4 / shrinkage}};
 }
 

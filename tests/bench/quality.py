@@ -7,7 +7,7 @@ import numpy as np
 
 RADIUS = np.sqrt(3) / 2
 THICKNESS = 0.04
-MARGIN = 0.05  # around a hole's rim, world units
+MARGIN = 0.05  # width of the zone around a hole's rim in which vertices are left out, in world units
 HOLES = {
     "sphere-round": lambda a, b, grow: np.hypot(a, b) < 0.30 + grow,
     "sphere-square": lambda a, b, grow: np.maximum(abs(a), abs(b)) < 0.25 + grow,

@@ -21,7 +21,8 @@ import tifffile
 SIZE, H = 48, 0.5
 ORIGIN = -H * (SIZE - 1) / 2
 
-# Files are made by make_inputs(); each job runs in a folder of its own, next to theirs. A job may use the outputs of previous jobs.
+# Each line is the name of a job and the arguments of covol. A job runs in a folder of its own. ../in contains the files
+# that make_inputs() makes, and ../NAME the outputs of a previous job.
 JOBS = """
 phantom_torus      phantom torus --size 48 -o i.nrrd --points p.xyz --labels t.nrrd
 phantom_round      phantom sphere-round --size 64 -o i.nii.gz --points p.ply
@@ -185,7 +186,7 @@ def content(path):
 def run(covol, folder, arguments):
     """{file: its content as far as it is compared}, with the printed output and the exit code."""
     folder.mkdir(parents=True)
-    own = os.environ | {"LD_LIBRARY_PATH": str(covol.parent.parent / "lib")}  # a build that was copied finds its own library
+    own = os.environ | {"LD_LIBRARY_PATH": str(covol.parent.parent / "lib")}  # a copied build uses its own libcovol
     done = subprocess.run([covol, *shlex.split(arguments), "--threads", "2"], cwd=folder, capture_output=True, text=True, env=own)
     printed = re.sub(r"[\d.]+ (s|GB|MB|GiB|MiB)\b", "", done.stdout + done.stderr)
     found = {path.name: content(path) for path in sorted(folder.iterdir())}
@@ -201,7 +202,7 @@ def main():
     options = parser.parse_args()
     jobs = dict(line.split(None, 1) for line in JOBS.strip().splitlines())
     chosen = [name for name in jobs if options.only in name]
-    for name in chosen:  # grows meanwhile
+    for name in chosen:  # the loop appends to the list that it visits: the jobs of which outputs are used
         chosen += [need for need in re.findall(r"\.\./(\w+)/", jobs[name]) if need in jobs and need not in chosen]
     work = pathlib.Path(options.work or tempfile.mkdtemp(prefix="covol_bits_")).resolve()
     differ, failed = [], []

@@ -27,9 +27,11 @@ from heuristics import SOURCE, read_heuristics
 
 CSV, PAGE = SOURCE / "tests/bench/results/heuristics.csv", SOURCE / "docs/heuristics.md"
 COLUMNS = ["name", "value", "factor", "job", "state", "error", "seconds"]
-MAX_SECONDS = 20  # of processor time
-CHECK = "local_fit.first_spacings=2"  # changes every cloud
-ABOVE, POINTS, FAIL = 0.1, 0.1, 3  # sensitive: an error that grows by a tenth of itself, and by POINTS percentage points; fails: threefold, and by 1
+MAX_SECONDS = 20  # of processor time per job; a job that takes longer fails
+CHECK = "local_fit.first_spacings=2"  # a change of COVOL_SCALE that changes the result of every cloud
+# sensitive: an error grows by this fraction, and by POINTS percentage points; fails: it grows by a factor of FAIL, and
+# by 1 percentage point.
+ABOVE, POINTS, FAIL = 0.1, 0.1, 3
 
 
 # ---- running --------------------------------------------------------------------------------------------------------------
@@ -86,7 +88,7 @@ def measure(options):
         heuristics[h.name.split(".")[0]].append(h)
     for step in set(options.only or []) - set(jobs.PLAN):
         raise SystemExit(f"--only {step}: expected one of {', '.join(jobs.PLAN)}")
-    tasks = []  # first job of every constant, then the second ones, so that limited time is spread over all
+    tasks = []  # the first jobs of all constants, then the second jobs, so that limited time is used for all constants
     for turn in range(max(len(names) for names in jobs.PLAN.values())):
         for step, names in jobs.PLAN.items():
             if turn < len(names) and (not options.only or step in options.only):
@@ -134,7 +136,7 @@ class Measured:
         self.constant, self.same = constant, True
         self.errors = collections.defaultdict(dict)
         for row in rows:
-            if row["job"] in as_is:  # without a baseline there is nothing to compare
+            if row["job"] in as_is:  # only jobs that succeeded without scaling, which have an error to compare with
                 self.errors[float(row["factor"])][row["job"]] = float(row["error"]) if row["error"] else None
                 self.same &= row["state"] == "same"
         self.as_is = {job: as_is[job] for found in self.errors.values() for job in found}

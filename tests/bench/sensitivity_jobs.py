@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "marks"))
 
-COUNT = 3000  # points of a cloud
+COUNT = 3000  # default number of points of a cloud
 
 
 # ---- clouds: f(p) is a distance near its surface, negative inside ------------------------------------------------------------
@@ -48,8 +48,9 @@ SHAPES = {
     "spikes": union(ball((0, 0, 0), 0.85), capsule((0, 0, 0), (1.4, 0, 0), 0.13), capsule((0, 0, 0), (-0.3, 1.35, 0.2), 0.11),
                     capsule((0, 0, 0), (0, -0.4, -1.35), 0.15)),
     "torus": torus(0.9, 0.3),
-    "plate": plate((1, 0.8, 0.08), 0.06),  # 4 spacings thick
-    "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),  # a gap of 2 spacings
+    "plate": plate((1, 0.8, 0.08), 0.06),  # its thickness is 4 spacings of the points
+    # Two balls with a gap of 2 spacings of the points.
+    "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),
     "ball": ball((0, 0, 0), 1),
 }
 
@@ -138,7 +139,7 @@ def cloud_error(folder, out, shape, part=None):
     """Mean distance of the mesh from the shape, and of the shape from the mesh beyond 0.05, in % of the shape's half length."""
     vertices = mesh_vertices(out / "s.ply")
     truth = np.load(folder / f"{shape}.npy")
-    if part is not None:  # of an open surface, only the part with points
+    if part is not None:  # an open surface: only the part of the truth and of the mesh near the points is compared
         truth = truth[cKDTree(part).query(truth)[0] < 0.05]
         vertices = vertices[cKDTree(part).query(vertices)[0] < 0.2]
     missing = np.maximum(0, cKDTree(vertices).query(truth)[0] - 0.05)
@@ -181,7 +182,7 @@ def make_phantoms(folder, covol):
         points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
         np.savetxt(folder / f"ten_{name}.csv", points[::max(1, len(points) // 10)], "%.6f", ",", header="x,y,z", comments="")
     rows = []
-    for k in range(8, 37, 4):  # of the torus of radii 0.75 and 0.3: voxels are 2.6 / 44 wide
+    for k in range(8, 37, 4):  # contours on slices of the torus with radii 0.75 and 0.3; the voxel size is 2.6 / 44
         wide = 0.3 ** 2 - ((k - 21.5) * 2.6 / 44) ** 2
         for number, radius in enumerate((0.75 + wide ** 0.5, 0.75 - wide ** 0.5) if wide > 0 else ()):
             rows += [(k, number, 21.5 + radius * np.cos(t) * 44 / 2.6, 21.5 + radius * np.sin(t) * 44 / 2.6) for t in np.arange(0, 6.28, 0.35)]
@@ -202,14 +203,16 @@ def mask_error(folder, path, name):
 
 # ---- structures of real images: with COVOL_DATA ----------------------------------------------------------------------------
 
-# The structures of the second row were not used to choose constants; the draws of marks differ from those that were.
+# The structures of the second row were not used to choose constants. Marks are drawn with another number (REAL_DRAW)
+# than those that were used for it.
 REAL = ("spinal cord", "ventricle", "left atrium", "hippocampus", "worm nucleus 59", "embryo nucleus 2",
         "caudate, right", "vertebra", "hippocampus, posterior", "mouse nucleus 395", "hippocampus 2", "thalamus")
 REAL_COUNTS = (60, 20)
 REAL_DRAW = 11
 
 
-DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4  # marks; of their extent
+# Number of marks; shift of the wrong ones along each axis, as a fraction of the extent of the marks.
+DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4
 
 
 def real_name(structure, count):
@@ -261,7 +264,7 @@ def real_error(folder, out, structure):
 
 RECONSTRUCT = "reconstruct ../in/{} --init cloud -o s.vdb --mesh s.ply"
 MARKS = "segment ../in/p_{0}.nrrd --points ../in/p_{0}.csv -o s.vdb --mask m.nrrd"
-JOBS = {  # name: (arguments, kind of truth, shape, more)
+JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points if the surface is open)
     "spikes": (RECONSTRUCT.format("spikes1.csv"), "cloud", "spikes"),
     "spikes noisy": (RECONSTRUCT.format("spikes2.csv"), "cloud", "spikes"),
     "torus": (RECONSTRUCT.format("torus3.csv"), "cloud", "torus"),
@@ -320,7 +323,7 @@ JOBS = {  # name: (arguments, kind of truth, shape, more)
     "m painted": ("segment ../in/p_torus.nrrd --painted ../in/s_torus.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m painted box": ("segment ../in/p_box.nrrd --painted ../in/s_box.nrrd --rho 0 -o s.vdb --mask m.nrrd", "mask", "box"),
 }
-# By kind, the most informative job first.
+# Lists of jobs for the steps in PLAN, the most informative job first.
 CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins", "torus noisy", "hole", "spikes", "plate"]
 SCANS = ["front", "layers", "front sensor", "half open", "hole", "half flat"]
 GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "half open", "twins"]
@@ -336,7 +339,7 @@ MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
 REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
 DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
-PLAN = {  # step: the jobs that exercise it
+PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "orientation", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,

@@ -1,5 +1,5 @@
-// Every stage per active voxel, on 1 and 2 threads: one time step of the solver, then the others. COVOL_SIMD chooses
-// the instruction set. Names are stage/threads.
+// Times per active voxel on 1 and 2 threads: of one time step of the solver, and of every other stage of a run. The
+// environment variable COVOL_SIMD chooses the instruction set. Names of benchmarks are stage/threads.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <tbb/parallel_for.h>
@@ -34,10 +34,10 @@ RunContext on(const benchmark::State& state) {
 
 // ---- one time step ---------------------------------------------------------------------------------------------
 
-constexpr float kRadius = 200, kHalfWidth = 7;  // voxels: 7 million active ones
+constexpr float kRadius = 200, kHalfWidth = 7;  // voxels; 7 million voxels are active
 constexpr int kFewSteps = 1, kManySteps = 6, kRounds = 3;
 
-/// `value` of the position on every leaf of `like`.
+/// A grid with the active voxels of `like`, whose values are value(index, value of `like`).
 template <typename Value>
 FloatGridPtr field_on(const FloatGrid& like, Value value) {
     FloatGridPtr grid = like.deepCopy();
@@ -68,9 +68,10 @@ struct Scene {
     }
 };
 
-/// All leaves stay active, since the tolerance is 0. The difference of two runs with different numbers of steps
-/// excludes setup and output; of each the fastest of several repetitions counts, because a slow short run would make
-/// steps appear cheap. @param solved_to  residual, relative to that of the u before
+/// Measures a time step as the difference of two runs with different numbers of steps, which excludes setup and output.
+/// Of each run, the fastest of several repetitions counts, because a slow short run would make steps appear fast. The
+/// tolerance is 0, so that no leaf is skipped as steady.
+/// @param solved_to  residual at which the linear solver ends, relative to that of the previous u
 void time_step(benchmark::State& state, double solved_to) {
     const Scene& scene = Scene::get();
     EvolveOptions options;
@@ -109,12 +110,13 @@ void time_step(benchmark::State& state, double solved_to) {
     constexpr int kSteps = kManySteps - kFewSteps;
     const double voxels = double(many.active_voxels), leaf_voxels = 512.0 * double(many.leaf_count);
     const double visits = double(many.leaf_visits - few.leaf_visits) / double(many.leaf_count) / kSteps;
-    // Each value once: assembly reads u, u before, phi and edge and writes the first estimate and six rows; a visit
-    // reads u, u before and the rows and writes u; measuring the motion reads u and u before.
+    // Bytes per voxel if each value is moved once, with 4 bytes per float and 12 for the six rows: assembly reads u,
+    // the previous u, phi and edge, and writes the first estimate and the rows; a visit of the solver reads u, the
+    // previous u and the rows, and writes u; the measurement of the motion reads u and the previous u.
     const double bytes = (4 * 4 + 4 + 12) + visits * (4 + 4 + 12 + 4) + 4 * 2;
     count_voxels(state, voxels * kSteps, bytes * leaf_voxels / voxels);
     state.counters["cpu_per_voxel"] =
-        cpu / voxels / kSteps;  // the benchmark library's own counter would include both runs completely
+        cpu / voxels / kSteps;  // the CPU time of the benchmark library would include both runs completely
     state.counters["visits"] = visits;
     state.counters["leaf_fill"] = voxels / leaf_voxels;
     state.counters["ns_assembly"] = 1e9 * (many.seconds_assembly - few.seconds_assembly) / voxels / kSteps;

@@ -12,7 +12,7 @@
 namespace covol::bench {
 namespace {
 
-constexpr std::size_t kFloats = std::size_t(48) << 20;  // 192 MiB an array
+constexpr std::size_t kFloats = std::size_t(48) << 20;  // 192 MiB for each of three arrays
 constexpr std::size_t kChunk = std::size_t(1) << 18;
 
 }  // namespace

@@ -11,8 +11,8 @@
 #include "stopwatch.h"
 #include "support/shapes.h"
 
-// Common to the programs of tests/bench: "--key value" arguments, and one way from level sets to meshes for all
-// solvers.
+// Functions that the programs of tests/bench have in common: arguments of the form "--key value", and the extraction of
+// meshes from level sets, which is the same for all solvers.
 namespace covol::bench {
 
 class Arguments {
@@ -25,7 +25,7 @@ public:
         }
         if (argc % 2 == 0) throw std::invalid_argument(std::string("expected a value after ") + argv[argc - 1]);
     }
-    /// @throws std::invalid_argument if it is not given.
+    /// @throws std::invalid_argument  the argument --key is not given
     [[nodiscard]] const std::string& text(const std::string& key) const {
         const auto at = values_.find(key);
         if (at == values_.end()) throw std::invalid_argument("expected --" + key);
@@ -43,7 +43,7 @@ private:
     std::map<std::string, std::string> values_;
 };
 
-/// The body of main(): exceptions of `run` are printed to stderr, after the program's name.
+/// The body of main(): an exception of `run` is printed to stderr after the program's name, and the exit code is 1.
 inline int run_program(const char* name, int argc, char** argv, int (*run)(const Arguments&)) try {
     return run(Arguments(argc, argv));
 } catch (const std::exception& e) {
@@ -51,8 +51,9 @@ inline int run_program(const char* name, int argc, char** argv, int (*run)(const
     return 1;
 }
 
-/// Writes the zero level set of values on the whole domain as triangles, in covol's way for every solver, so that
-/// quality is measured alike. @param half_width  beyond this |u| is meaningless, world units
+/// Writes the zero level set of u, which has a value at each voxel of the domain, as triangles. covol's extraction is
+/// used for the results of all solvers, so that only the level sets are compared.
+/// @param half_width  voxels with |u| above this value are ignored; world units
 inline void write_zero_level(const std::string& path, const Domain& domain, const test::DenseField& u,
                              double half_width) {
     std::vector<char> active(u.size(), 0);

@@ -78,11 +78,13 @@ class Alignment(unittest.TestCase):
     def setUpClass(cls):
         cls.out = pathlib.Path(tempfile.mkdtemp(prefix="covol-alignment-"))
         cls.addClassCleanup(shutil.rmtree, cls.out)
-        cls.axes = rotation() @ np.diag(SPACING)  # columns: steps along i, j, k
+        # Column a: the step in the world from a voxel to the next along axis a.
+        cls.axes = rotation() @ np.diag(SPACING)
         cls.origin = np.array(CENTER) - cls.axes @ ((np.array(SIZE) - 1) / 2)
         i, j, k = np.meshgrid(*map(np.arange, SIZE), indexing="ij")
         cls.lattice = np.stack([i, j, k], axis=-1) @ cls.axes.T + cls.origin
-        cls.depth = RADIUS - np.linalg.norm(cls.lattice - CENTER, axis=-1)  # > 0 inside
+        # Depth of each voxel below the surface of the sphere, > 0 inside.
+        cls.depth = RADIUS - np.linalg.norm(cls.lattice - CENTER, axis=-1)
         image = (40 + 160 * np.clip(cls.depth / H + 0.5, 0, 1)).astype("u1")
         steps = " ".join("(" + ",".join(repr(float(c)) for c in cls.axes[:, a]) + ")" for a in range(3))
         header = "\n".join(["NRRD0004", "type: uint8", "dimension: 3", "space: left-posterior-superior",

@@ -43,12 +43,13 @@ def volume_box(obj, threshold=0.01):
 def error(call, *words, **keywords):
     try:
         call(*words, **keywords)
-    except RuntimeError as found:  # the form in which scripts get an operator's error
+    except RuntimeError as found:  # Blender reports the error of an operator to scripts as a RuntimeError
         return str(found)
     return ""
 
 
-# Marks are children of an empty, which is not at the image's position. A first run creates the image's space.
+# The marks are children of an empty object with a rotation and a translation of its own, so that the add-on must use
+# their world positions. The first run creates an object, settings.space, that represents the image's coordinate system.
 holder = bpy.data.objects.new("holder", None)
 bpy.context.scene.collection.objects.link(holder)
 holder.matrix_world = Matrix.Translation((7, 8, 9)) @ Matrix.Rotation(0.3, 4, "X")
@@ -76,7 +77,9 @@ checks["figures"] = surface["covol_genus"] == 0 and surface["covol_volume"] > 0 
 first = {path.name for path in folder.iterdir()}
 checks["files"] = sum(name.endswith((".vdb", ".ply", ".json")) for name in first) == 3
 
-# The user moves the space and gives the surface a material; marks of a body of half the size, the vertices of a mesh, update the surface in place.
+# The user moves the space and gives the surface a material. The next run uses other marks, the vertices of a mesh on a
+# body of half the size; it must update the existing surface object and keep its material and the new position of the
+# space.
 surface.data.materials.append(bpy.data.materials.new("glass"))
 space.matrix_world = Matrix.Translation((100, 0, 0)) @ Matrix.Rotation(0.5, 4, "Z") @ Matrix.Scale(2, 4)
 cloud = bpy.data.meshes.new("cloud")
@@ -99,7 +102,8 @@ second = {path.name for path in folder.iterdir()}
 checks["files of the last result are gone"] = len([n for n in second if n.endswith(".vdb")]) == 1 and not first & second & {pathlib.Path(
     bpy.path.abspath(volume.data.filepath)).name}
 
-# A time-lapse: three frames from frame 5 on, each shifted by one unit of the image along x.
+# A time-lapse of three images, shown from Blender's frame 5 on. The body moves by one unit of the image along x from
+# each image to the next.
 cloud.clear_geometry()
 cloud.from_pydata(places.tolist(), [], [])
 settings.image, settings.is_lapse = str(movie), True
@@ -144,7 +148,7 @@ settings.image, settings.is_lapse = "", True
 checks["a time-lapse of no image"] = "choose one" in error(bpy.ops.covol.segment)
 settings.is_lapse = False
 
-# Errors are reported and change nothing.
+# Wrong settings: each is reported as the operator's error, and the existing objects and files remain.
 settings.options = "--no-such-option"
 checks["an option that is none"] = "--no-such-option" in error(bpy.ops.covol.segment)
 settings.options = "--model 'paper"

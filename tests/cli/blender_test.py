@@ -73,7 +73,7 @@ class Addon(Folder):
         root = Path(__file__).resolve().parents[2]
         subprocess.run([sys.executable, root / "tools/plugins/pack.py", "blender", "--output", self.out], check=True, capture_output=True)
         [archive] = self.out.glob("covol_blender-*.zip")
-        # The ball moves by one unit along x in each frame.
+        # A time-lapse in which the ball moves by one unit of length along x from each frame to the next.
         write_um_tiff(self.out / "movie.tif", np.stack([np.uint8(20 + 200 * ball(np.array(CENTRE) + (n, 0, 0))) for n in range(3)]))
         folder = self.out / "addon"
         folder.mkdir()

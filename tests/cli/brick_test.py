@@ -46,7 +46,8 @@ class Bricks(Case):
         self.assertGreaterEqual(planned["bricks"], 4)
         self.run_covol("brick", "run", "plan")
         self.run_covol("brick", "join", "plan", "-o", "joined.vdb", "--mesh", "joined.ply", "--json", "joined.json")
-        self.run_covol(*self.job, "--coarse-levels", "1", "-o", "whole.vdb")  # from the tagged start: up to 0.07 voxels away
+        # Coarse first, as bricks; else up to 0.07 voxels away.
+        self.run_covol(*self.job, "--coarse-levels", "1", "-o", "whole.vdb")
         report = json.loads((self.out / "joined.json").read_text())
         self.assertTrue(report["surface"]["closed"])
         self.assertEqual(report["surface"]["genus"], 1)
@@ -91,7 +92,8 @@ class Bricks(Case):
         for brick in range(planned["bricks"]):
             self.run_covol("brick", "run", "plan", str(brick))
         before = {path: path.stat().st_mtime_ns for path in (self.out / "plan/sweep-01").iterdir()}
-        self.run_covol("brick", "run", "plan", "0", "1")  # a brick that is done is not solved again
+        # These bricks are done, and must not be solved and written again.
+        self.run_covol("brick", "run", "plan", "0", "1")
         self.assertEqual(before, {path: path.stat().st_mtime_ns for path in before})
         self.run_covol("brick", "join", "plan", "-o", "s.vdb")
 

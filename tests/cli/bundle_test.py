@@ -35,7 +35,9 @@ class Bundle(unittest.TestCase):
         run("tar", "xf", packed, "-C", cls.work)
         cls.root = cls.work / packed.name.removesuffix(".tar.xz")
         cls.elf = [path for path in cls.root.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
-        # A library of another version in LD_LIBRARY_PATH, as ROS, conda or a module of a cluster may set it.
+        # ROS, conda and modules of clusters set LD_LIBRARY_PATH to folders with other versions of the same libraries.
+        # Here it
+# contains invalid files with the names of the bundle's libraries, so that a program that loads one of them fails.
         poison = cls.work / "poison"
         poison.mkdir()
         for path in (cls.root / "lib").glob("*.so*"):
@@ -54,7 +56,8 @@ class Bundle(unittest.TestCase):
     def test_a_job_runs(self):
         def covol(*words):
             return run(self.root / "bin/covol", *words, env=self.environment, cwd=self.work)
-        covol("phantom", "sphere", "--size", "32", "-o", "p.nii.gz", "--points", "p.csv")  # which ITK reads, by a module of its own
+        # NIfTI: read by the separately loaded ITK module.
+        covol("phantom", "sphere", "--size", "32", "-o", "p.nii.gz", "--points", "p.csv")
         printed = covol("segment", "p.nii.gz", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--report", "s.html")
         self.assertIn("closed, genus 0", printed)
         self.assertGreater((self.work / "s.html").stat().st_size, 100_000)

@@ -17,7 +17,8 @@ except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
 LPS = np.diag([-1.0, -1.0, 1.0]) if not MISSING else None
-TURNED = ((0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0))  # exact: 7, 24, 25
+# A rotation with exact decimals: 7 / 25 = 0.28, 24 / 25 = 0.96.
+TURNED = ((0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0))
 
 
 def affine(steps, origin):
@@ -37,7 +38,7 @@ def nifti(path, sform=None, qform=None, codes=(0, 0), pixdim=None):
         image.set_sform(sform, code=1)
     plain = path.with_suffix("") if path.suffix == ".gz" else path
     nibabel.save(image, str(plain))
-    raw = bytearray(plain.read_bytes())  # nibabel would write its own codes
+    raw = bytearray(plain.read_bytes())  # codes and pixdim are patched: nibabel would write its own
     raw[252:256] = np.array(codes, "<i2").tobytes()
     if pixdim is not None:
         raw[80:92] = np.array(pixdim, "<f4").tobytes()

@@ -14,7 +14,8 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-L_SHAPE = ((0, 3), (0, 0), (4, 0), (4, 1), (2, 1), (2, 3))  # area 8, of a prism 2 high: area 44, volume 16
+# Area 8, perimeter 14; prism of height 2 over it: area 44, volume 16.
+L_SHAPE = ((0, 3), (0, 0), (4, 0), (4, 1), (2, 1), (2, 3))
 
 
 def prism(outline, height, first=1):
@@ -39,7 +40,7 @@ def sphere(radius, count=24, inward=False, centre=(6, 5.5, 4), gap=0):
             k = (j + 1) % (2 * count)
             a, b, c, d = i * 2 * count + j, (i + 1) * 2 * count + j, (i + 1) * 2 * count + k, i * 2 * count + k
             triangles += ([(a, b, c)] if i < count - 1 else []) + ([(a, c, d)] if i > 0 else [])
-    # A single vertex at each pole.
+    # The first and the last ring of vertices lie at the poles: each is replaced by its first vertex.
     vertices = np.array(vertices)
     ring = 2 * count
     pole = lambda v: 0 if v < ring else (count * ring if v >= count * ring else v)  # noqa: E731

@@ -98,7 +98,7 @@ class Programs(TablesCase):
         self.read("c.txt", "Results of the day\n\nx y z\n" + rows(self.points, " "))
 
     def test_ptx(self):
-        move = "0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n"  # rows: vectors are multiplied from the left
+        move = "0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n"  # PTX: row vectors times this matrix; last row: translation
         header = "{}\n{}\n10 20 30\n0 1 0\n-1 0 0\n0 0 1\n" + move
         scan = "".join(f"{y - 20:.5f} {10 - x:.5f} {z - 30:.5f} 0.5\n" for x, y, z in self.points)
         empty = "0 0 0 0.5\n" * 8

@@ -72,7 +72,7 @@ class Programs(Folder):
         self.expect_finding("m.glb", "slicer", "problem", ".glb")
         self.expect_finding("m.stl", "slicer", "remark", "LPS")
         self.expect_finding("m.ply", "slicer", "problem", "in um", "--unit-scale 0.001")
-        self.silent("m.stl", "slicer", "--unit-scale")  # STL states no unit
+        self.silent("m.stl", "slicer", "--unit-scale")  # no finding: STL has no unit that could be wrong
         self.expect_finding("x.nrrd", "slicer", "remark", "in um")
         self.silent("x.seg.nrrd", "slicer", "Segment0_ID")
         (self.out / "bare.seg.nrrd").write_bytes((self.out / "x.nrrd").read_bytes())
@@ -117,7 +117,8 @@ class Programs(Folder):
         self.expect_finding("open.off", "print", "problem", "open", "--repair")
         self.write_off("crossing.off", np.r_[vertices, vertices + (5, 0, 0)], np.r_[faces, faces + len(vertices)])
         self.expect_finding("crossing.off", "print", "problem", "intersect each other", "--repair")
-        # A shell 0.2 mm thick: the inner sphere's triangles are reversed.
+        # A shell 0.2 mm thick between two spheres; the triangles of the inner sphere are reversed, so that they face
+        # its cavity.
         shell = np.r_[vertices, 0.98 * vertices], np.r_[faces, faces[:, ::-1] + len(vertices)]
         self.write_off("shell.off", *shell)
         self.expect_finding("shell.off", "print", "remark", "mm thin in places", "--isovalue")

@@ -19,9 +19,9 @@ COVOL = os.environ.get("COVOL", "build/bin/covol")
 COMMANDS = ["mark", "segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
             "info", "check", "convert", "render", "report", "phantom", "plan", "brick", "rerun", "demo", "doctor"]
 
-# The image of all tests: a bright ball on a dark background.
+# The image of all tests: a bright ball on a dark background. The unit of length is arbitrary.
 SIZE = 40          # voxels along each axis
-H = 0.5            # spacing
+H = 0.5            # spacing, in units of length
 CENTER = (3.0, -2.0, 1.0)
 RADIUS = 12 * H
 ORIGIN = tuple(c - H * (SIZE - 1) / 2 for c in CENTER)
@@ -84,7 +84,7 @@ class Case(unittest.TestCase):
         cls.inputs = pathlib.Path(tempfile.mkdtemp(prefix="covol-in-"))
         cls.image = cls.inputs / "ball.nrrd"
         cls.points = cls.inputs / "ball.xyz"
-        cls.sparse = cls.inputs / "sparse.xyz"  # enough for a ball, in a fraction of the time
+        cls.sparse = cls.inputs / "sparse.xyz"  # fewer marks: sufficient for a ball, and faster
         write_nrrd(cls.image, (SIZE,) * 3, ball_bytes())
         write_xyz(cls.points, sphere_points(1500))
         write_xyz(cls.sparse, sphere_points(60))
@@ -228,7 +228,7 @@ class BadInput(Case):
         pipe = self.inputs / "pipe.vdb"
         os.mkfifo(pipe)
         self.refuse("segment", self.image, "--points", self.points, "-o", pipe, code=4, expected_text="not a regular file")
-        # Reports can be written to devices and pipes directly.
+        # Reports, unlike .vdb files, can be written to devices and pipes.
         done = self.segment("--quiet", "--json", "/dev/stdout", points=self.sparse)
         self.assertEqual(json.loads(done.stdout)["command"], "segment")
         (self.out / "s.vdb").unlink()
@@ -272,7 +272,7 @@ class BadInput(Case):
         self.refuse("segment", self.image, "-o", "s.vdb", code=3, expected_text="points")
 
     def test_outputs_are_checked_first(self):
-        # The image does not exist either: outputs are checked first.
+        # The image does not exist, but the message must be about the output, because outputs are checked before inputs.
         for flags, code in [(["-o", "s.abc"], 3), (["-o", "no/folder/s.vdb"], 4),
                             (["-o", "s.vdb", "--mask", "m.jpg"], 3), (["-o", "s.vdb", "--mesh", "m.xyz"], 3),
                             (["-o", "s.vdb", "--json", "no/folder/r.json"], 4),
@@ -312,7 +312,7 @@ class Segment(Case):
         self.assertIn("1500 marks", report["automatic"]["guess"])
         self.assertTrue(report["guidance"]["used"], report["guidance"])
         self.assertEqual(report["fit"]["marks_off"]["count"], 0)
-        # The three files contain the same solid.
+        # The level set s.vdb, the mask m.nrrd and the mesh m.ply contain the same solid.
         for other in ("m.nrrd", "m.ply"):
             alike = self.report("compare", "s.vdb", other)["compare"]
             self.assertGreater(alike["dice"], 0.97)
@@ -394,7 +394,7 @@ class Segment(Case):
         self.assertEqual(self.files(), ["s.vdb"])
 
     def test_memory_limit(self):
-        for _ in range(40):  # reported once, by the memory guard or by the reader, whichever comes first
+        for _ in range(40):  # one message, from the memory guard or the reader; chance decides which
             self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "20k", code=3,
                         expected_text="--memory-limit 20k")
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "1M",
@@ -407,7 +407,7 @@ class Segment(Case):
             with self.subTest(more):
                 line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, expected_text="GiB of memory")
                 fits = re.search(r"such as ([0-9.e-]+) ", line).group(1)
-        # The last of them again, with the size that the message proposed.
+        # The last of these jobs succeeds with the voxel size that the error message proposed.
         report = self.report("reconstruct", self.points, "-o", "s.vdb", "--voxel-size", fits, *more[2:])
         self.assertTrue(report["surface"]["closed"])
         self.refuse_distance()
@@ -417,7 +417,7 @@ class Segment(Case):
         self.refuse("distance", self.points, "-o", "d.vdb", "--voxel-size", "0.001", "--max-distance", "2", code=3, expected_text="such as")
 
     def test_one_output_that_fails_takes_the_others_with_it(self):
-        name = "m" * 252 + ".ply"  # one character more than file names may have
+        name = "m" * 252 + ".ply"  # 256 characters; file names have at most 255
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name, code=4, expected_text="too long")
         self.segment("--mesh", name[1:], points=self.sparse)
         self.assertEqual(self.files(), [name[1:], "s.vdb"])
@@ -427,7 +427,7 @@ class Segment(Case):
                                     "r.json", "--max-steps", "100000000", "--tolerance", "0"], cwd=self.out,
                                    stderr=subprocess.PIPE, text=True)
         try:
-            # This line appears once the run has begun; it would continue for hours.
+            # This line is printed when the run has begun. Without the signal, the run would take hours.
             while not process.stderr.readline().startswith("covol: tag_distance"):
                 self.assertIsNone(process.poll(), "ended before the signal")
             process.send_signal(signal.SIGINT)
@@ -487,8 +487,8 @@ class Steps(Case):
     def test_single_steps_are_segment(self):
         whole = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", "s.ply", "--tag-distance", "3vx",
                             "--delta", "1vx", "--rho", "0")
-        # segment() with image and points calls evolve twice, first with the points alone. segment() merges close points first; these points are not
-        # close.
+        # With --rho 0, segment calls evolve once, like these steps; with image and points, it calls evolve twice. It
+        # also merges close points, which changes nothing here because no points are close to each other.
         self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb", "--max-distance", "8vx")
         self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "3vx")
         self.run_covol("edge", self.image, "--band", "b.vdb", "-o", "g.vdb")
@@ -509,7 +509,7 @@ class Steps(Case):
         self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb")
         self.run_covol("band", "d.vdb", "-o", "b.vdb", code=2)
         self.assertEqual(self.files(), ["d.vdb"])
-        self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "9vx", code=3)  # wider than the tube
+        self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "9vx", code=3)  # more than the tube of d.vdb
 
     def test_a_flow_that_vanishes(self):
         self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb", "--max-distance", "8vx")

@@ -95,7 +95,7 @@ class Few(Clouds):
             self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.15)
 
     def test_so_few_that_the_tag_distance_has_to_be_given(self):
-        for seed in (3, 5, 6):  # with other seeds the points enclose a body anyhow
+        for seed in (3, 5, 6):  # with other seeds, the automatic tag distance suffices
             points = random_sphere(24, seed)
             advice = re.search(r"try (--tag-distance) ([0-9.]+)",
                                self.advice(points, "the points enclose nothing", "--model", "paper"))
@@ -117,7 +117,7 @@ def random_knot(count, tube, noise, seed):
         t = 2 * math.pi * draw.random()
         tangent = along(t)
         if 6 * draw.random() > math.hypot(*tangent):
-            continue  # evenly along the knot
+            continue  # rejection sampling: a density proportional to the speed |tangent| <= 6 is uniform along the knot
         unit = [x / math.hypot(*tangent) for x in tangent]
         across = [draw.gauss(0, 1) for _ in range(3)]
         fraction = sum(a * b for a, b in zip(across, unit))
@@ -172,7 +172,7 @@ class Thin(Clouds):
         self.assertIn("handles", " ".join(json.loads(done.stdout).get("warnings", [])))
 
     def test_noise_is_distinguished_from_shape(self):
-        # The mean distance of the surface from the ball is less than half of that of the points.
+        # Mean distance from the ball: less than half of that of the noisy points, which is sigma sqrt(2 / pi).
         points = [tuple(x * (1 + 0.03 * random.Random(n).gauss(0, 1)) for x in p) for n, p in enumerate(random_sphere(1500, 2))]
         self.assertEqual(self.reconstruct(points, "--mesh", "s.ply").returncode, 0)
         write_xyz(self.out / "ball.xyz", random_sphere(5000, 3))
@@ -278,26 +278,26 @@ class Many(Clouds):
         self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
 
     def test_from_the_air(self):
-        # The closing surface is larger than the scan and leaves the domain; it must not turn whole roofs over.
+        # The surface that closes the scan is larger than the scan and leaves the domain; no roof may be inverted by it.
         for seed in 1, 3:
             report = self.report(random_scan_from_the_air(5000, seed))
             self.assertIn("from every point", " ".join(report["warnings"]))
             self.assertTrue(report["surface"]["closed"])
-            self.assertLessEqual(report["surface"]["components"], 1 + 9)  # roofs without walls may be parts of their own
-            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # the scan, the same area below it, and walls
+            self.assertLessEqual(report["surface"]["components"], 1 + 9)  # the ground, and 9 roofs without walls
+            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # scan, surface below it, and walls
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.25 * report["resolved"]["voxel_size"])
             self.assertLess(report["fit"]["marks_off"]["count"], 0.02 * 5000)
 
     def test_folds_are_no_views(self):
-        # Deep folds, open at the bottom: normals vary strongly in them, and from outside only a ball is visible.
+        # A ball with deep folds, without its bottom: normals vary strongly on the walls, which are hidden from outside.
         points = [p for p in random_folds(14000, 16, 0.3, 2) if p[2] > -0.6]
         report = json.loads(self.reconstruct(points).stdout)
         self.assertTrue(report["cloud"]["encloses"])
         self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.8 * report["resolved"]["voxel_size"])
 
     def test_folds_are_no_noise(self):
-        # Folds whose walls are less than three spacings apart are smoothed away, with a warning. There is none for noise of that thickness, or for
-        # folds that are resolved.
+        # Folds with walls less than three spacings apart are smoothed away, with the warning that points lie on sheets.
+        # It is not given for folds that are resolved, nor for noise of a standard deviation above the spacing.
         reported = "lie on sheets"
         folds = self.reconstruct(random_folds(10000, 30, 0.2, 1))
         self.assertIn(reported, folds.stderr)
@@ -315,7 +315,7 @@ class Many(Clouds):
             self.assertNotIn(reported, done.stderr)
 
     def test_points_that_fill_a_solid(self):
-        # Also with 2,000 points: as marks on a surface these would give a folded one.
+        # 2,000 points, too, must be recognised as filling a solid: the surface through so few marks would be folded.
         for count in 10000, 2000:
             draw = random.Random(count)
             filled = [tuple(x * f for x in p) for p in random_sphere(count, 8) for f in [draw.random() ** (1 / 3)]]
@@ -326,7 +326,7 @@ class Many(Clouds):
             self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.06)
 
     def test_folds_are_met(self):
-        # If the cells are too fine, neighbouring walls merge, and a quadric through two of them lies between them.
+        # Too fine cells would merge neighbouring walls of folds: a quadric fitted to two walls lies between them.
         for seed in 1, 2:
             report = self.report(random_folds(8000, 16, 0.3, seed))
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
@@ -366,7 +366,7 @@ class Edges(Clouds):
             if words[:1] == ["f"]:
                 corners = [int(corner.split("/")[0]) - 1 for corner in words[1:]]
                 used |= {tuple(sorted((corners[n], corners[n - 1]))) for n in range(3)}
-        # Distance to those mesh edges of which a sharp crease consists.
+        # Distance of the positions on the true edges of the solid (`edges`) from the nearest edge of the mesh.
         by_cell = {}
         for a, b in used:
             for v in (a, b):
@@ -391,7 +391,7 @@ class Edges(Clouds):
         return [tuple(x + n / count * (y - x) for x, y in zip(a, b)) for n in range(count + 1)]
 
     def test_box(self):
-        # A rotated block with edges of length 12, 10, 8: points are about 0.35 apart.
+        # A rotated block with edges of length 12, 10 and 8. With 8 points per unit area, points are about 0.35 apart.
         draw, turned = random.Random(7), lambda p: (0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2])
         sides, points = (12, 10, 8), []
         for axis in range(3):
@@ -420,7 +420,7 @@ class Edges(Clouds):
         self.check_edges(points, edges, 0.32, 250 * math.pi)
 
     def test_bracket(self):
-        # Two plates that meet at a right angle, with an inner edge.
+        # A bracket: two plates that meet at a right angle, with a concave edge between them.
         draw, points = random.Random(9), []
         outline = [(0, 0), (12, 0), (12, 3), (3, 3), (3, 10), (0, 10)]
         for (x0, z0), (x1, z1) in zip(outline, outline[1:] + outline[:1]):
@@ -461,7 +461,7 @@ class Scenes(Clouds):
         self.assertLess(report["fit"]["marks_off"]["count"], 0.002 * len(points))
 
     def test_front_of_a_house(self):
-        # Windows are set back by 0.3; the winding number alone gives hundreds of pieces.
+        # Windows are set back by 0.3. By the winding number alone, the surface would have hundreds of pieces.
         draw = random.Random(4)
         density, depth, points, area = 120, 0.3, [], 12 * 6.0
 
@@ -481,7 +481,7 @@ class Scenes(Clouds):
         self.check_open(points, area, 1, 1)
 
     def test_ground_roofs_and_crowns(self):
-        # Parts above each other in the air, each open below.
+        # Ground, and above it two houses' roofs and two tree crowns without walls or trunks, each open below.
         draw = random.Random(5)
         points = [(x, y, math.sin(0.2 * x)) for x, y in ((draw.uniform(0, 40), draw.uniform(0, 40)) for _ in range(12000))]
         for x in (6, 24):
@@ -495,7 +495,7 @@ class Scenes(Clouds):
         ground = 40 * sum(math.hypot(1, 0.2 * math.cos(0.2 * (n + 0.5) / 100)) / 100 for n in range(4000))
         area = ground + 4 * 12 * math.hypot(4, 2.5) + 2 * 2 * math.pi * 9
         self.check_open(points, area, 5, 5)
-        # All triangles face the sky, from where they were scanned: no part of the ground is closed by a roof above it.
+        # Triangles face upwards, as scanned from the air: no roof or crown forms a closed body with the ground.
         lines = [line.split() for line in (self.out / "m.obj").read_text().splitlines()]
         places = [tuple(map(float, words[1:4])) for words in lines if words[:1] == ["v"]]
         triangles = [[places[int(corner.split("/")[0]) - 1] for corner in words[1:]] for words in lines if words[:1] == ["f"]]
@@ -607,7 +607,7 @@ class Normals(Clouds):
         self.assertAlmostEqual(shell_fraction(report["surface"]), 1, delta=0.01)
 
     def test_normals_of_narrow_folds(self):
-        # The orientation found from the points alone is wrong here, and differs from a twentieth of these normals.
+        # Of these points, a twentieth get a wrong orientation without normals; the given normals are right.
         points = random_folds(10000, 20, 0.3, 1)
         report, output = self.report("p.xyz", self.rows(points, fold_normals(points, 20, 0.3)))
         self.assertTrue(report["cloud"]["normals"]["used"])
@@ -665,7 +665,7 @@ class Far(Clouds):
         self.assertGreater(alike["dice"], 0.99)
         self.assertLess(alike["hausdorff"], 0.2)
         self.assertEqual(self.run_covol("check", "far.ply")[0]["problems"], 0)
-        # the other commands accept these files
+        # mesh, compare and report accept files with coordinates this large
         for end in ("obj", "glb"):
             self.run_covol("mesh", "far.vdb", "-o", f"again.{end}")
             self.assertGreater(self.run_covol("compare", f"again.{end}", "far.ply")[0]["compare"]["dice"], 0.999)
@@ -693,7 +693,7 @@ class Open(Clouds):
         self.check_layer([(0.02 * n, 0.0, 0.0) for n in range(500)], "lie on a line")
 
     def test_what_holds_no_surface_is_refused_at_once(self):
-        # Tagging and a flow would need half a minute to detect it.
+        # Refused before tagging and the flow, which would need half a minute until the surface vanishes.
         draw = random.Random(2)
         line = [(0.002 * n, 0.001 * n, 0.0) for n in range(6000)]
         plane = [(draw.uniform(0, 10), draw.uniform(0, 10), 3.0) for _ in range(6000)]
@@ -702,7 +702,7 @@ class Open(Clouds):
                 self.assertNotIn("vanished after", self.advice(points, expected_text, *more))  # no step was made
 
     def test_points_on_a_curve(self):
-        # Closer points would give finer voxels, although they contain no more information about the surface.
+        # On a curve, closer points contain no more information about a surface: voxels must not become as fine as they.
         turns = [2 * math.pi * n / 1500 for n in range(1500)]
         report = json.loads(self.reconstruct([(3 * math.sin(t) + 6 * math.sin(2 * t), 3 * math.cos(t) - 6 * math.cos(2 * t),
                                                -3 * math.sin(3 * t)) for t in turns], "--mesh", "s.ply").stdout)
@@ -711,7 +711,7 @@ class Open(Clouds):
     def test_half_a_sphere(self):
         half = [p for p in random_sphere(400, 1) if p[2] > 0]
         self.check_layer(half, "enclose nothing", "--model", "paper")
-        done = self.reconstruct(half)  # the surface of minimum bending energy closes it, with a warning that it has no support there
+        done = self.reconstruct(half)  # closed by the guess, with a warning for the half without points
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("farther than", done.stderr)
         self.assertAlmostEqual(json.loads(done.stdout)["surface"]["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.2)
@@ -721,7 +721,7 @@ class Open(Clouds):
         self.advice([tuple(draw.gauss(0, 1) for _ in range(3)) for _ in range(500)], "enclose nothing", "--model", "paper")
 
     def test_structure_cut_off_by_both_ends_of_the_image(self):
-        # A bright tube along z with rings of marks, and open ends.
+        # A bright tube along z that the first and the last slice cut off, with marks on rings around it.
         n, radius, slices = 40, 8, 20
         tube = bytes(200 if math.hypot(i - 19.5, j - 19.5) < radius else 20
                      for _ in range(slices) for j in range(n) for i in range(n))
@@ -741,7 +741,7 @@ class Open(Clouds):
                 self.assertAlmostEqual(json.loads(done.stdout)["surface"]["volume"] / truth, 1, delta=within)
 
 
-del Clouds  # a base class without tests
+del Clouds  # a base class: unittest would run it, too
 
 if __name__ == "__main__":
     unittest.main()

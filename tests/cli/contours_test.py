@@ -19,11 +19,11 @@ from cli_test import COVOL, Case
 from points_test import roi
 from structures_test import rows_of
 
-# Axes, voxel sizes and origin all differ.
+# Sizes, spacings and coordinates of the origin differ between the axes, so that exchanged axes change the results.
 SIZES = (80, 70, 24)
 SPACING = (0.5, 0.4, 1.5)
 ORIGIN = (12.0, 31.0, 207.0)
-CENTRE = (39.0, 36.0, 11.0)  # voxels
+CENTRE = (39.0, 36.0, 11.0)  # centre of the ellipsoid, in voxels
 DATA = os.environ.get("COVOL_DATA")
 
 
@@ -80,7 +80,7 @@ class ContoursCase(Case):
         r = np.sqrt((x / 11) ** 2 + (y / 11) ** 2 + (z / 12) ** 2)
         cls.solid = cls.inputs / "solid.nrrd"
         write_nrrd(cls.solid, 30 + 180 * np.clip((1 - r) * 11 / 0.5 + 0.5, 0, 1))
-        cls.shell = cls.inputs / "shell.nrrd"  # the same border as a bright membrane
+        cls.shell = cls.inputs / "shell.nrrd"  # an image in which the border of the same ellipsoid is a bright membrane
         write_nrrd(cls.shell, 30 + 180 * np.exp(-0.5 * ((r - 1) * 11 / 0.6) ** 2))
 
     def table(self, name, outlines):
@@ -110,13 +110,14 @@ class Bodies(ContoursCase):
         self.assertLess(report["fit"]["points_to_surface"]["p95"], 0.4)
 
     def test_a_small_body_in_the_corner_is_not_inside_out(self):
-        # Two outlines; the second one is far larger than the first and close to the image's last slice.
+        # Two outlines on slices k - 2 and k. The one on slice k is far larger, and k is close to the last slice of the
+        # image.
         k, radius = SIZES[2] - 3, 4.0
         corner = (SIZES[0] - 1 - 0.7 * radius / SPACING[0], SIZES[1] - 1 - 0.7 * radius / SPACING[1])
         lines = [outline(r, at, centre=corner) for r, at in ((0.9, k - 2), (radius, k))]
         lines = [[(min(x, SIZES[0] - 0.5), min(y, SIZES[1] - 0.5), at) for x, y, at in line] for line in lines]
         report = self.report("segment", self.solid, "--contours", self.table("corner.csv", lines), "-o", "s.vdb", "--rho", 0)
-        # Beyond a disc of that radius, at most 45 degrees over two and a half slices.
+        # Upper bound: the body spans at most five slices and widens by at most 45 degrees over two and a half slices.
         self.assertLess(report["surface"]["volume"], math.pi * (radius + 2.5 * SPACING[2]) ** 2 * 5 * SPACING[2])
         self.assertEqual(report["surface"]["components"], 1)
 
@@ -124,11 +125,13 @@ class Bodies(ContoursCase):
         for step in (2, 4, 7):
             with self.subTest(step=step):
                 volume = self.volume(self.solid, "--contours", self.table(f"every_{step}.csv", ellipsoid(step)), "--rho", 0)
-                # With only three slices the radius in between is a cubic with zero slope at the equator: 8.9 instead of 9.9 halfway.
+                # step 7 leaves three slices. Between them the radius is a cubic with slope 0 at the equator, and thus
+                # 8.9 instead of 9.9 halfway.
                 self.assertLess(abs(volume / ELLIPSOID - 1), 0.03 if step < 7 else 0.08)
 
     def test_the_image_helps_between_slices(self):
-        # The marks contain no information about the waist between two slices; the image shows it, 2.5 voxels inside the guess.
+        # The body has a waist between slices 7 and 15, where there are no marks: the initial surface is 2.5 voxels too
+        # wide, and only the image shows the waist.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         waist = 9 - 0.5 * np.cos(np.pi * z / 6)
         image = self.inputs / "hourglass.nrrd"
@@ -159,12 +162,13 @@ class Bodies(ContoursCase):
         path = self.table("few.csv", few)
         lines = self.volume(self.solid, "--contours", path, "--rho", 0, "--contour-curve", "lines")
         spline = self.volume(self.solid, "--contours", path, "--rho", 0)
-        octagon = 8 * math.sin(math.pi / 4) / (2 * math.pi)  # its fraction of the circle's area
+        # Area of a regular octagon / area of its circumscribed circle.
+        octagon = 8 * math.sin(math.pi / 4) / (2 * math.pi)
         self.assertAlmostEqual(lines / ELLIPSOID, octagon, delta=0.02)
         self.assertAlmostEqual(spline / ELLIPSOID, 1, delta=0.03)
 
     def test_other_planes(self):
-        # Outlines on planes across x: the same body, marked from the side.
+        # The same body, outlined in planes across x instead of z.
         marks = []
         for i in range(20, 59, 2):
             w = (i - CENTRE[0]) * SPACING[0] / 11
@@ -174,7 +178,7 @@ class Bodies(ContoursCase):
             marks.append([(i, CENTRE[1] + 11 * s * math.cos(t) / SPACING[1], CENTRE[2] + 12 * s * math.sin(t) / SPACING[2])
                           for t in 2 * np.pi * np.arange(40) / 40])
         path = self.inputs / "side.csv"
-        with open(path, "w") as file:  # napari: z, y, x
+        with open(path, "w") as file:  # columns axis-0 to axis-2 of napari are z, y, x
             file.write("index,shape-type,vertex-index,axis-0,axis-1,axis-2\n")
             for n, line in enumerate(marks):
                 for v, (x, y, z) in enumerate(line):
@@ -189,10 +193,12 @@ class Bodies(ContoursCase):
         self.refuse("segment", self.solid, "--contours", one, "-o", "s.vdb", "--rho", 0, code=3, expected_text="mark a second slice")
         height = 9.0
         volume = self.volume(self.solid, "--contours", one, "--rho", 0, "--contour-thickness", height)
-        self.assertLess(abs(volume / (math.pi * 121 * height / 2) - 1), 0.05)  # two paraboloids: half of the cylinder's volume
+        # Two paraboloids, each half of a cylinder.
+        self.assertLess(abs(volume / (math.pi * 121 * height / 2) - 1), 0.05)
 
     def test_points_move_the_body(self):
-        # The domes reach three voxels too far; the marks at the poles correct them.
+        # The outlines cover slices 6 to 16. The domes beyond them end three voxels too far; the marks at the poles
+        # correct this.
         path = self.table("middle.csv", [outline(radius_at(k), k) for k in (6, 11, 16)])
         poles = self.inputs / "poles.csv"
         poles.write_text("x,y,z\n%f,%f,%f\n%f,%f,%f\n" % (*CENTRE[:2], CENTRE[2] + 8, *CENTRE[:2], CENTRE[2] - 8))
@@ -222,12 +228,13 @@ class Bodies(ContoursCase):
 
     def test_an_exterior_seed_in_the_body_tags_instead(self):
         seed = ",".join(map(str, CENTRE_WORLD))
-        inner = [outline(5, k, 36) for k in range(8, 15)]  # bounded below and above by nothing but the seed
+        inner = [outline(5, k, 36) for k in range(8, 15)]  # walls of a cavity, without marks at its two ends along z
         report = self.report("segment", self.solid, "--contours", self.table("whole.csv", ellipsoid()), "-o", "s.vdb", "--rho", 0)
         whole = report["surface"]["volume"]
         cavity = self.report("segment", self.solid, "--contours", self.table("cavity.csv", ellipsoid() + inner), "-o", "c.vdb",
                              "--rho", 0, "--exterior-seed", seed)
-        self.assertTrue(cavity["automatic"]["start"].startswith("contours"))  # the seed is already outside
+        # No tagging: the seed is in the cavity, outside the contours' body.
+        self.assertTrue(cavity["automatic"]["start"].startswith("contours"))
         self.assertGreater(whole - cavity["surface"]["volume"], math.pi * 25 * 6 * SPACING[2])
         shell = self.report("segment", self.solid, "--contours", self.table("whole.csv", ellipsoid()), "-o", "t.vdb", "--rho", 0,
                             "--exterior-seed", seed, "--max-steps", 1)
@@ -246,7 +253,8 @@ class Bodies(ContoursCase):
         head, body = raw.split(b"\n\n", 1)
         dark.write_bytes(head + b"\n\n" + (240 - np.frombuffer(body, np.uint8)).tobytes())
         self.assertEqual(self.report("segment", dark, "--contours", path, "-o", "s.vdb")["resolved"]["edge_feature"], "dark-line")
-        # Marks 0.7 beside the membrane on slices 4 apart: the surface is to find the middle of the membrane between them.
+        # Marks 0.7 units of length inside the middle of the membrane, on every fourth slice. Between these slices, the
+        # surface is expected to move outward to the middle of the membrane.
         beside = self.table("beside.csv", [outline(radius_at(k) - 0.7, k) for k in range(5, 18, 4)])
         volumes = {feature: self.volume(self.shell, "--contours", beside, "--edge-feature", feature)
                    for feature in ("bright-line", "slope")}
@@ -255,7 +263,8 @@ class Bodies(ContoursCase):
         self.assertGreater(volumes["bright-line"], volumes["slope"])
 
     def test_evidence_on_membranes(self):
-        # The membrane of the lower half has faded: nothing supports the surface there, far from the only marks.
+        # The image shows the membrane only above the centre. Below, nothing supports the surface between the outlines: the
+        # suggestion is expected there.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         r = np.sqrt((x / 11) ** 2 + (y / 11) ** 2 + (z / 12) ** 2)
         image = self.inputs / "faded.nrrd"
@@ -287,7 +296,8 @@ class Formats(ContoursCase):
         self.run_covol("segment", self.solid, "--contours", path, "-o", "b.vdb", "--rho", 0, *more)
         alike = self.report("compare", "a.vdb", "b.vdb")["compare"]
         self.assertGreater(alike["dice"], 0.9999)
-        # A tenth of a voxel: points that differ in the sixth digit may fall into different cells when close points are merged.
+        # Coordinates in the two files may differ in the sixth digit. When close points are merged, such points may fall
+        # into different cells, so that the surfaces differ by up to a tenth of a voxel.
         self.assertLess(alike["hausdorff"], 0.1 * min(SPACING))
 
     def test_fiji_roi_manager(self):
@@ -355,7 +365,8 @@ class Several(ContoursCase):
         self.assertEqual(core["input"]["contours"]["slices"], 9)
         self.assertEqual(core["input"]["points"]["count"], 9 * 36)
         self.assertEqual(core["input"]["points"]["densified"], core["input"]["contours"]["along"] + core["input"]["contours"]["between"])
-        # The caps of the core are two paraboloids one slice high, whose rims are rounded by curvature.
+        # A cylinder of 9 slices. The caps of the core are paraboloids one slice high, whose rims are rounded by
+        # curvature.
         self.assertAlmostEqual(core["surface"]["volume"] / (math.pi * 25 * 9 * SPACING[2]), 1, delta=0.08)
         both = layer["surface"]["volume"] + core["surface"]["volume"]
         self.assertAlmostEqual(both / ELLIPSOID, 1, delta=0.03)
@@ -371,13 +382,13 @@ class Several(ContoursCase):
         dirty.write_text(points.read_text() + "".join("%f %f %f\n" % (ORIGIN[0] + n, ORIGIN[1] + 2 * n, ORIGIN[2]) for n in range(4)))
         report = self.report("segment", self.solid, "--points", f"core={dirty}", "--contours", f"whole={self.table('all.csv', ellipsoid())}",
                              "-o", "s.vdb", "--rho", 0, "--remove-outliers")
-        core, whole = report["structures"]  # structures of --points come first
+        core, whole = report["structures"]  # structures of --points precede those of --contours
         self.assertEqual((core["name"], whole["name"]), ("core", "whole"))
         self.assertEqual(core["input"]["points"]["cleanup"]["outliers"], 4)
         self.assertNotIn("contours", core["input"])
         self.assertLess(abs(core["surface"]["volume"] / (4 / 3 * math.pi * 125) - 1), 0.05)
         self.assertEqual(report["overlaps"][0]["inner"], "core")
-        # One structure may have points and contours.
+        # Points and contours with the same name belong to one structure.
         both = self.report("segment", self.solid, "--points", f"core={points}", "--contours", f"core={self.core}", "-o", "t.vdb",
                            "--rho", 0)["structures"]
         self.assertEqual([s["name"] for s in both], ["core"])
@@ -395,7 +406,7 @@ class Several(ContoursCase):
                         ("render", "{}", "-o", "p.png"), ("compare", "{}", "s.vdb:core")):
             with self.subTest(command[0]):
                 done = self.run_covol(*[str(a).format("s.vdb") for a in command])
-                if command[0] != "render":  # which draws all of them
+                if command[0] != "render":  # render draws all level sets of a file
                     self.assertIn("'layer' is used, one of the level sets layer, core", done.stderr)
                 done = self.run_covol(*[str(a).format("s.vdb:core") for a in command])
                 self.assertNotIn("warning", done.stderr)
@@ -404,7 +415,7 @@ class Several(ContoursCase):
         self.assertAlmostEqual(volume / (math.pi * 25 * 9 * SPACING[2]), 1, delta=0.08)
         self.assertGreater(self.report("compare", "s.vdb:core", "m.nrrd", "--label-b", 2)["compare"]["dice"], 0.98)
         self.assertLess(self.report("compare", "s.vdb:layer", "s.vdb:core")["compare"]["dice"], 0.01)
-        # Without the separation from the layer, the core fits its own marks again.
+        # s.vdb:core was separated from the layer. As the start of a run for the core alone, it moves back to the marks.
         alone = self.report("segment", self.solid, "--contours", self.core, "-o", "alone.vdb", "--rho", 0)["surface"]["volume"]
         again = self.report("segment", self.solid, "--contours", self.core, "-o", "again.vdb", "--rho", 0, "--init", "vdb:s.vdb:core")
         self.assertIn("near its marks", again["automatic"]["start"])

@@ -15,12 +15,12 @@ class Corpus(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="covol-corpus-") as folder:
             with tarfile.open(FUZZ / "corpus.tar.xz") as archive:
                 archive.extractall(folder)
-            for path in (FUZZ / "regressions/pixels").iterdir():  # these are damaged after their headers
+            for path in (FUZZ / "regressions/pixels").iterdir():  # valid headers, damaged voxels
                 shutil.copy(path, pathlib.Path(folder) / path.suffix[1:])
             formats = sorted(pathlib.Path(folder).iterdir())
             self.assertGreaterEqual(len(formats), 20)
             done = subprocess.run([os.environ["COVOL_READ_CORPUS"], folder], capture_output=True, text=True, errors="replace", timeout=600)
-            lines = [line for line in done.stdout.splitlines() if folder in line]  # OpenVDB's own warnings appear among the lines
+            lines = [line for line in done.stdout.splitlines() if folder in line]  # without warnings of OpenVDB
             self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr[-2000:])
             self.assertEqual(len(lines), sum(len(list(one.iterdir())) for one in formats))
 

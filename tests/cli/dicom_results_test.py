@@ -20,8 +20,9 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-SIZE, SPACING = (29, 25, 14), (0.5, 0.8, 1.5)  # 725 pixels in a slice: no whole number of bytes
-LEFT, RIGHT, HALF = (8, 12, 6.2), (20, 13, 7), (4.6, 6.3, 4.1)  # voxels
+# 725 pixels per slice: in 1-bit segmentations, slices begin within a byte.
+SIZE, SPACING = (29, 25, 14), (0.5, 0.8, 1.5)
+LEFT, RIGHT, HALF = (8, 12, 6.2), (20, 13, 7), (4.6, 6.3, 4.1)  # centres and half axes of two ellipsoids, in voxels
 SEG, RTSTRUCT = "1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.481.3"
 ENHANCED_CT = "1.2.840.10008.5.1.4.1.1.2.1"
 EPOCH = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
@@ -326,7 +327,8 @@ class StructureSets(DicomCase):
                 source = self.slices[contour.ContourImageSequence[0].ReferencedSOPInstanceUID]
                 np.testing.assert_allclose(np.array(source.ImagePositionPatient, float), self.affine[:3, 3] + k * self.affine[:3, 2],
                                            atol=1e-5)
-                # Distances from the ellipsoid along its radius, in pixels: far below one.
+                # Mean distance of the contour from the ellipsoid, in pixels: the relative radius times 5, about a half
+                # axis.
                 radius = np.sqrt((((voxels - at) / HALF) ** 2).sum(1))
                 self.assertLess(np.mean(np.abs(radius - 1)) * 5, 0.4)
                 volume += area(points, axes) * 1.5
@@ -351,14 +353,16 @@ class StructureSets(DicomCase):
         ds = self.shell_contours()
         self.check_structures(ds)
         middle = [loops(c) for c in self.contours(ds) if abs(float(c.ContourData[2]) - 20) < 1e-6]
-        self.assertEqual(len(middle), 2)  # the shell with its cavity, and the ball within
+        # Contours on the middle slice: of the shell with its cavity, and of the ball in the cavity.
+        self.assertEqual(len(middle), 2)
         areas = sorted(area(points, np.eye(3)[:, :2]) for points in middle)
         slice_ = self.shell()[20] > 100
         ball = np.hypot(*(np.argwhere(slice_) - 20).T) < 7
         np.testing.assert_allclose(areas, [ball.sum(), (~ball).sum()], rtol=0.05)
         ring = max(middle, key=len)
         steps = {tuple(np.round((a + b) / 2, 9)) for a, b in zip(ring, np.roll(ring, -1, 0))}
-        self.assertEqual(len(ring) - len(steps), 1)  # one edge is passed twice
+        # The outline passes one edge twice: the cut that joins the outer border and the hole.
+        self.assertEqual(len(ring) - len(steps), 1)
 
     def test_what_is_written_is_read(self):
         self.shell_contours()

@@ -52,7 +52,7 @@ def check_example(test, done, out, folder):
         data = picture.read_bytes()
         test.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
         width, height = struct.unpack(">II", data[16:24])
-        # A picture of a single colour compresses to almost nothing.
+        # A PNG of a single colour has far less than a byte for 100 pixels.
         test.assertGreater(len(data), width * height / 100, f"{picture} is empty")
 
 
@@ -97,7 +97,8 @@ class Pages(unittest.TestCase):
             for block in blocks(page):
                 for line in re.sub(r"\\\n", " ", block).splitlines():
                     if command := re.match(r"\s*covol (?:brick )?(?:plan )?([a-z]\w*)", line):
-                        # The options of brick run and join include those of the planned command.
+                        # covol brick run and covol brick join accept the options of segment, the command that was
+                        # planned, too.
                         known = options["segment" if command[1] in ("run", "join") else command[1]]
                         for flag in re.findall(r"(?<=\s)--?[a-z][\w-]*", line.split("#")[0]):
                             self.assertIn(flag, known, f"{page.relative_to(ROOT)}: {line}")

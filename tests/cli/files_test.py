@@ -108,7 +108,7 @@ class TwoFolders(Files):
             if code == 0:
                 break
             self.assertEqual(code, -signal.SIGKILL)
-            # The next run uses only one of the folders; it completes the whole set, or discards all of it.
+            # A run that writes to one of the folders completes or discards the interrupted set of outputs in all of them.
             self.run_covol(*PHANTOM, "-o", "abc"[call % 3] + "/next.nrrd")
             self.assertIn(self.state(), sets, f"killed before call {call}")
             new += sets.index(self.state()) != last
@@ -137,14 +137,14 @@ class Waits(Files):
         folder = os.open(self.out, os.O_RDONLY)
         self.addCleanup(os.close, folder)
         fcntl.flock(folder, fcntl.LOCK_EX)
-        # The message names the process that holds the lock, before the work begins, and the first signal ends the wait.
+        # The run waits for the lock before it begins, names the process that holds it, and ends at the first signal.
         run = self.start(*PHANTOM, "-o", "x.nrrd")
         line = run.stderr.readline()
         self.assertIn(f"waiting for process {os.getpid()} (", line)
         self.interrupted(run)
         self.assertEqual(run.returncode, 130)
         self.assertEqual(self.text("x.nrrd"), "old")
-        # Once the lock is released the run continues.
+        # When the lock is released, the waiting run continues and replaces the file.
         run = self.start(*PHANTOM, "-o", "x.nrrd")
         self.assertIn("waiting for process", run.stderr.readline())
         fcntl.flock(folder, fcntl.LOCK_UN)
@@ -254,7 +254,7 @@ class Waits(Files):
         self.interrupted(run)
         self.assertEqual(run.returncode, 130)
         self.assertFalse((self.out / "x.nrrd").exists())
-        # A pipe that is no longer read.
+        # A pipe that is full and no longer read: writing the report to it blocks until the signal.
         read, write = os.pipe()
         self.addCleanup(os.close, read)
         os.set_blocking(write, False)
@@ -355,7 +355,7 @@ class Places(Files):
         for image in "series", names[0]:
             with self.subTest(image):
                 self.keeps(image, names[0], names[7], names[-1])
-        # Other files in that folder do not belong to the image.
+        # A JSON file in the folder of a DICOM series is not part of the image, so it may be replaced.
         (self.out / "series/notes.json").write_text("old")
         self.run_covol("info", "series", "--json", "series/notes.json")
         self.assertNotEqual(self.text("series/notes.json"), "old")
@@ -375,7 +375,7 @@ class Places(Files):
         self.run_covol("phantom", "sphere", "--size", SIZE, "-o", "in.zarr")
         inside = sorted(str(p.relative_to(self.out)) for p in (self.out / "in.zarr").rglob("*") if p.is_file())
         self.keeps("in.zarr", *inside[:3])
-        # Nothing may be added to it either: the name could be that of a missing chunk.
+        # No file may be added to a store that is an input: its name could be that of a chunk that the store lacks.
         self.fails("segment", "in.zarr", *LINE, "-o", "in.zarr/s.vdb", code=3, expected_text="lies in in.zarr")
 
     def test_a_configuration(self):
@@ -416,7 +416,7 @@ class Places(Files):
         self.assertEqual(stat.S_IMODE(os.stat(self.out / "d/real.nrrd").st_mode), 0o640)
         self.fails(*PHANTOM, "-o", "nowhere.nrrd", code=4, expected_text="does not exist")
         self.fails(*PHANTOM, "-o", "folder.nrrd", code=4, expected_text="it is a folder")
-        # A store behind a link is replaced at the link's target.
+        # If the output is a link to a Zarr store, the store is replaced at the link's target, and the link stays.
         self.run_covol(*PHANTOM, "-o", "d/store.zarr")
         os.chmod(self.out / "d/store.zarr", 0o700)
         (self.out / "l.zarr").symlink_to("d/store.zarr")
@@ -425,7 +425,7 @@ class Places(Files):
         self.assertTrue((self.out / "l.zarr").is_symlink())
         self.assertFalse((self.out / "d/store.zarr/old").exists())
         self.assertEqual(stat.S_IMODE(os.stat(self.out / "d/store.zarr").st_mode), 0o700)
-        # Two outputs with two names of the same file.
+        # same.csv is a link to t.csv: two outputs would be the same file.
         (self.out / "same.csv").symlink_to("t.csv")
         self.fails("segment", self.image, *LINE, "-o", "s.vdb", "--table", "t.csv", "--evidence", "same.csv", code=3,
                    expected_text="another output")
@@ -495,7 +495,7 @@ class Streams(Files):
         self.assertTrue(text.startswith("before\n{") and text.endswith("}\nafter\n"), text)
 
 
-del Files, Case  # base classes without tests
+del Files, Case  # base classes: unittest would run them, too
 
 if __name__ == "__main__":
     unittest.main()

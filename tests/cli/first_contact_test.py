@@ -30,7 +30,7 @@ class Words(Case):
         try:
             while part := os.read(near, 65536):
                 output += part
-        except OSError:  # the other end was closed
+        except OSError:  # EIO: the program has closed the terminal
             pass
         os.close(near)
         return output.decode().replace("\r", ""), process.wait(60)
@@ -43,7 +43,7 @@ class Words(Case):
         self.assertIn("--report", lines[2])
         self.assertLessEqual(max(map(len, lines)), 100)
         self.assertNotIn("error", output)
-        self.refuse(code=2, expected_text="covol --help")  # scripts get an error if the command is missing
+        self.refuse(code=2, expected_text="covol --help")  # without a terminal, as in a script, it is an error
 
     def test_help_begins_with_what_to_do(self):
         text = self.run_covol("--help").stdout
@@ -87,10 +87,10 @@ class Demo(PageCase):
         for name in ("celegans_embryo.tif", "celegans_marks.csv"):
             self.assertEqual((folder / name).read_bytes(), (SAMPLES / name).read_bytes())
         self.assertTrue((folder / "README.md").exists() and (folder / "celegans_embryo.tif.covol").is_dir())
-        # The command that the message names gives the same result without a page.
+        # The message names a command that does the same without a page; here it is only planned, not run.
         command = output.split("from the command line: covol ")[1].splitlines()[0].split()
         self.assertEqual(self.run_covol("plan", *command, "--quiet").returncode, 0)
-        program, page = self.start()  # again: the study is continued, and marks are not added twice
+        program, page = self.start()  # a second run continues the study, and does not add the marks again
         again = Live(page)
         self.addCleanup(again.close)
         self.assertEqual(len(again.state["structures"][0]["marks"]), 398)
@@ -118,7 +118,7 @@ class Doctor(Case):
         self.assertEqual(pathlib.Path(found["program"]), pathlib.Path(COVOL).resolve())
         counts = {folder: int(count) for count, folder in re.findall(r"^  (\d+) in (/.*)$", output, re.M)}
         self.assertEqual(sum(counts.values()), len(found["libraries"]))
-        for folder in counts:  # each library is counted once
+        for folder in counts:  # no folder lies in another one, else its libraries would be counted twice
             self.assertEqual([other for other in counts if other != folder and other.startswith(folder + "/")], [])
         for word in ("instruction set", "GiB free", "browser: ", "reader hdf5: found"):
             self.assertIn(word, output)

@@ -8,8 +8,9 @@ import unittest
 
 from cli_test import COMMANDS, Case
 
-LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]  # --help lists only a selection of their options
-MAX_SELECTED = 14  # maximum number of options in a selection, without help itself
+# Commands of which --help lists a selection of the options.
+LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]
+MAX_SELECTED = 14  # maximum number of options in such a selection, without --help and --help-all
 
 
 class Help(Case):
@@ -98,7 +99,7 @@ class OptionFiles(Case):
         return [line for line in (self.out / path).read_text().splitlines() if line and not line.startswith("#")]
 
     def test_saved_options_are_one_list(self):
-        # Options of five groups, in another order than that of their definition.
+        # Options of five groups, in an order other than that in which the program defines them.
         self.run_covol("segment", self.image, "--up", "y", "--sigma", "1vx", "--points", self.points, "--delta", "2vx", "-o", "s.vdb",
                        "--mesh", "m.ply", "--epsilon", "0.02", "--save-config", "c.toml")
         self.assertNotRegex((self.out / "c.toml").read_text(), r"(?m)^# [\w ]+ Options$")
@@ -106,7 +107,7 @@ class OptionFiles(Case):
                          ["image", "points", "output", "mesh", "delta", "epsilon", "sigma", "up"])
 
     def test_a_file_of_an_earlier_version(self):
-        # Its comments contain outdated descriptions.
+        # Its comments contain descriptions of options that have changed since; they are ignored.
         (self.out / "old.toml").write_text(
             '# covol 1.0.0, segment\n# Image and points together: the surface of a structure\n\n'
             '# 3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse\n'

@@ -33,7 +33,7 @@ except ImportError as error:
 SIZE = (30, 26, 14)           # voxels along x, y, z
 SPACING = (0.5, 0.625, 1.25)  # exact in single precision and in DICOM's decimals
 ORIGIN = (10.0, -20.0, 5.5)
-CENTRE = (16.0, -12.5, 12.0)  # of an ellipsoid away from the image's middle, so that flips and swaps are noticed
+CENTRE = (16.0, -12.5, 12.0)  # of the ellipsoid; not the image's centre, so that flipped or swapped axes are noticed
 RADII = (3.5, 4.5, 3.0)
 
 
@@ -120,8 +120,8 @@ def write_dicom_series(folder, data, series="1.2.3.4.5", description="ball"):
         ds.InstanceNumber = data.shape[0] - k
         ds.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
         ds.ImagePositionPatient = [ORIGIN[0], ORIGIN[1], ORIGIN[2] + SPACING[2] * k]
-        ds.PixelSpacing = [SPACING[1], SPACING[0]]  # rows first
-        ds.SliceThickness = 0.7                     # thinner than the distance of slices, with which it must not be confused
+        ds.PixelSpacing = [SPACING[1], SPACING[0]]  # DICOM: distance of rows (y), then of columns (x)
+        ds.SliceThickness = 0.7                     # the spacing of slices is not this, but 1.25, from their positions
         ds.Rows, ds.Columns = data.shape[1:]
         ds.SamplesPerPixel, ds.PhotometricInterpretation, ds.PixelRepresentation = 1, "MONOCHROME2", 0
         ds.BitsAllocated = ds.BitsStored = 16
@@ -249,7 +249,7 @@ class SameSurface(Case):
     def test_nifti_with_flipped_and_swapped_axes(self):
         ras = np.zeros((4, 4))
         ras[3, 3] = 1
-        # stored z fastest and y backwards, as the affine states
+        # In the file, z varies fastest and y runs backwards; the affine `ras` describes this.
         stored = self.data[:, ::-1, :].transpose(0, 1, 2)
         lps = np.zeros((3, 4))
         lps[2, 0] = SPACING[2]
@@ -313,7 +313,7 @@ class SameSurface(Case):
         grid = pyopenvdb.FloatGrid()
         grid.copyFromArray(self.data.transpose(2, 1, 0).astype(np.float32), tolerance=-1)
         matrix = np.diag([*SPACING, 1.0])
-        matrix[3, :3] = ORIGIN  # rows: OpenVDB multiplies from the left
+        matrix[3, :3] = ORIGIN  # translation in the last row: OpenVDB multiplies row vectors by the matrix
         grid.transform = pyopenvdb.createLinearTransform(matrix.tolist())
         grid.name = "density"
         other = pyopenvdb.BoolGrid()
@@ -329,14 +329,14 @@ class SameSurface(Case):
                 if name == "lzw.tif":
                     try:
                         tifffile.imwrite(str(self.folder / "try.tif"), self.data[:2], compression="lzw")
-                    except Exception:  # imagecodecs is not packaged in Debian
+                    except Exception:  # LZW requires imagecodecs, which Debian does not package
                         continue
                 tifffile.imwrite(str(self.folder / name), self.data, imagej=True,
                                  resolution=(1 / SPACING[0], 1 / SPACING[1]),
                                  metadata={"axes": "ZYX", "spacing": SPACING[2], "unit": "um"}, **more)
                 self.check(name, origin=False, unit="um")
         with tifffile.TiffFile(str(self.folder / "one.tif")) as one:
-            self.assertEqual(len(list(one.pages.pages)), 1)  # the form of stacks larger than 4 GB
+            self.assertEqual(len(list(one.pages.pages)), 1)  # one page, as in ImageJ stacks above 4 GB
 
     def test_imagej_origin(self):
         text = ("ImageJ=1.53t\nimages=%d\nslices=%d\nunit=um\nspacing=%r\nxorigin=%r\nyorigin=%r\nzorigin=%r\n"
@@ -346,13 +346,13 @@ class SameSurface(Case):
                 tiff.write(self.data[k], contiguous=False, metadata=None, description=text if k == 0 else None,
                            resolution=(1 / SPACING[0], 1 / SPACING[1]))
         self.check("origin.tif", unit="um")
-        # a TIFF that covol writes has the position of the image
+        # A mask that covol writes as TIFF has the origin of the image, as the NRRD file has.
         self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.tif")
         self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.nrrd")
         self.assertEqual(self.report("compare", "m.tif", "m.nrrd")["compare"]["dice"], 1)
 
     def test_hyperstack(self):
-        stack = np.zeros((3, SIZE[2], 2, SIZE[1], SIZE[0]), np.uint8)  # TZCYX
+        stack = np.zeros((3, SIZE[2], 2, SIZE[1], SIZE[0]), np.uint8)  # axes t, z, c, y, x
         stack[1, :, 1] = self.data
         tifffile.imwrite(str(self.folder / "hyper.tif"), stack, imagej=True, resolution=(1 / SPACING[0], 1 / SPACING[1]),
                          metadata={"axes": "TZCYX", "spacing": SPACING[2], "unit": "um"})
@@ -369,7 +369,7 @@ class SameSurface(Case):
         self.check(path, origin=False, unit="um")
 
     def test_ome_tiff_channels(self):
-        stack = np.stack([self.data, 0 * self.data])  # CZYX: channels outermost, DimensionOrder XYZCT
+        stack = np.stack([self.data, 0 * self.data])  # axes c, z, y, x, which OME calls DimensionOrder XYZCT
         path = self.folder / "two.ome.tif"
         tifffile.imwrite(str(path), stack, metadata={
             "axes": "CZYX", "Channel": {"Name": ["membrane", "nuclei"]}, "PhysicalSizeX": SPACING[0],
@@ -411,7 +411,7 @@ class Options(Case):
         chosen = 0
         for what in ("delta", "tau", "sigma", "edge_k", "attraction_range"):
             pair = of_part["resolved"][what], of_whole["resolved"][what]
-            if pair != (None, None):  # not needed in either run
+            if pair != (None, None):  # None: the option was not needed
                 self.assertAlmostEqual(pair[0] / pair[1], 1, 3, what)
                 chosen += 1
         self.assertGreater(chosen, 2)
@@ -428,7 +428,7 @@ class Options(Case):
         size = {name: self.report("info", name)["grids"][0] for name in ("whole.vdb", "part.vdb")}
         self.assertLess(size["part.vdb"]["active_voxels"], size["whole.vdb"]["active_voxels"] / 4)
         part = self.report("info", image, "--roi", "15.5,-13,11.9,16.5,-12,12.1")["image"]
-        self.assertGreater(part["range"][0], 100)  # only the inside of the ellipsoid
+        self.assertGreater(part["range"][0], 100)  # minimum value in the box, which lies within the bright ellipsoid
         self.assertEqual(info["range"][0], 30)
         error = self.run_covol("info", image, "--roi", "0,0,0,1,1,1", code=3).stderr
         self.assertIn("outside the image", error)
@@ -492,7 +492,7 @@ class Options(Case):
                     self.assertIn("install covol again", done.stderr)
 
         expect("alone/covol-[0-9.]+/covol-reader: covol's reader, the process that decodes files, could not be started")
-        # the program that reads files, and no module
+        # The folder `alone` now has the reader program, but none of its modules.
         (folder,) = pathlib.Path(library.group(2)).resolve().parent.glob("covol-*")
         (alone / folder.name).mkdir()
         shutil.copy(folder / "covol-reader", alone / folder.name)

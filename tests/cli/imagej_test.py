@@ -42,7 +42,7 @@ def roi_of_points(points):
     head, head2 = bytearray(64), bytearray(64)
     struct.pack_into(">4shBB", head, 0, b"Iout", 228, 10, 0)
     struct.pack_into(">H", head, 16, n)
-    struct.pack_into(">h", head, 50, 128)  # coordinates follow as floats, too
+    struct.pack_into(">h", head, 50, 128)  # option SUB_PIXEL_RESOLUTION: coordinates follow as floats, too
     struct.pack_into(">i", head, 60, 64 + 12 * n)
     struct.pack_into(">i", head2, 48, 64 + 12 * n + 64)
     x, y, z = zip(*points)
@@ -102,7 +102,8 @@ class Macro(Folder):
     def expect_the_ball(self, found):
         mask, outlines, table = found
         self.run_covol(*self.job, "-o", "s.vdb", "--mask", "s.nrrd")
-        # ImageJ's file has the position of the stack: covol compares the two in the world.
+        # The mask saved by ImageJ has the origin of the stack, so that covol compares the two masks in world
+        # coordinates.
         compared = self.report("compare", "back.tif", "s.nrrd")["compare"]
         self.assertGreater(compared["dice"], 0.97)
         full = [k for k in range(len(mask)) if mask[k].any()]
@@ -118,7 +119,7 @@ class Macro(Folder):
 
     def test_outlines_and_points_in_the_roi_manager(self):
         marks, (first, *between, last) = "", self.rings()
-        for z, xs, ys in between[::2]:  # in coordinates of pixel corners, as ImageJ stores outlines of areas
+        for z, xs, ys in between[::2]:  # + 0.5: ImageJ's area selections count from pixel corners
             x, y = (", ".join(f"{v + 0.5:.2f}" for v in values) for values in (xs, ys))
             marks += f'setSlice({z}); makeSelection("polygon", newArray({x}), newArray({y})); roiManager("add");\n'
         for z, xs, ys in (first, last):

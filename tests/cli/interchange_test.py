@@ -134,7 +134,7 @@ class MeshFiles(Folder):
         np.testing.assert_allclose(to_z_up(normals), ply[:, 3:6], atol=1e-6)
         np.testing.assert_array_equal(triangles, faces)
         self.assertGreater(np.abs(positions - ply[:, :3]).max(), 1, "the format is y up")
-        # Smooth: the normals are those of the ball.
+        # Vertex normals, for smooth shading: each points away from the centre of the ball.
         outward = (ply[:, :3] - CENTRE) / np.linalg.norm(ply[:, :3] - CENTRE, axis=1, keepdims=True)
         self.assertGreater((outward * ply[:, 3:6]).sum(1).min(), 0.95)
         self.run_covol("mesh", "s.vdb", "-o", "z.glb", "--up", "z", "--quiet")
@@ -159,7 +159,7 @@ class MeshFiles(Folder):
                 report = self.report("check", name)
                 self.assertEqual(report["problems"], 0)
                 self.assertTrue(any("different pieces intersect" in f["text"] for f in report["findings"]), report["findings"])
-        # Surfaces of one solid that cross each other are still an error.
+        # In a file of a single object, crossing surfaces are still an error. Here: two copies of a mesh, shifted by 1.
         parts = read_glb(self.out / "two.glb")
         vertices = np.concatenate([parts[0][0], parts[0][0] + (1, 0, 0)])
         faces = np.concatenate([parts[0][2], parts[0][2] + len(parts[0][0])])
@@ -217,7 +217,7 @@ class Vdb(Folder):
             shown = subprocess.run(["vdb_print", "-l", str(self.out / "s.vdb")], capture_output=True, text=True)
             self.assertEqual(shown.returncode, 0, shown.stderr)
             self.assertIn("covol_space", shown.stdout)
-        # Single steps preserve it.
+        # The command surface keeps the unit of its input.
         self.run_covol("surface", "s.vdb:surface", "-o", "again.vdb", "--quiet")
         self.assertEqual(pyopenvdb.read(str(self.out / "again.vdb"), "surface").metadata["covol_unit"], "um")
 

@@ -12,7 +12,7 @@ from cli_test import Case, write_nrrd
 from structures_test import H, ORIGIN, SIZE, ball_image, fibonacci, lattice, nrrd_keys, write_points
 
 MIDDLE = (0.0, 0.0, 0.0)
-RADIUS = 7.0  # 14 voxels
+RADIUS = 7.0  # in units of length; 14 voxels
 
 
 def ball(center=MIDDLE, radius=RADIUS):
@@ -75,7 +75,8 @@ class Painted(KindsCase):
         self.assertGreater(dice(mask > 0, ball()), 0.96)
 
     def test_slices_side_by_side_become_a_body(self):
-        # The ball covers 28 slices; painted are all but the first and the last two, or the middle ones.
+        # The ball covers slices 10 to 37. Either all of them are painted except two at each end, or only the 16 in the
+        # middle.
         for first, last in ((12, 36), (16, 32)):
             with self.subTest(first):
                 some = np.zeros((SIZE,) * 3, bool)
@@ -144,7 +145,8 @@ class Painted(KindsCase):
         self.assertEqual(report["seeds"]["wrong"], 0)
 
     def test_paint_is_not_called_seeds(self):
-        # A cone whose tip is painted as specks on adjacent slices: they are not cross-sections, and lie beyond the body's end.
+        # The specks of paint at the tip of the cone are not taken as complete cross-sections, and the body ends before
+        # them. The warning about these voxels must call them paint, not seeds.
         x, y, z = lattice()
         cone = (np.hypot(x, y) < 0.35 * (8 - z)) & (abs(z) < 9)
         cone[[k for k in range(SIZE) if k % 5 not in (1, 2)]] = False
@@ -181,14 +183,15 @@ class Seeds(KindsCase):
         report = self.report("segment", self.image, "--points", marks, "--inside", "0,0,0", "--outside", "9,9,9", "--outside",
                              self.cloud("out.xyz", 10), "-o", "s.vdb")
         self.assertEqual(report["seeds"], {"inside": 1, "outside": 41, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0})
-        # A seed beyond 600 marks and the image's border contradicts them: the ball stays, with a warning.
+        # The inside seed lies outside the ball, and thus contradicts 600 marks and the edge of the image. The result is
+        # still the ball, with a warning about the seed.
         for model in ([], ["--model", "paper"]):
             result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--mask", "m.nrrd", *model)
             self.assertIn("1 of 1 seeds lie on the wrong side of the surface", result.stderr)
             self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.97)
 
     def test_seeds_alone_are_a_start(self):
-        # Halfway between the seeds is a radius of 6.5.
+        # Inside seeds lie at a radius of 4, outside seeds at 9. Without steps, the surface is halfway: at 6.5.
         for count, minimum in ((40, 0.9), (300, 0.95)):
             with self.subTest(count):
                 report = self.report("segment", self.image, "--inside", self.cloud("in.xyz", 4, count), "--outside",
@@ -210,13 +213,13 @@ class Starts(KindsCase):
         return path
 
     def test_the_image_alone_grows_from_a_sphere_or_a_seed(self):
-        # Far from every edge, and close to one.
+        # Starts in the middle of the ball, far from its edge, and closer to the edge.
         for place, radius in (("0,0,0", 1.5), ("4,0,0", 1.5), ("0,-3,3", 2)):
             with self.subTest(place):
                 report = self.report("segment", self.image, "--theta", 0, "--init", f"sphere:{place},{radius}", "-o", "s.vdb", "--mask", "m.nrrd")
                 self.assertIn("to edges", report["automatic"]["growth"])
                 self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.95)
-        # The paper's model does not grow this start, and curvature makes it vanish.
+        # With the paper's model, a start far from the edge does not grow towards it, and vanishes by its curvature.
         for name in self.files():
             (self.out / name).unlink()
         self.refuse("segment", self.image, "--theta", 0, "--init", "sphere:0,0,0,1.5", "--model", "paper", "-o", "p.vdb", code=3, expected_text="vanished")
@@ -237,7 +240,8 @@ class Starts(KindsCase):
         self.assertNotIn("had no effect", done.stderr)
 
     def test_an_outline_on_the_first_slice_is_the_outline_of_the_cut(self):
-        # A ball that the first slice cuts below its middle; three outlines, the first of them on that slice.
+        # The first slice of the image cuts the ball below its centre. Of the three outlines, one lies on this first
+        # slice: its marks must not be taken for marks all over the cut.
         z = np.arange(SIZE) * H + ORIGIN[2]
         center = (0.0, 0.0, z[0] + 3.0)
         image = self.inputs / "cut.nrrd"
@@ -269,7 +273,7 @@ class Starts(KindsCase):
         self.assertIn("near its marks", again["automatic"]["start"])
         self.assertEqual(again["solve"]["steps"], 0)
         self.assertLess(again["fit"]["points_to_surface"]["max"], 0.5 * H)
-        # Far from the mark the result is unchanged.
+        # The further mark changes the surface only near itself.
         far = self.report("compare", "first.vdb", "again.vdb")["compare"]
         self.assertGreater(far["dice"], 0.98)
 
@@ -299,12 +303,12 @@ class Guess(KindsCase):
         self.assertEqual(reported["marks"], 10)
         self.assertEqual(reported["mask"]["added"] + reported["mask"]["removed"], np.count_nonzero(changed))
         self.assertLess(reported["marks_to_corrected"]["max"], H)
-        # Beyond the largest reach of all marks every voxel is unchanged.
+        # Voxels that are farther from all marks than the largest radius of a correction are unchanged.
         x, y, z = lattice()
         points = np.loadtxt(self.marks)
         nearest = np.min([np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2) for p in points], axis=0)
         self.assertFalse(np.any(changed & (nearest >= reported["radius"]["largest"])))
-        # With all marks every part is supported; without those of the missing cap, that part is not.
+        # Without the five marks on the missing cap, nothing supports the surface there, and marks are suggested.
         some = self.inputs / "some.xyz"
         write_points(some, points[5:])
         half = self.report("segment", self.image, "--guess", mask, "--points", some, "-o", "h.vdb", "--suggest", 2)

@@ -167,7 +167,8 @@ class Masks(unittest.TestCase):
         self.assertEqual(scale[0]["coordinateTransformations"],
                          [{"type": "scale", "scale": [1.25, 0.625, 0.5]}, {"type": "translation", "translation": [5.5, -20, 10]}])
         self.assertIn("image-label", group.attrs)
-        # A voxel of a level has the most frequent value of its voxels on the finer level.
+        # A voxel of level 1 has the most frequent value of the 2 x 2 voxels of level 0 that it covers; ties are not
+        # tested.
         fine, coarse = group["0"][:], group["1"][:]
         factors = [round(b / a) for a, b in zip(scale[0]["coordinateTransformations"][0]["scale"],
                                                 scale[1]["coordinateTransformations"][0]["scale"])]
@@ -176,7 +177,7 @@ class Masks(unittest.TestCase):
         whole = (fine[:, :140] == 3).reshape(139, 70, 2, 75, 2).sum((2, 4))
         decided = whole != 2
         self.assertTrue(((coarse[:, :70] == 3) == (whole > 2))[decided].all())
-        # covol reads the same mask from it.
+        # covol reads this store as the same mask as an NRRD file.
         self.mask("m.nrrd", "--label", 3)
         same = json.loads(run("compare", path, self.folder / "m.nrrd", "--json", "-").stdout)
         self.assertEqual(same["compare"]["dice"] if "compare" in same else same["dice"], 1)
@@ -234,7 +235,7 @@ class Meshes(unittest.TestCase):
         h = 0.5
         one = vdb.createLevelSetSphere(radius=60.0, center=(3.1, -7.7, 12.3), voxelSize=h, halfWidth=3.0)
         other = vdb.createLevelSetSphere(radius=4.0, center=(80, 0.3, 0.1), voxelSize=h, halfWidth=3.0)
-        # Both in one grid: the minimum of the two values everywhere.
+        # The union of both balls in one grid: the level set is the minimum of the two level sets.
         one.combine(other, min)
         one.name = "surface"
         cls.vdb = cls.folder / "balls.vdb"
@@ -275,7 +276,7 @@ class Meshes(unittest.TestCase):
         self.check_closed(points, faces)
         self.check_measures(report, points, faces)
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
-        # of the large ball, outward
+        # The normals on the large ball (x < 70) point outward.
         large = points[:, 0] < 70
         outward = ((points - (3.1, -7.7, 12.3)) * normals).sum(1)[large] / 60
         self.assertTrue(outward.min() > 0.5 and outward.mean() > 0.99, (outward.min(), outward.mean()))

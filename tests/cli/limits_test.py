@@ -98,7 +98,7 @@ class ControlGroups(Limited):
                     code, _, text = self.peak(*words, "--quiet", preexec_fn=lambda: processes.write_text(str(os.getpid())))
                     self.assertEqual(code, 3, text)
                     self.assertIn("memory", text)
-                    if "voxel size" not in text:  # which is refused before memory is allocated
+                    if "voxel size" not in text:  # else refused for its voxel size, before allocation
                         self.assertIn("control group", text)
                     self.assertEqual(self.files(), before)
             code, _, text = self.peak("info", "t.nrrd", preexec_fn=lambda: processes.write_text(str(os.getpid())))
@@ -151,7 +151,7 @@ class Threads(Limited):
         self.assertIn(0, seen)
 
     def test_a_limit_of_processes(self):
-        # For root there is no such limit.
+        # RLIMIT_NPROC does not apply to root, so a test run as root changes to the user nobody (65534).
         user = 65534 if os.geteuid() == 0 else os.geteuid()
 
         def limited(count):
@@ -184,7 +184,7 @@ def bomb_of_rois(path, entries, points):
     header = bytearray(64)
     struct.pack_into(">4shB", header, 0, b"Iout", 227, 10)
     struct.pack_into(">I", header, 18, points)
-    struct.pack_into(">i", header, 56, 1)  # slice
+    struct.pack_into(">i", header, 56, 1)  # the slice of the points, counted from 1
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for n in range(entries):
             archive.writestr(f"{n}.roi", bytes(header) + bytes(4 * points))
@@ -196,7 +196,7 @@ class SmallFiles(Limited):
     ALLOWED = 300 * MIB
 
     def refused(self, *words, expected_text="memory"):
-        # A safeguard of the test itself: it stops a program that allocates all it can get.
+        # A limit of 8 GiB for the address space protects the machine from a program that allocates what a file claims.
         code, peak, text = self.peak(*words, "--quiet", preexec_fn=lambda: resource.setrlimit(
             resource.RLIMIT_AS, (8 << 30, 8 << 30)))
         self.assertEqual(code, 3, text)
@@ -300,7 +300,8 @@ class Places(Case):
                     self.run_covol("convert", path, "o.nrrd")
 
     def test_far_places_that_numbers_hold(self):
-        # National grids in metres with voxels of a millimetre; a microscope stage in nanometres.
+        # (spacing, origin): 1 mm voxels in a national grid in metres, 5 nm voxels 0.1 m along a stage, and a large
+        # scale.
         for spacing, origin in ((1e-3, 4.2e6), (5e-9, 0.1), (300.0, 1e9)):
             write_nrrd(self.inputs / "i.nrrd", (4, 4, 4), bytes(64), spacing=spacing, origin=(origin, 0, 0))
             self.run_covol("info", self.inputs / "i.nrrd")
@@ -342,7 +343,8 @@ class LargeImages(Limited):
         self.assertNotIn("estimate", self.run_covol("info", self.image).stdout)
 
     def test_plan_knows_of_mapped_pages(self):
-        # The system maps more pages at once if it has read them before; docs/benchmarks.md states how accurate plans are.
+        # The bounds are wide because the system maps more pages at once if it has them in memory from an earlier run;
+        # docs/benchmarks.md states how accurate plans are.
         job = ["segment", self.large, "--points", self.inputs / "large.xyz", "-o", "s.vdb", "--quiet", "--json"]
         self.run_covol("plan", *job, "plan.json")
         planned = json.loads((self.out / "plan.json").read_text())["plan"]
@@ -353,7 +355,7 @@ class LargeImages(Limited):
         self.assertLess(ratio, 1.5)
 
 
-del Limited, Case  # base classes without tests
+del Limited, Case  # base classes: unittest would run them, too
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ class Page:
         try:
             connection.send(body)
         except OSError:
-            pass  # the server refused it before reading all
+            pass  # the server has refused the request before it read the whole body
         answer = connection.getresponse()
         text = answer.read().decode()
         connection.close()

@@ -200,7 +200,7 @@ class Outputs(Case):
         self.assertEqual(self.run_covol("mesh", "kept.vdb:start", "-o", "start.ply", "--quiet").returncode, 0)
         volume = self.report("info", "start.ply")["mesh"]["volume"]
         self.assertAlmostEqual(volume / (4 / 3 * math.pi * 27), 1, 1)
-        # A successful run keeps nothing.
+        # A run that succeeds does not write the file of --keep-failed.
         self.segment("--keep-failed", "none.vdb", "--quiet", points=self.sparse)
         self.assertNotIn("none.vdb", self.files())
 

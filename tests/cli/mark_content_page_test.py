@@ -39,9 +39,9 @@ class Content(PageCase):
         self.assertAlmostEqual(radius, 5, places=6)
         self.assertAlmostEqual(self.painted(2, 30), math.pi * 25 + 10 * 20, delta=25)
         self.assertEqual(self.painted(2, 31), 0)
-        self.assertGreater(self.painted(1, 42), 20)  # visible as a line in a slice across
+        self.assertGreater(self.painted(1, 42), 20)  # the stroke crosses this slice in a line
         self.assertEqual([action["do"] for action in self.server.journal()], ["add_structure", "add_stroke"])
-        # The eraser clears the middle; Shift makes the brush an eraser, too.
+        # The key g selects the eraser, which clears the middle of the stroke.
         self.keys("g")
         self.drag(2, [35, 42, 30], [36, 42, 30])
         self.settled()
@@ -50,7 +50,7 @@ class Content(PageCase):
         self.keys("z")
         self.wait("return mark.study.structures[0].strokes.length === 1 && mark.queue.items.length === 0")
         self.assertGreater(self.painted(2, 30), rubbed)
-        # A larger ball.
+        # The key d changes the brush to a ball, and each "." enlarges it by a factor of 1.25.
         self.keys("b", "d", ".", ".")
         self.click(2, [34, 42, 30])
         self.settled()
@@ -62,7 +62,7 @@ class Content(PageCase):
         self.driver.find_element(By.CSS_SELECTOR, '[aria-label="remove all paint"]').click()
         self.settled()
         self.assertEqual(self.strokes(), [])
-        # The page shows the same voxels as the program paints: whole cross-sections determine the body.
+        # Strokes that cover the whole cross-sections of the body on five slices determine a surface.
         self.js("mark.state.set({brush: {radius: 1, isBall: false}})")
         for k in (22, 26, 30, 34, 38):
             self.js("const [k, r] = arguments; mark.study.act({do: 'add_stroke', structure: mark.study.structures[0].id, erases: false, radius: r, axis: 2, at: k, world: [mark.space.toWorld([34, 42, k])]})",
@@ -84,7 +84,7 @@ class Content(PageCase):
         self.keys("z")
         self.wait("return mark.study.structures[0].marks.length === 0")
         # A file that cannot be read causes a message and no change.
-        self.may_fail = True  # the browser logs the response 400
+        self.may_fail = True  # the browser logs the response 400 as an error
         broken = self.server.folder / "broken.nii"
         broken.write_bytes(b"no image")
         self.js("mark.files.as = 'guess'")
@@ -100,7 +100,8 @@ class Content(PageCase):
         self.settled()
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=table]").click()
         self.wait("return document.querySelectorAll('dialog.results tbody tr').length === 2")
-        # Rows are created anew with each result, so that element references become stale.
+        # Text is read by a script, because each result recreates the rows, and references to the old elements become
+        # invalid.
         rows = self.js("return [...document.querySelectorAll('dialog.results tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent).join(' '))")
         self.assertRegex(rows[0], r"structure 1.* 9 ")
         self.assertIn("–", rows[1])
@@ -113,8 +114,8 @@ class Content(PageCase):
         if os.environ.get("COVOL_PICTURES"):
             self.driver.save_screenshot(os.environ["COVOL_PICTURES"] + "/table.png")
         self.keys(Keys.ESCAPE)
-        # The voxels of the first answer are coarser, and a busy machine may still show it, or the result of fewer marks: with all
-        # of them, and voxels of the image's size, there are some 18,000 triangles.
+        # The first answer has coarser voxels, and a busy machine may still show it, or the result of fewer marks. With
+        # all marks and voxels of the image's size, the mesh has some 18,000 triangles.
         before = self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.triangles > 12000 && r.triangles")
         self.driver.find_element(By.CSS_SELECTOR, "[data-do=options]").click()
         field = self.driver.find_element(By.CSS_SELECTOR, "dialog.options [name=voxel_size]")
@@ -135,7 +136,7 @@ class Content(PageCase):
                 self.assertGreater(red, 128)
             else:
                 self.assertGreater(blue, green)
-        # Kept after a reload.
+        # The choice of colours is kept after a reload of the page.
         self.wait("return localStorage.getItem('covol-mark/view/ball.nrrd/colors') === '\"inverted\"'")
         self.driver.refresh()
         self.ready()
@@ -157,7 +158,7 @@ class Content(PageCase):
         self.settled()
         self.assertEqual(len(self.server.journal()), 2)
         self.driver.switch_to.default_content()
-        self.may_fail = True  # the browser logs the refusal
+        self.may_fail = True  # the browser logs as an error that the frame was refused
         for port, host in ((other, "localhost"), (notebook, "127.0.0.1")):
             self.driver.get(f"http://{host}:{port}/")
             self.driver.execute_script(show, address)

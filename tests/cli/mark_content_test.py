@@ -70,7 +70,8 @@ class Content(ContentCase):
         self.assertEqual(patches[0]["structures"][0]["guess"]["name"], "small.nrrd")
         live.wait_for(structure["id"], "refined", 10)
         self.same_without_a_page(page, program)
-        # The journal refers to the file relative to the study's folder; replacing the file is an error.
+        # The journal names the mask relative to the study's folder, with a digest. If the file has another digest, it
+        # is an error.
         line = json.loads(self.journal()[2])
         self.assertEqual((self.out / "ball.nrrd.covol" / line["path"]).resolve(), self.small.resolve())
         broken = [text if n != 2 else json.dumps({**line, "digest": "xxh128:0"}) for n, text in enumerate(self.journal())]
@@ -91,7 +92,7 @@ class Content(ContentCase):
             self.assertGreater(result["volume"], 0.7 * 2 / 3 * math.pi * (11 * H) ** 3 - 4 * math.pi * (11 * H) ** 2 * H)
         self.same_without_a_page(page, program)
         self.assertEqual(set(self.voxels("s.nrrd")), {0, 3, 8})
-        # Repeating the command adds nothing.
+        # The same command on the existing study does not add the structures again.
         program, page = self.start("--labels", self.halves)
         self.assertEqual(len(self.open(page).state["structures"]), 2)
         self.end(program)
@@ -121,7 +122,7 @@ class Content(ContentCase):
         live = self.open(page)
         structure = live.add_structure("ball")
         radius = RADIUS
-        # Whole cross-sections on some slices.
+        # Strokes that cover the whole cross-section of the ball on five slices.
         for k in (12, 16, 20, 24, 28):
             cut = math.sqrt(max(0, radius ** 2 - (H * (k - MIDDLE)) ** 2))
             patches, done = live.act(do="add_stroke", structure=structure, erases=False, radius=cut, axis=2, at=k, world=[world(MIDDLE, MIDDLE, k)])
@@ -129,7 +130,7 @@ class Content(ContentCase):
         self.assertEqual(len(patches[0]["structures"][0]["strokes"]), 5)
         result = live.wait_for(structure, "refined", 6)
         self.assertAlmostEqual(radius_of(result["volume"]), RADIUS, delta=0.05 * RADIUS)
-        # The same voxels as a label image.
+        # A label image with the same voxels painted gives the same volume.
         cuts = {k: math.sqrt(max(0, radius ** 2 - (H * (k - MIDDLE)) ** 2)) / H for k in (12, 16, 20, 24, 28)}
         labels = bytes(int(k in cuts and math.dist((i, j), (MIDDLE,) * 2) <= cuts[k]) for k in range(SIZE) for j in range(SIZE) for i in range(SIZE))
         write_nrrd(self.out / "painted.nrrd", (SIZE,) * 3, labels)
@@ -195,7 +196,8 @@ class Files(ContentCase):
         self.assertEqual(status, 200, text)
         patch = live.receive()["patch"]
         self.assertEqual(len(patch["structures"][0]["marks"]), len(MARKS))
-        # Sent again after a lost response, the marks are added only once.
+        # The page sends the same file again, as it does if it has not received the response: the marks are added only
+        # once.
         self.assertEqual(self.send(page, "marks.csv", self.marks.read_bytes(), **{"as": "points", "structure": structure})[0], 200)
         self.assertEqual(len(self.open(page).state["structures"][0]["marks"]), len(MARKS))
         status, text = self.send(page, "../../small.nrrd", self.small.read_bytes(), structure=structure)
@@ -221,7 +223,7 @@ class Files(ContentCase):
         live.add_mark(structure, CENTER, "inside")
         live.add_mark(structure, world(2, 2, 2), "outside")
         exported = page.get(f"/export?structure={structure}&format=marks.csv")[2]
-        # The program interprets the marks as intended.
+        # segment reads the exported table with the same kinds of marks as the page: volumes are equal.
         result = live.wait_for(structure, "refined", len(MARKS) + 3)
         (self.out / "exported.csv").write_bytes(exported)
         self.run_covol("segment", self.stack, "--points", "exported.csv", "-o", "e.vdb", "--json", "e.json")
@@ -236,9 +238,10 @@ class Files(ContentCase):
         marks = patch["patch"]["structures"][0]["marks"]
         plain = [(m["kind"], m["world"]) for m in next(s for s in self.open(page).state["structures"] if s["id"] == structure)["marks"]]
         self.assertEqual(sorted(m["kind"] for m in marks), sorted(kind for kind, _ in plain))
-        for mark in marks:  # tables have six digits
+        for mark in marks:  # the table has six digits
             self.assertLess(min(math.dist(mark["world"], place) for kind, place in plain if kind == mark["kind"]), 1e-4)
-        # From napari: a closed line within a slice is an outline, one across slices is read as marks.
+        # Shapes of napari: a polygon within a slice becomes an outline; the corners of a path across slices become
+        # marks.
         ring = [(17, MIDDLE + 8 * math.sin(n * math.pi / 6), MIDDLE + 8 * math.cos(n * math.pi / 6)) for n in range(12)]
         slanted = [(10 + n, 18 + n, 16 + 2 * n) for n in range(4)]
         rows = [f"{shape},{kind},{n},{z},{y},{x}" for shape, (kind, line) in enumerate((("polygon", ring), ("path", slanted))) for n, (z, y, x) in enumerate(line)]
@@ -275,7 +278,7 @@ class Files(ContentCase):
             self.assertNotIn("\x1b", text)
         files = self.out / "ball.nrrd.covol" / "files"
         self.assertEqual(list(files.iterdir()) if files.exists() else [], [])
-        # Messages of a page must not name files.
+        # Actions that a page sends must not name files, which the program would read.
         live = self.open(page)
         for action in ({"do": "set_guess", "structure": structure, "path": "/etc/passwd", "digest": "xxh128:0", "label": 0},
                        {"do": "add_labels", "path": "/etc/passwd", "digest": "xxh128:0", "labels": [{"label": 1, "name": "a"}]}):
@@ -287,7 +290,7 @@ class Files(ContentCase):
             self.assertEqual(status, 400, key)
             self.assertIn("'key'", text)
         self.assertEqual(len(self.journal()), 2)
-        # Pages of other sites cannot upload either.
+        # Uploads are refused without the right Origin and cookie, so that pages of other sites cannot upload.
         good = f"/import?key=k&as=guess&name=a.nrrd&structure={structure}"
         body = self.small.read_bytes()
         self.assertEqual(page.post(good, body, Origin=None)[0], 403)

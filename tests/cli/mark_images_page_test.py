@@ -14,7 +14,7 @@ try:
 except ImportError:
     tifffile = None
 
-# The rows of slices across k are sheared by 20 degrees, and slices along k by other angles.
+# Columns: directions of the axes i, j, k. Axis j is tilted by 20 degrees towards i, and k is perpendicular to neither.
 SHEARED = np.array([[1, math.sin(math.radians(20)), 0.2], [0, math.cos(math.radians(20)), -0.25], [0, 0, math.sqrt(1 - 0.2 ** 2 - 0.25 ** 2)]])
 
 
@@ -34,7 +34,7 @@ def channel_values(n):
 
 
 def write_channels(folder):
-    data = np.stack([channel_values(0), channel_values(1)], 1)  # z c y x
+    data = np.stack([channel_values(0), channel_values(1)], 1)  # axes z, c, y, x
     tifffile.imwrite(folder / "two.tif", data, imagej=True, resolution=(1, 1), metadata={"spacing": 1.0, "unit": "um", "axes": "ZCYX"})
     return folder / "two.tif"
 
@@ -54,17 +54,17 @@ class Images(PageCase):
         for mark, (axis, index) in zip(marks, ((2, [40, 20, 30]), (1, [20, 42, 45]), (0, [34, 60, 12]))):
             self.near(mark["index"], index, axis)
             np.testing.assert_allclose(mark["world"], self.world(mark["index"]), atol=1e-6)
-        # On the screen, lengths and angles are those of the world.
+        # Lengths on the screen are proportional to those in the world, and angles are equal.
         places = [self.js("const p = mark.panels[2]; return p.spotOf(mark.space.toWorld(arguments[0]))", index) for index in ([20, 20, 30], [60, 20, 30], [20, 60, 30])]
         a, b = (np.subtract(place, places[0]) for place in places[1:])
         world_a, world_b = self.world([60, 20, 30]) - self.world([20, 20, 30]), self.world([20, 60, 30]) - self.world([20, 20, 30])
         self.assertAlmostEqual(np.linalg.norm(a) / np.linalg.norm(b), np.linalg.norm(world_a) / np.linalg.norm(world_b), places=3)
         self.assertAlmostEqual(abs(a @ b) / np.linalg.norm(a) / np.linalg.norm(b), abs(world_a @ world_b) / np.linalg.norm(world_a) / np.linalg.norm(world_b), places=3)
-        # The picture is sheared like the marks: the bright body is at its voxels.
+        # The picture is sheared like the marks, so that the bright body appears at its voxels.
         self.slices(*BALL)
         for index, is_bright in (([34, 42, 30], True), ([34, 42 - 20, 30], True), ([34, 42 - 30, 30], False), ([34 + 26, 42, 30], False), ([34, 42 + 20, 30], True)):
             self.assertEqual(self.bright(2, index), is_bright, index)
-        # A brush is round in the world.
+        # A stroke of the brush is a disc in the world, although the voxels are sheared.
         self.keys("b")
         self.click(2, [34.0, 42.0, 30])
         self.settled()
@@ -81,9 +81,9 @@ class Images(PageCase):
         grey = ("const o = mark.view.oblique, p = o.pixels, n = 384, at = (x, y) => p.slice(4 * (y * n + x), 4 * (y * n + x) + 4);"
                 "return o.codes ? [[...at(192, 192)], [...at(0, 0)]] : null")
         middle, corner = self.wait(grey)
-        self.assertGreater(middle[0], 110)  # the bright body is in the middle
+        self.assertGreater(middle[0], 110)  # in the middle of the oblique plane, the bright body
         self.assertEqual(middle[3], 255)
-        self.assertEqual(corner[3], 0)  # outside of the image
+        self.assertEqual(corner[3], 0)  # transparent outside of the image
         self.driver.find_element(By.CSS_SELECTOR, ".three canvas").send_keys("]" * 3)
         self.wait("return mark.view.oblique.codes")
         page = Page(self.server.url)
@@ -116,7 +116,7 @@ class Images(PageCase):
         np.testing.assert_allclose(left, own, atol=2)
         np.testing.assert_allclose(right, other, atol=2)
         self.assertEqual(self.driver.find_element(By.CSS_SELECTOR, "[data-channel='1']").get_attribute("aria-checked"), "true")
-        # The displayed value is that of the marked channel; the choice is kept after a reload.
+        # The choice of the second channel is kept after a reload of the page.
         self.driver.refresh()
         self.ready()
         self.wait("return mark.panels[2].slice.others.size === 1 && mark.state.get('grey').others?.length === 1")

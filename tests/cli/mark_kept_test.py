@@ -48,7 +48,7 @@ class Kept(MarkCase):
             self.assertEqual(refined[name], result[name], name)
         self.assertEqual(kept, mesh)
         self.assertEqual(after, mesh)
-        self.assertEqual(refined["version"], at_once["version"])  # pages need not request it again
+        self.assertEqual(refined["version"], at_once["version"])  # equal, so that pages need not request the mesh again
         self.assertEqual(at_once["stage"], "first")
 
     def test_other_marks_have_another_surface(self):
@@ -56,7 +56,7 @@ class Kept(MarkCase):
         program, page = self.start()
         live = self.open(page)
         live.act(do="remove_mark", structure=1, mark=live.state["structures"][0]["marks"][0]["id"])
-        program.kill()  # whether or not the new surface was found by then, the old one does not belong to these marks
+        program.kill()  # before or after the new surface is saved
         program.wait()
         _, page = self.start()
         result = self.open(page).state["structures"][0]["result"]
@@ -86,7 +86,7 @@ class Kept(MarkCase):
     def test_another_image_in_its_place_has_its_own_surface(self):
         result, _ = self.begin()
         data = bytearray(self.stack.read_bytes())
-        data[-SIZE_OF_SLICES:] = bytes(SIZE_OF_SLICES)  # beyond the middle of the ball nothing is bright any more
+        data[-SIZE_OF_SLICES:] = bytes(SIZE_OF_SLICES)  # the upper slices become black, and cut the ball
         self.stack.write_bytes(bytes(data))
         at_once, _, refined, _ = self.again()
         self.assertNotEqual(refined["mean"], result["mean"])

@@ -14,8 +14,8 @@ import numpy as np
 from cli_test import COVOL, Case, sphere_points
 from live_client import Live, Page
 
-SIZE, CHUNK, LEVELS, SPACING = (256, 1024, 1024), 64, 3, 0.5  # z y x; large enough to be read chunk by chunk
-MIDDLE, RADIUS = np.array([96, 160, 224]), 20                 # x y z, of a bright ball within one chunk
+SIZE, CHUNK, LEVELS, SPACING = (256, 1024, 1024), 64, 3, 0.5  # size z, y, x; large enough to be read chunk by chunk
+MIDDLE, RADIUS = np.array([96, 160, 224]), 20                 # x, y, z of a bright ball within one chunk; voxels
 
 
 def write_pyramid(folder):
@@ -101,7 +101,7 @@ class Large(Case):
         self.run_covol("segment", "--study", self.out / "study", "-o", self.out / "ball.vdb", "--mesh", self.out / "ball.ply", "--json", self.out / "ball.json")
         report = json.loads((self.out / "ball.json").read_text())
         self.assertEqual(report["structures"][0]["surface"]["volume"], refined["volume"])
-        self.assertLess(report["input"]["image"]["chunks"]["read"], 60)  # of 1024
+        self.assertLess(report["input"]["image"]["chunks"]["read"], 60)  # of 1024 chunks (4 x 16 x 16)
 
 
 if __name__ == "__main__":

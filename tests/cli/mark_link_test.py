@@ -12,7 +12,7 @@ EVIL = "<img src=x onerror=alert(1)><script>alert(2)</script>\"&amp;'"
 class Link(PageCase):
     def test_a_program_that_was_killed_takes_what_was_kept(self):
         self.open()
-        self.may_fail = True  # the browser logs that there is no server
+        self.may_fail = True  # the browser logs as an error that the server does not respond
         self.mark_ball(2)
         self.server.kill()
         self.wait("return mark.state.get('link') === 'lost'")
@@ -40,7 +40,8 @@ class Link(PageCase):
         self.mark_ball(2)
         self.js("mark.connection.socket.send(JSON.stringify({key: 'x-1', do: 'add_mark', structure: mark.study.structures[0].id, kind: 'surface', world: [0, 20, 30]}))")
         self.wait("return mark.study.structures[0].marks.length === 3")
-        # As if the response had been lost: the action is stored, and the next page sends it again.
+        # If the response is lost, the action stays in localStorage, and the next page sends it again. The test puts it
+        # there.
         self.js("localStorage.setItem('covol-mark/actions/ball.nrrd/x-1', JSON.stringify({time: 1, action: {key: 'x-1', do: 'add_mark', structure: mark.study.structures[0].id, kind: 'surface', world: [0, 20, 30]}}))")
         self.driver.refresh()
         self.ready()

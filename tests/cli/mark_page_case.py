@@ -24,9 +24,10 @@ except ImportError:
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 SIZE, SPACING, ORIGIN = (96, 80, 60), (0.8, 0.8, 1.4), (-31, 12, 5)
-BALL = (34, 42, 30)  # the middle of the bright body, and the distance of its surface
+BALL = (34, 42, 30)  # the bright ellipsoid: its centre and its half axes (RADII), in voxels
 RADII = (20, 24, 13)
-# Pages are composited on the CPU, as on a computer without a graphics card; SwiftShader is only for WebGL.
+# Pages are composited on the CPU, as on a computer without a graphics card. WebGL is rendered by SwiftShader on the
+# CPU.
 FLAGS = ["--headless=new", "--disable-gpu-compositing", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-quic",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=1400,900"]
 
@@ -120,16 +121,17 @@ class PageCase(unittest.TestCase):
 
     def quiet(self):
         severe = [entry for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"]
-        # A request for a surface that has just been replaced by a newer one is not an error.
+        # A surface may be replaced by a newer one before the page has requested its mesh. The status 404 is then no
+        # error.
         severe = [entry for entry in severe if not ("/mesh?" in entry["message"] and "404" in entry["message"])]
-        self.driver.get("about:blank")  # before the server ends
+        self.driver.get("about:blank")  # leaves the page before the server ends, which would cause further errors
         if not self.may_fail:
             self.assertEqual(severe, [])
 
     def js(self, script, *arguments):
         return self.driver.execute_script("const mark = window.covolMark;" + script, *arguments)
 
-    def wait(self, script, *arguments, seconds=60):  # many times what it takes, for busy machines
+    def wait(self, script, *arguments, seconds=60):  # far longer than necessary, for busy machines
         return WebDriverWait(self.driver, seconds, 0.05).until(lambda _: self.js(script, *arguments))
 
     def settled(self):
@@ -215,4 +217,4 @@ class PageCase(unittest.TestCase):
 
     def surface(self, structure=0):
         self.wait("const s = mark.study.structures[arguments[0]]; return s?.result?.stage === 'refined' && mark.meshes.get(s.id)?.version === s.result.version", structure)
-        self.wait("return mark.view.due === Infinity")  # it is shown in 3D as well
+        self.wait("return mark.view.due === Infinity")  # no drawing of the 3D view is pending

@@ -21,7 +21,8 @@ class Marks(PageCase):
             self.click(axis, wanted)
             self.assertEqual(len(self.marks()), before + 1)
             self.near(self.marks()[-1]["index"], wanted, axis)
-            # Zoomed in about a position away from the middle.
+            # The plane is enlarged 5 times about the mark, which is not in the middle of the plane; then the click on
+            # `again`.
             x, y = self.spot(axis, wanted)
             self.js("const p = mark.panels[arguments[0]], b = p.canvas.getBoundingClientRect(); p.zoomAt(5, arguments[1] - b.left, arguments[2] - b.top)", axis, x, y)
             self.slices(31, 36, 26)
@@ -56,7 +57,8 @@ class Marks(PageCase):
         self.surface()
         self.slices(*BALL)
         self.wait("return mark.lastShown > mark.lastAction")
-        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")  # result of the last mark
+        # The result includes the last mark.
+        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")
         self.assertGreater(self.js("return mark.resultsSeen"), 1)
         self.assertIn("µm³", self.driver.find_element(By.CSS_SELECTOR, ".structure .figures").text)
         self.assertRegex(self.driver.find_element(By.CSS_SELECTOR, ".structure .dice").text, r"0\.\d\d \(0\.\d\d–0\.\d\d\)")
@@ -120,7 +122,7 @@ class Marks(PageCase):
         self.settled()
         self.near(self.marks()[0]["index"], [60, 20, 30], 2)
         self.assertEqual(len(self.marks()), 1)
-        # Selected by a click, then deleted while the pointer is elsewhere.
+        # A click selects the mark; the key then deletes it although the pointer is elsewhere.
         self.click(2, [60, 20, 30])
         self.assertEqual(len(self.marks()), 1)
         self.assertTrue(self.driver.find_element(By.CSS_SELECTOR, ".chosen").is_displayed())
@@ -128,7 +130,7 @@ class Marks(PageCase):
         self.keys(Keys.BACKSPACE)
         self.settled()
         self.assertEqual(self.marks(), [])
-        # A press with movement is not a click.
+        # If the pointer moves while the button is pressed, no mark is set.
         self.drag(2, [20, 20, 30], [26, 26, 30])
         self.assertEqual(self.marks(), [])
 
@@ -161,7 +163,7 @@ class Marks(PageCase):
         self.click(2, [65, 25, 20])
         self.settled()
         self.assertEqual(len(self.structures()[0]["outlines"]), 2)
-        # A double click closes the outline and adds one corner.
+        # A double click adds one corner, not two, and closes the outline.
         self.keys("c")
         self.slices(30, 42, 22)
         for place in ([20, 30, 22], [50, 30, 22]):
@@ -202,7 +204,7 @@ class Marks(PageCase):
         self.assertTrue(self.driver.find_element(By.CSS_SELECTOR, "dialog.help").is_displayed())
         self.keys(Keys.ESCAPE, "w")
         self.assertEqual(self.js("return mark.state.get('window').white"), self.js("return mark.image.high"))
-        # Every control has a name.
+        # Every visible control has a name for screen readers: an aria-label or a text.
         nameless = self.js("return [...document.querySelectorAll('button, input, select, a, canvas')].filter((e) => e.checkVisibility() && !e.closest('[aria-hidden=true]') && !(e.getAttribute('aria-label') || e.textContent.trim())).map((e) => e.outerHTML)")
         self.assertEqual(nameless, [])
 
@@ -290,7 +292,8 @@ class Marks(PageCase):
         self.wait("return mark.meshes.get(mark.study.structures[0].id).before === null", seconds=5)
         self.assertEqual(self.js(camera), before)
         self.assertIsNotNone(self.js(count + "?.version"))
-        # Outlines are joined to whole loops: a plane through the middle of a ball gives a single one.
+        # The segments in which a plane cuts the triangles are joined to closed lines: to a single one through the
+        # middle of a ball.
         lines = self.js("const m = mark.meshes.get(mark.study.structures[0].id); mark.panels[2].draw(); return m.lines[2].lines.map((l) => [l.closed, l.places.length])")
         self.assertEqual(len(lines), 1)
         self.assertTrue(lines[0][0])

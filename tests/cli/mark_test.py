@@ -143,7 +143,7 @@ class Study(MarkCase):
             self.assertIn(why, answer["why"])
         live.send_text("nonsense")
         while "failed" not in (answer := live.receive()):
-            self.assertIn("result", answer)  # of the marks before, computed at any time
+            self.assertIn("result", answer)  # results for the marks may arrive first
         self.assertIsNone(answer["failed"])
         live.act(do="lock", structure=structure, locked=True)
         _, answer = live.act(do="add_mark", structure=structure, kind="surface", world=list(MARKS[3]))
@@ -206,7 +206,7 @@ class Safe(MarkCase):
         self.assertTrue(policy.startswith("default-src 'none'"), policy)
         self.assertNotIn("unsafe", policy)
         self.assertNotIn(b"{{", body)
-        # Only on the loopback address.
+        # The server accepts connections only at 127.0.0.1, not at the machine's other addresses.
         for address in {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}:
             if address.startswith("127."):
                 continue

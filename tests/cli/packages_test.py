@@ -38,7 +38,8 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.work = pathlib.Path(tempfile.mkdtemp(prefix="covol-packages-"))
         cls.addClassCleanup(shutil.rmtree, cls.work)
-        shutil.rmtree(BUILD / "made", ignore_errors=True)  # as after a build of the program alone: cpack creates it
+        # A build of the program alone has no such folder; cpack must create it.
+        shutil.rmtree(BUILD / "made", ignore_errors=True)
         run("cpack", "-G", "DEB", "--config", BUILD / "CPackConfig.cmake", "-B", cls.work, cwd=BUILD)
         cls.debs = {path.name.split("_")[0]: path for path in cls.work.glob("*.deb")}
         assert sorted(cls.debs) == NAMES, cls.debs

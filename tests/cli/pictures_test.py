@@ -11,7 +11,7 @@ from PIL import Image
 from cli_test import Case, write_nrrd
 from structures_test import H, ORIGIN, ball_image, ball_points, write_points
 
-BLUE, RED = (68, 119, 170), (238, 102, 119)  # the first two structures'
+BLUE, RED = (68, 119, 170), (238, 102, 119)  # colours of the first and the second structure, 0 to 255
 
 
 def near(pixels, color, upper_bound=60):
@@ -43,8 +43,8 @@ class Pictures(Case):
     def test_all_structures_or_one(self):
         both = self.picture("--figure", "surface", "--view", "front", "--size", "500x300")
         self.assertEqual(both.shape, (300, 500, 3))
-        middle = both[60:240]  # below the legend
-        # By hue, because the shading varies.
+        middle = both[60:240]  # rows below the legend
+        # Pixels are classified by the difference of blue and red, because the brightness varies with the shading.
         blue = (middle[..., 2].astype(int) - middle[..., 0] > 30).nonzero()[1]
         red = (middle[..., 0].astype(int) - middle[..., 2] > 30).nonzero()[1]
         self.assertGreater(len(blue), 4000)
@@ -55,7 +55,8 @@ class Pictures(Case):
         self.assertGreater(near(both[:60, :60], RED).sum(), 20)
         self.two = f"{self.two}:left"
         one = self.picture("--figure", "surface", "--view", "front", "--size", "500x300", name="q.png")
-        self.assertEqual((one[:240, ..., 2].astype(int) - one[:240, ..., 0] > 30).sum(), 0)  # below are blue axes
+        # No blue surface; the rows below contain blue axes.
+        self.assertEqual((one[:240, ..., 2].astype(int) - one[:240, ..., 0] > 30).sum(), 0)
         behind = self.picture("--figure", "surface", "--view", "back", "--size", "500x300", name="r.png")
         self.assertFalse(np.array_equal(one, behind))
 
@@ -100,7 +101,7 @@ class Pictures(Case):
         self.nest(0)
         write_nrrd(self.out / "grey.nrrd", (33,) * 3, np.full(33**3, 128, np.uint8).tobytes(), 1, (-16,) * 3)
         pixels = self.picture("--image", "grey.nrrd", "--figure", "slices", "--slices", 1, "--size", "1200x1200").astype(int)
-        blueness = pixels[:1100, ..., 2] - pixels[:1100, ..., 0]  # without the legend
+        blueness = pixels[:1100, ..., 2] - pixels[:1100, ..., 0]  # rows above the legend
         self.assertGreater((blueness > 40).sum(), 800)
         self.assertGreater((blueness < -40).sum(), 800)
 

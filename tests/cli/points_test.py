@@ -17,7 +17,7 @@ import numpy as np
 
 from cli_test import Case
 
-# An image whose axes, voxel sizes and origin are all different.
+# Sizes, spacings and coordinates of the origin differ between the axes, so that exchanged axes change the results.
 SIZES = (60, 50, 16)
 SPACING = (0.5, 0.4, 2.0)
 ORIGIN = (12.0, 31.0, 207.0)
@@ -95,7 +95,7 @@ class Formats(PointsCase):
     def same_place(self, path, *more):
         got = self.converted(path, *more)
         self.assertEqual(len(got), len(self.world))
-        # polygons of an archive come in the order of the archive
+        # Sorted, because the polygons of a ZIP archive are read in the order of the archive.
         for a, b in zip(sorted(got), sorted(self.world)):
             for u, v in zip(a, b):
                 self.assertAlmostEqual(u, v, delta=1e-4)
@@ -122,7 +122,7 @@ class Formats(PointsCase):
         self.assertIn("Cell Counter (1 type), slices from 1", self.run_covol("info", path).stdout)
 
     def test_fiji_results(self):
-        # Fiji stores the spacing but no origin
+        # Fiji writes x and y in the unit of the image, but without its origin.
         rows = [(n + 1, 200, p[0] * SPACING[0], p[1] * SPACING[1], p[2] + 1) for n, p in enumerate(self.marks)]
         path = self.write("Results.csv", rows, " ,Mean,X,Y,Slice\n", ",")
         self.same_place(path)

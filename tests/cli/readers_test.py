@@ -27,8 +27,8 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-# An ellipsoid with three different axes, away from the image's middle, with anisotropic voxels: rotations, reflections and shifts give another body.
-# Micrometres.
+# An ellipsoid with three different axes, away from the image's centre, with anisotropic voxels: a rotation, a
+# reflection or a shift gives a different body. Lengths are in micrometres.
 SPACING = (0.5, 0.4, 0.75)
 SIZE = (44, 52, 30)
 ORIGIN = (10.0, -20.0, 5.0)
@@ -36,9 +36,10 @@ CENTRE = (20.2, -9.1, 16.5)
 AXES = (6.5, 4.0, 8.0)
 H = 0.4
 
-VERTEX = 1e-5   # um: single precision at these coordinates
-MEASURE = 1e-5  # relative: volume and area of the same triangles
-BODY = 1.0      # voxels of the image: tolerance for bounding boxes, and for the distance of misclassified voxels from the ellipsoid
+VERTEX = 1e-5   # um; tolerance for vertices: single precision at these coordinates
+MEASURE = 1e-5  # relative tolerance for volume and area of the same triangles
+# tolerance, in voxels of the image, for bounding boxes and for the distance of misclassified voxels from the ellipsoid.
+BODY = 1.0
 
 
 def voxel_places():
@@ -109,7 +110,7 @@ class Meshes(Job):
         faces = vtk_to_numpy(made.GetPolys().GetConnectivityArray()).reshape(-1, 3)
         vertices = vtk_to_numpy(made.GetPoints().GetData())
         normals = made.GetPointData().GetNormals()
-        if name.endswith(".glb"):  # y is up in this format
+        if name.endswith(".glb"):  # in glTF, y is up: the rotation is undone
             vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], 1)
         return vertices, faces, None if normals is None else vtk_to_numpy(normals)
 
@@ -130,7 +131,7 @@ class Meshes(Job):
                 self.assertEqual(len(t), len(faces))
                 np.testing.assert_allclose(v[t].reshape(-1, 3).min(0), vertices.min(0), atol=VERTEX)
                 np.testing.assert_allclose(v[t].reshape(-1, 3).max(0), vertices.max(0), atol=VERTEX)
-                # The corners of the triangles in order: the same triangles with the same orientation.
+                # Triangles are equal corner by corner, so that they have the same order and orientation.
                 np.testing.assert_allclose(v[t], vertices[faces], atol=VERTEX)
                 np.testing.assert_allclose(signed_volume(v, t), signed_volume(vertices, faces), rtol=MEASURE)
                 np.testing.assert_allclose(area(v, t), area(vertices, faces), rtol=MEASURE)
@@ -152,7 +153,7 @@ class Meshes(Job):
         self.assertEqual(grid.gridClass, "level set")
         np.testing.assert_allclose(grid.transform.voxelSize(), H, rtol=1e-6)
         values = grid.getConstAccessor()
-        # At a mesh's vertices the level set is 0; a voxel further out it is positive, further in negative.
+        # At the vertices of the mesh the level set is about 0, one voxel outward about +1 voxel, one voxel inward -1.
         normal = np.zeros_like(vertices, dtype=float)
         face_normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
         for n in range(3):
@@ -184,7 +185,8 @@ class Meshes(Job):
 
     def test_compressions(self):
         expected = pyopenvdb.read(str(self.out / "e.vdb"), "surface")
-        # OpenVDB compresses level sets and fog volumes by Blosc or not at all, whatever was requested; other grids also by zip.
+        # OpenVDB does not apply zip to level sets and fog volumes, even if it was requested: only Blosc or no
+        # compression. A distance grid, which is neither, is compressed by zip.
         for packing in "zip", "none":
             self.run_covol("distance", "e.xyz", "-o", f"d_{packing}.vdb", "--voxel-size", "0.5", "--compression", packing,
                            "--quiet")
@@ -273,7 +275,7 @@ class Masks(Job):
         voxels, spacing, _ = self.by_vtk("m.nii.gz", reader)
         for matrix in reader.GetQFormMatrix(), reader.GetSFormMatrix():
             affine = np.diag([-1, -1, 1, 1]) @ [[matrix.GetElement(r, c) for c in range(4)] for r in range(4)]
-            # VTK stores the spacing separately: its matrix is a rotation.
+            # In VTK the spacing is separate from the matrix, which is a rotation.
             np.testing.assert_allclose(np.abs(affine[:3, :3]).max(1), 1, atol=1e-5)
             self.expect("VTK", voxels, spacing, affine[:3, 3])
 
@@ -286,9 +288,9 @@ class Masks(Job):
         with tifffile.TiffFile(self.out / "m.ome.tif") as tiff:
             pixels = tifffile.xml2dict(tiff.ome_metadata)["OME"]["Image"]["Pixels"]
             self.expect("tifffile, OME", tiff.asarray(), [pixels[f"PhysicalSize{axis}"] for axis in "XYZ"])
-        for name in "m.tif", "m.ome.tif":  # libtiff, a different decoder for the same pages
+        for name in "m.tif", "m.ome.tif":  # VTK decodes the pages by libtiff, unlike tifffile
             reader = vtkTIFFReader()
-            reader.SetOrientationType(1)  # the first row is at the top, and stays the first
+            reader.SetOrientationType(1)  # orientation top left: VTK does not reverse the rows
             voxels, _, _ = self.by_vtk(name, reader)
             if name == "m.tif" or voxels.shape == SIZE[::-1]:
                 self.expect(name, voxels[:, ::1])

@@ -37,7 +37,7 @@ class Recipes(unittest.TestCase):
         self.assertLessEqual({step[0] for step in steps}, {"FROM", "COPY", "WORKDIR", "RUN", "USER", "ENTRYPOINT", "CMD"})
         self.assertEqual([step[1] for step in steps if step[0] == "ENTRYPOINT"], ['["covol"]'])
         last = [n for n, step in enumerate(steps) if step[0] == "FROM"][-1]
-        self.assertIn("USER", [step[0] for step in steps[last:]])  # not run as root
+        self.assertIn("USER", [step[0] for step in steps[last:]])  # the image that is shipped does not run as root
         self.expect_commands(text)
 
     def test_conda(self):

@@ -62,7 +62,8 @@ class Sets(Case):
             new += self.state() != last
         self.assertEqual(code, 0)
         self.assertEqual(self.state(), sets[choice])
-        # Each of the five outputs was put in place by a separate call, and a run that was killed between these calls was completed.
+        # A separate call puts each of the outputs in place. If the run was killed between these calls, the next run
+        # completed the set: there are at least as many such kills as outputs.
         self.assertGreaterEqual(new, len(sets[0]))
         self.assertGreater(call, 2 * len(sets[0]))
 
@@ -105,7 +106,7 @@ class Sets(Case):
 
 class Inputs(Case):
     def test_an_image_that_is_cut_short_while_it_is_read(self):
-        size = 704  # a file this large is mapped
+        size = 704  # 350 MB: a file this large is mapped into memory instead of read
         image, points = self.inputs / "large.nrrd", self.inputs / "marks.xyz"
         write_nrrd(image, (size,) * 3, b"", spacing=1, origin=(0, 0, 0))
         with open(image, "r+b") as file:
@@ -148,7 +149,8 @@ class Inputs(Case):
 class Memory(Case):
     """--memory-limit bounds the program's memory in every phase."""
 
-    # Memory of a program that has not done anything yet, and its possible growth between two checks.
+    # Bytes by which the peak may exceed the limit: the memory of the program before it reads anything, and what it may
+    # allocate between two checks of the limit.
     OWN = 76 << 20
 
     def peak(self, *words):
@@ -189,7 +191,8 @@ class Memory(Case):
         self.stay_within({
             "distance": ["distance", "t.ply", "--like", "t.nrrd", "-o", "o.vdb", "--max-distance", "30vx"],
             "band": ["band", "d.vdb", "-o", "o.vdb", "--tag-distance", "3vx"],
-            "evolve": ["evolve", "b.vdb", "--distance", "d.vdb", "-o", "o.vdb", "--rho", 0, "--max-steps", 3],  # all take the same memory
+            # All steps need the same memory.
+            "evolve": ["evolve", "b.vdb", "--distance", "d.vdb", "-o", "o.vdb", "--rho", 0, "--max-steps", 3],
             "surface": ["surface", "b.vdb", "-o", "o.vdb"],
             "convert": ["convert", "t.nrrd", "o.vdb"],
             "fine mesh": ["mesh", "b.vdb", "-o", "o.ply"],
@@ -266,9 +269,10 @@ class Damaged(Case):
         kind = b"\x0d\0\0\0__delayedload"
         begin = data.index(kind) + len(kind)
         length, leaves, packed = struct.unpack_from("<3I", data, begin)
-        self.assertEqual(packed, 0)  # a byte for each leaf, uncompressed; then eight for each in a Blosc block
+        self.assertEqual(packed, 0)  # 0: a byte per leaf, uncompressed; a Blosc block with 8 bytes per leaf follows
         block = begin + 12 + leaves
-        header = struct.unpack_from("<5I", data, block)  # packed size; versions; size, size of its blocks, packed size
+        # 4-byte numbers: packed size, versions, unpacked size, block size, packed size.
+        header = struct.unpack_from("<5I", data, block)
         self.assertEqual(header[2::2], (8 * leaves, header[0]))
         for place, value in ((begin + 4, leaves + 1), (begin + 4, 2**32 - 1), (begin + 8, 2**32 - 2), (begin + 8, 7), (begin + 8, leaves),
                              (block, 2**32 - 2), (block, 7), (block, header[0] - 1), (block + 8, 2**31 - 1), (block + 16, header[0] + 100)):

@@ -20,7 +20,8 @@ except ImportError:
     webdriver = By = Keys = WebDriverWait = None
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-EVIL = "<!--<script>alert(1)\"&amp;'"  # names of structures cannot contain a slash
+# Markup that must stay text; without a slash, which names of structures cannot contain.
+EVIL = "<!--<script>alert(1)\"&amp;'"
 MB = 1e6
 COARSE = ("--voxel-size", 2 * H)
 
@@ -81,7 +82,8 @@ class BrowserCase(PageCase):
         self.driver.get_log("performance")
         self.load(page.as_uri())
         self.addCleanup(self.quiet)
-        # The next test starts from an empty state.
+        # The page cannot save its state any more, and what it saved is removed: the next test starts from an empty
+        # state.
         self.addCleanup(self.js, "Storage.prototype.setItem = () => {}; localStorage.clear(); sessionStorage.clear()")
 
     def load(self, address):

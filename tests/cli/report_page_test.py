@@ -34,7 +34,7 @@ class Page(PageCase):
         self.assertEqual(sorted(data["facts"]["given"]), ["image", "output", "points", "report", "voxel-size"])
         self.assertTrue(data["facts"]["command_line"].startswith("covol segment "))
         self.assertEqual(report["page"]["bytes"], (self.out / "s.html").stat().st_size)
-        # Marks are consecutive floats.
+        # Compressed marks: x, y, z of each as 4-byte floats, thus 12 bytes for each of 60 marks.
         first = zlib.decompress(base64.b64decode(ball["marks"]["data"]))
         self.assertEqual(len(first), 60 * 12)
         self.assertIn("suggestions", report["evidence"])
@@ -45,7 +45,7 @@ class Page(PageCase):
         a, b = (data_of(self.out / name) for name in ("a.html", "b.html"))
         self.assertEqual(a["structures"][0]["mesh"]["corners"], b["structures"][0]["mesh"]["corners"])
         self.assertEqual(a["image"]["slices"], b["image"]["slices"])
-        self.assertEqual(b["facts"]["resolved"], a["facts"]["resolved"])  # kept in the .vdb
+        self.assertEqual(b["facts"]["resolved"], a["facts"]["resolved"])  # the .vdb contains the options of the run
 
     def test_facts_of_the_run(self):
         self.segment(*COARSE, "--json", "s.json")
@@ -90,7 +90,7 @@ class Page(PageCase):
         import nibabel
         import numpy
         values = numpy.frombuffer(self.image.read_bytes()[-SIZE ** 3:], numpy.uint8).reshape((SIZE,) * 3).T
-        affine = numpy.diag([-H, -H, H, 1.0])  # NIfTI's world is RAS
+        affine = numpy.diag([-H, -H, H, 1.0])  # world of NIfTI is RAS: x and y have the opposite sign
         affine[:3, 3] = [-ORIGIN[0], -ORIGIN[1], ORIGIN[2]]
         nibabel.save(nibabel.Nifti1Image(values, affine), self.out / "ball.nii.gz")
         self.run_covol("segment", "ball.nii.gz", "--points", self.few, *COARSE, "-o", "s.vdb", "--report", "s.html")
@@ -124,7 +124,7 @@ class Browser(BrowserCase):
             }
             return Math.max(...out);""")
         self.assertLess(edges, 1.0)
-        self.assertGreater(edges, 0.5)  # and it is not small
+        self.assertGreater(edges, 0.5)  # the surface fills more than half of the view
 
     def test_surface_planes_and_switches(self):
         self.open(self.two())
@@ -186,15 +186,15 @@ class Browser(BrowserCase):
             panel.draw();
             for (const name of ['beginPath', 'moveTo', 'lineTo', 'stroke']) delete context[name];
             return drawn.map((line) => line.map(([x, y]) => panel.plane.unplace(x, y)).map(([x, y]) => Math.hypot(x - middle, y - middle)));""")
-        self.assertGreaterEqual(len(radii), 2)  # of both structures
+        self.assertGreaterEqual(len(radii), 2)  # outlines of both structures
         for line in radii:
             self.assertGreater(min(line), RADIUS / H - 2.5)
             self.assertLess(max(line), RADIUS / H + 2)
 
     def test_a_suggestion_is_jumped_to(self):
-        half = self.inputs / "half.xyz"  # no marks in the upper half
+        half = self.inputs / "half.xyz"  # marks only in the lower half, and one at the upper pole
         write_xyz(half, [p for p in sphere_points(120) if p[2] < CENTER[2] + 1] + [(CENTER[0], CENTER[1], CENTER[2] + RADIUS)])
-        half_image = self.inputs / "half.nrrd"  # and nothing visible there either
+        half_image = self.inputs / "half.nrrd"  # an image that is dark in the upper half
         write_nrrd(half_image, (SIZE,) * 3, ball_bytes()[:SIZE ** 3 // 2] + bytes([20]) * (SIZE ** 3 // 2))
         self.open(self.page_of("half", "segment", half_image, "--points", half, "-o", "s.vdb", "--suggest", 2))
         buttons = self.driver.find_elements(By.CSS_SELECTOR, ".suggestion")
@@ -208,9 +208,9 @@ class Browser(BrowserCase):
         self.assertNotEqual(self.picture()[1], before)
         self.assertEqual(buttons[0].get_attribute("aria-current"), "true")
         count = len(self.marks())
-        self.keys(Keys.ENTER)  # the focus is on the button: goes there again
+        self.keys(Keys.ENTER)  # presses the focused button again, which sets no mark
         self.js("document.activeElement.blur()")
-        self.keys(Keys.ENTER)  # the border is at the crosshair's ring
+        self.keys(Keys.ENTER)  # without focus: sets a mark at the crosshair's ring
         self.assertEqual(len(self.marks()), count + 1)
 
     def test_dark_light_and_a_phone(self):
@@ -232,7 +232,7 @@ class Browser(BrowserCase):
         WebDriverWait(self.driver, 60).until(lambda d: d.execute_script("return Boolean(window.covolReport?.done)"))
         self.assertIn("no WebGL", self.driver.find_element(By.CSS_SELECTOR, ".three .notice").text)
         self.assertGreater(len(self.slice_picture(2)), 2000)
-        self.driver.get_log("browser")  # three.js logs that it has no context
+        self.driver.get_log("browser")  # discards what three.js logs: it has no WebGL context
 
     def test_points_alone_have_no_slices(self):
         self.open(self.page_of("cloud", "reconstruct", self.points, "-o", "s.vdb"))
@@ -258,7 +258,7 @@ class Browser(BrowserCase):
         self.assertLess(page.stat().st_size, 15 * MB)
         self.open(page)
         print(f"page of {page.stat().st_size / MB:.1f} MB: first view after {self.js('return report.ready'):.0f} ms, all slices after {self.js('return report.decoded'):.0f} ms")
-        self.assertLess(self.js("return report.ready"), 20000)  # generous: both cores of the machine may be busy
+        self.assertLess(self.js("return report.ready"), 20000)  # ms; a wide limit, because the machine may be busy
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ class Viewer(BrowserCase):
         zoom = self.js("return report.state.get('views')[2].zoom")
         self.assertGreater(zoom, 1.2)
         after = self.spot(2, [*place, 20])
-        self.assertLess(math.hypot(after[0] - spot[0], after[1] - spot[1]), 1.5)  # at the cursor
+        # px: the wheel zooms about the cursor, so that the position under it stays.
+        self.assertLess(math.hypot(after[0] - spot[0], after[1] - spot[1]), 1.5)
         self.mouse(("move", *spot), ("down", 1), ("move", spot[0] + 40, spot[1] + 30), ("up", 1))
         after = self.spot(2, [*place, 20])
         self.assertLess(math.hypot(after[0] - spot[0] - 40, after[1] - spot[1] - 30), 1.5)
@@ -36,8 +37,9 @@ class Viewer(BrowserCase):
         self.assertIn("voxel 20, 20, 20", cursor)
         image = data_of(self.two())["image"]
         value = float(re.search(r"value \u2248\u2009([\d.]+)", cursor)[1])
-        self.assertGreater(value, image["black"] + 0.8 * (image["white"] - image["black"]))  # the inside of the ball
-        self.load(self.driver.current_url)  # the view is kept after a reload
+        # Voxel 20, 20, 20 is in the bright ball.
+        self.assertGreater(value, image["black"] + 0.8 * (image["white"] - image["black"]))
+        self.load(self.driver.current_url)  # a reload: zoom and window are kept
         self.assertAlmostEqual(self.js("return report.state.get('views')[2].zoom"), zoom)
         self.assertEqual(self.js("return report.state.get('window')"), window)
         self.js("document.activeElement.blur()")
@@ -73,12 +75,12 @@ class Viewer(BrowserCase):
         self.assertNotEqual(self.slice_picture(2), before)
         where = self.driver.find_element(By.CSS_SELECTOR, ".axis-2 .where")
         self.assertIn("12 of 0\u201339", where.text)
-        where.click()  # counted as in Fiji
+        where.click()  # changes the slice numbers to count from 1, as in Fiji
         WebDriverWait(self.driver, 10).until(lambda _: "13 of 1\u201340" in where.text)
         spot = self.spot(2, [15, 25, 12])
         self.mouse(("wheel", *spot, 100))
         self.assertEqual(self.slices()[2], 13)
-        self.click(2, [15, 25, 13])  # the crosshair is the initial tool
+        self.click(2, [15, 25, 13])  # the initial tool is the crosshair, which moves to the click
         self.assertEqual(self.slices(), [15, 25, 13])
         self.keys("]", Keys.ARROW_LEFT)
         self.assertEqual(self.slices(), [14, 25, 14])
@@ -106,7 +108,7 @@ class Viewer(BrowserCase):
         self.keys("z")
         self.load(self.driver.current_url)
         kept = self.marks()
-        self.assertEqual(len(kept), given + 3)  # a reload loses none
+        self.assertEqual(len(kept), given + 3)  # all marks are there after the reload
         self.assertEqual(self.downloads(), {"first_marks.csv", "first_new_marks.csv", "first_inside.csv", "structures.csv", *self.second_files()})
         for name, count in (("first_marks.csv", given + 2), ("first_inside.csv", 1)):
             rows = self.rows(name)
@@ -126,7 +128,8 @@ class Viewer(BrowserCase):
         self.assertNotEqual(self.picture()[1], before)
         normal, eye = self.js("const v = report.view, e = v.camera.position.clone().sub(v.controls.target).normalize(); return [report.state.get('oblique').normal, e.toArray()]")
         self.assertLess(math.dist(normal, eye), 1e-6)
-        # In the middle of the ball the value is that of the ball, at its rim that of the background.
+        # The oblique plane goes through the middle of the ball: bright at the middle of the picture, dark beyond the
+        # ball.
         values = self.js("""
             const {pixels} = report.view.oblique, n = Math.sqrt(pixels.length / 4), at = (x, y) => pixels[4 * (Math.round(y * (n - 1)) * n + Math.round(x * (n - 1)))];
             return [at(0.5, 0.5), at(0.5, 0.72), at(0.72, 0.5)];""")

@@ -92,7 +92,7 @@ class Rerun(Case):
             with self.subTest(name=name, value=value[:40]):
                 self.write_with("t.vdb", {name: value})
                 self.assertIn(expected_text, self.run_covol("rerun", "t.vdb", code=3).stderr)
-        # Outputs are written only to where they belong.
+        # The output path in the metadata leads out of the folder. The run ignores it and writes only the file of -o.
         self.write_with("t.vdb", {"covol_options": json.dumps(options | {"output": "../../away.vdb"})})
         before = self.files()
         self.assertIn("bit-identical", self.run_covol("rerun", "t.vdb", "-o", "again.vdb").stdout)
@@ -109,7 +109,7 @@ class Rerun(Case):
             while "running" not in run.stderr.readline():
                 self.assertIsNone(run.poll(), "ended before the signal")
             run.terminate()
-            run.communicate(timeout=60)  # this ends with the last process that has the stream open, which is the inner run
+            run.communicate(timeout=60)  # waits for the inner run, too: it has the same stderr
         finally:
             run.kill()
         self.assertEqual(run.returncode, 130)

@@ -15,12 +15,12 @@ from tilted_test import rotation
 
 RADII, CENTRE = np.array([6.0, 4.5, 3.5]), np.array([3.0, -2.0, 1.0])
 VOLUME = 4 / 3 * math.pi * RADII.prod()
-AXES = rotation((1, 2, 3), 0.7)  # columns: axes of the ellipsoid
+AXES = rotation((1, 2, 3), 0.7)  # columns: directions of the ellipsoid's axes
 
 
 def section(normal, offset, count=48, radii=RADII, axes=AXES):
     """The ellipsoid's outline in the plane normal . (x - CENTRE) = offset; empty if they do not meet."""
-    n = axes.T @ normal * radii  # the plane in coordinates in which the ellipsoid is the unit ball
+    n = axes.T @ normal * radii  # normal of the plane after the map that makes the ellipsoid a unit ball
     reach = np.linalg.norm(n)
     if abs(offset) >= 0.98 * reach:
         return None

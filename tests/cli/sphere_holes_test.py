@@ -49,7 +49,8 @@ class SphereHoles(unittest.TestCase):
     def test_points_complete_the_sphere(self):
         for kind in KINDS:
             with self.subTest(kind=kind):
-                # The shell is two voxels thick, and its two edges appear as one: between them the surface is within the shell.
+                # The shell is two voxels thick, and its inner and outer edge cannot be resolved. The mean distance of the
+                # surface from the outer edge is only expected to be less than this thickness.
                 self.assertLess(self.expect_points_met(f"{kind}.nrrd", f"{kind}.xyz", kind, 0.02), 2)
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
@@ -71,13 +72,15 @@ class SphereHoles(unittest.TestCase):
                 self.assertEqual(json.loads((self.out / "r.json").read_text()).get("warnings", []), [])
 
     def test_the_image_alone_spans_flat_discs(self):
-        # The minimal surface across a round hole is the disc bounded by its rim; the cap of the sphere is 2.7 voxels higher.
+        # Without points, curvature spans a round hole by a minimal surface: the disc bounded by the hole's rim. The
+        # sphere is up to 2.7 voxels farther out there.
         self.run_covol("segment", "round.nrrd", "--theta", 0, *START, "-o", "s.vdb", "--mesh", "m.ply")
         vertices = quality.read_vertices(self.out / "m.ply")
         axis = np.abs(vertices).argmax(1)
         rows = np.arange(len(vertices))
         height, a, b = np.abs(vertices[rows, axis]), vertices[rows, (axis + 1) % 3], vertices[rows, (axis + 2) % 3]
-        # The hole is a cylinder of radius 0.30 through the shell; its wall ends on the inner and the outer sphere.
+        # The hole is a cylinder of radius 0.30 through the shell. The disc can lie between the two circles in which the
+        # cylinder meets the inner and the outer sphere of the shell: at the heights lowest and highest.
         lowest, highest = (np.sqrt((quality.RADIUS + side * quality.THICKNESS / 2) ** 2 - 0.30 ** 2) for side in (-1, 1))
         side = np.sign(vertices[rows, axis])
         for hole in [(n, s) for n in range(3) for s in (-1, 1)]:

@@ -10,7 +10,7 @@ import unittest
 
 from cli_test import H, ORIGIN, SIZE, Case, sphere_points, write_nrrd, write_xyz
 
-RADIUS, LEFT, RIGHT = 3.5, (9.5, 19.5, 19.5), (29.5, 19.5, 19.5)  # voxels
+RADIUS, LEFT, RIGHT = 3.5, (9.5, 19.5, 19.5), (29.5, 19.5, 19.5)  # radius and centres of two balls, in voxels
 
 
 def on_ball(middle, count=80):
@@ -117,12 +117,12 @@ class Columns(TwoBalls):
         volumes = self.volumes(self.inputs / "m.roi", "--structure-column", "counter")
         self.assertEqual(list(volumes), ["counter 0", "counter 1"])
         for volume, true in zip(volumes.values(), truth.values()):
-            self.assertAlmostEqual(volume / true, 1, delta=0.2)  # whole pixels
+            self.assertAlmostEqual(volume / true, 1, delta=0.2)  # coordinates in the .roi are whole pixels
         cell_counter(self.inputs / "cells.xml", self.marks)
         by_type = self.volumes(self.inputs / "cells.xml", "--structure-column", "type")
         self.assertEqual(list(by_type), list(self.marks))
         for volume, same in zip(by_type.values(), volumes.values()):
-            self.assertAlmostEqual(volume / same, 1, delta=0.01)  # the same marks as those of the multi-point, in another order
+            self.assertAlmostEqual(volume / same, 1, delta=0.01)  # same marks as in m.roi, in another order
 
     def test_lines_keep_together(self):
         rows = []
@@ -135,7 +135,8 @@ class Columns(TwoBalls):
         report = self.report("segment", self.scene, "--contours", table, "--structure-column", "cell", "-o", "s.vdb")
         for one in report["structures"]:
             self.assertEqual(one["input"]["contours"]["closed"], 6)
-            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.25)  # the body is seven voxels across
+            # A wide tolerance: the body is seven voxels across.
+            self.assertAlmostEqual(one["surface"]["volume"] / (4 / 3 * math.pi * (RADIUS * H) ** 3), 1, delta=0.25)
 
     def test_what_does_not_fit_is_reported(self):
         table = self.write("both.csv", ["x", "y", "z", "cell"], [[*to_world(p), name] for name, p in self.mixed()])

@@ -63,7 +63,7 @@ def nrrd_keys(path):
 
 
 class Structures(Case):
-    LEFT, RIGHT, RADIUS = (-3.0, 0.2, 0.0), (3.0, -0.1, 0.1), 4.5  # the balls overlap by 3 units
+    LEFT, RIGHT, RADIUS = (-3.0, 0.2, 0.0), (3.0, -0.1, 0.1), 4.5  # two balls that overlap by 3 units of length
 
     @classmethod
     def setUpClass(cls):
@@ -103,11 +103,11 @@ class Structures(Case):
             self.assertEqual(s["solve"]["stop_reason"], "steady")
             self.assertTrue(s["surface"]["closed"])
             self.assertEqual((s["surface"]["components"], s["surface"]["genus"]), (1, 0))
-            # The steady surface is 0.1 voxel inside the points; the radius is 9 voxels.
+            # The steady surface is 0.1 voxel inside the points, at a radius of 9 voxels: 3 % of the volume.
             self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.045)
             for field in ("resolved", "automatic", "grid", "fit", "guess"):
                 self.assertIn(field, s)
-            # The caps of height 1.5, a sixth of each ball, were assigned to the other structure, so that the marks on them lie outside.
+            # Each ball has lost a cap of height 1.5 to the other structure: its marks on that cap lie outside of it.
             self.assertGreater(s["fit"]["points_to_surface"]["bias"], 0.08)
             self.assertGreater(s["fit"]["marks_off"]["count"], 20)
             self.assertAlmostEqual(s["fit"]["marks_off"]["farthest"]["distance"], 1.5, delta=0.2)
@@ -120,7 +120,7 @@ class Structures(Case):
             self.assertAlmostEqual(float(row["volume"]), s["surface"]["volume"], places=3)
             self.assertAlmostEqual(float(row["area"]), s["surface"]["area"], places=3)
             self.assertTrue(0.8 < float(row["sphericity"]) < 1)
-            # Along x the cap of the other structure is missing.
+            # Along x the extent ends at the plane halfway between the balls.
             self.assertAlmostEqual(float(row["extent_y"]), 2 * self.RADIUS, delta=0.3)
             self.assertAlmostEqual(float(row["extent_x"]), self.RADIUS + math.dist(self.LEFT, self.RIGHT) / 2, delta=0.3)
             self.assertEqual(float(row["centroid_x"]) > 0, s["name"] == "right")
@@ -138,7 +138,7 @@ class Structures(Case):
         x, y, z = lattice()
         a = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.LEFT))) - self.RADIUS
         b = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.RIGHT))) - self.RADIUS
-        # Voxels that are more than one voxel from the decided borders.
+        # Tested are voxels more than one voxel from the surfaces and the border between the balls.
         self.assertTrue(np.all(labels[(a < -H) & (a < b - 2 * H)] == 1))
         self.assertTrue(np.all(labels[(b < -H) & (b < a - 2 * H)] == 2))
         self.assertTrue(np.all(labels[np.minimum(a, b) < -H] != 0))
@@ -187,7 +187,7 @@ class Structures(Case):
         self.assertEqual(first[1]["surface"], turned[0]["surface"])
 
     def test_nested_with_a_seed_of_one_structure(self):
-        # A shell with a cavity, and a ball whose surface is that of the cavity.
+        # The structures are a shell with a cavity, and a ball, `core`, that fills the cavity.
         points = np.concatenate([ball_points((0, 0, 0), 9, 4000), ball_points((0, 0, 0), 5)])
         shell, core = self.inputs / "shell.xyz", self.inputs / "core.xyz"
         write_points(shell, points)
@@ -198,7 +198,7 @@ class Structures(Case):
         whole = 4 / 3 * math.pi
         self.assertLess(abs(by_name["core"] / (whole * 125) - 1), 0.05)
         self.assertLess(abs(by_name["shell"] / (whole * (729 - 125)) - 1), 0.05)
-        # Without the seed the shell is a solid ball, from which the core is subtracted.
+        # Without the seed and the marks on the cavity, the shell is a solid ball, from which the core is subtracted.
         report = self.report("segment", self.scene, "--points", f"shell={self.outer()}", f"core={core}", "--rho", 0, "-o", "t.vdb")
         self.assertEqual(report["overlaps"][0]["inner"], "core")
         again = {s["name"]: s["surface"]["volume"] for s in report["structures"]}
@@ -220,7 +220,7 @@ class Structures(Case):
         self.refuse("segment", self.scene, "--points", "a=none.xyz", "-o", "s.vdb", code=4, expected_text="none.xyz")
         self.refuse("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--init", "sphere:0,0,0,5",
                     "-o", "s.vdb", code=2, expected_text="--init")
-        # A file whose own name contains the sign.
+        # The name of an existing file contains "=": the whole word is then the file, not NAME=FILE.
         odd = self.inputs / "left=1.xyz"
         odd.write_bytes(self.few_left.read_bytes())
         report = self.report("segment", self.scene, "--points", odd, "-o", "s.vdb", "--rho", 0)
@@ -289,7 +289,7 @@ class TimeLapse(Case):
             tifffile.imwrite(cls.singles[-1], frame, imagej=True, resolution=(1 / H, 1 / H),
                              metadata={"axes": "ZYX", "spacing": H, "unit": "um"})
             write_points(cls.inputs / f"marks_{t:03d}.xyz", cls.marks(t, 1500))
-            write_points(cls.inputs / f"few_{t:03d}.xyz", cls.marks(t, 100))  # enough for the first frame of a run
+            write_points(cls.inputs / f"few_{t:03d}.xyz", cls.marks(t, 100))  # sufficient for the first frame
         cls.first = cls.inputs / "few_000.xyz"
 
     @classmethod
@@ -321,7 +321,7 @@ class TimeLapse(Case):
             for a, name in enumerate("xyz"):
                 self.assertAlmostEqual(float(row[f"centroid_{name} (um)"]), center[a] + self.middle, delta=0.3 * H)
                 self.assertAlmostEqual(float(row[f"extent_{name} (um)"]), 2 * radius, delta=0.7 * H)
-        # The position, too: the mask's centre of gravity.
+        # The mask of a frame's surface has the right centre of gravity.
         for t in (0, self.FRAMES - 1):
             self.run_covol("mask", f"s_t{t:03d}.vdb", "--like", self.singles[0], "-o", "c.tif")
             where = np.argwhere(tifffile.imread(self.out / "c.tif") > 0).mean(axis=0)[::-1] * H
@@ -377,7 +377,7 @@ class TimeLapse(Case):
         process = subprocess.Popen([COVOL, "segment", *[self.singles[0]] * 2000, "--points", self.first, "-o", "s.vdb",
                                     "--table", "t.csv"], cwd=self.out, stderr=subprocess.PIPE, text=True)
         try:
-            # Each frame is reported once it is done; 1998 are left then.
+            # This line is printed when the second frame is done, and 1998 of 2000 frames are left.
             while "wrote s_t0001.vdb" not in (line := process.stderr.readline()):
                 self.assertNotEqual(line, "", "ended before the second frame")
             process.send_signal(signal.SIGINT)
@@ -392,7 +392,7 @@ class TimeLapse(Case):
         self.assertEqual(self.report("info", done[-1])["grids"][0]["name"], "surface")
 
     def test_several_structures(self):
-        # Two halves of the ball, each with its flat side marked.
+        # Two structures, the halves of a ball. Both have marks on their common flat side.
         shell = fibonacci(1500)
         for t in range(2):
             center, r = self.ball_at(t)
@@ -409,8 +409,8 @@ class TimeLapse(Case):
         before, after = ([s["surface"]["volume"] for s in frame["structures"]] for frame in report["frames"])
         for t, volumes in enumerate((before, after)):
             half = 2 / 3 * math.pi * self.ball_at(t)[1] ** 3
-            # The radius is 16 voxels: 3 % of the volume is lost since the surface is 0.1 voxel inside the points, and 1 % since it rounds the sharp
-            # rim by two voxels.
+            # At a radius of 16 voxels, 3 % of the volume is missing because the surface is 0.1 voxel inside the points,
+            # and 1 % because the sharp rim is rounded by two voxels.
             for volume in volumes:
                 self.assertTrue(0.95 < volume / half < 1, (t, volume / half))
         for old, new in zip(before, after):
@@ -425,7 +425,7 @@ class TimeLapse(Case):
                              "--table", "t.csv", "--delta", "0.3vx")
         volumes = [f["surface"]["volume"] for f in report["frames"]]
         self.assertEqual(len(volumes), 21)
-        # A droplet is incompressible; in the first frame, voxels above half maximum fill about 16 x 17 x 7 voxels.
+        # The droplet is incompressible, so that its volume must be equal in all frames, within 5 %.
         for v in volumes:
             self.assertLess(abs(v / np.median(volumes) - 1), 0.05)
 
@@ -439,14 +439,14 @@ class Evidence(Case):
         cls.scene = cls.inputs / "half.nrrd"
         image = ball_image(cls.CENTER, cls.RADIUS)
         x, _, z = lattice()
-        image[z > 0] = 20  # the upper half has faded
+        image[z > 0] = 20  # the upper half of the ball is not visible
         write_nrrd(cls.scene, (SIZE,) * 3, image.tobytes(), spacing=H, origin=ORIGIN)
         points = ball_points(cls.CENTER, cls.RADIUS, 6000)
         cls.marks = cls.inputs / "lower.xyz"
         write_points(cls.marks, points[points[:, 2] < 0])
 
     def judge(self, *more):
-        # Without steps the surface is the start, a sphere.
+        # --max-steps 0: the surface is the start, a sphere, and only the evidence is computed.
         return ("segment", self.scene, "--points", self.marks, "--init", "sphere:0,0,0,%g" % self.RADIUS, "--max-steps", 0,
                 "-o", "s.vdb", *more)
 
@@ -458,8 +458,8 @@ class Evidence(Case):
         for voxel in (1, 2):
             report = self.report("segment", self.scene, "--points", few, "--voxel-size", f"{voxel * H}", "--suggest", 2, "-o", "s.vdb")
             found.append(report["evidence"])
-            # The reach is the distance up to which the surface through the marks is accurate to a fourth of the image's voxel: 0.3 d^2 / (2 R) = H /
-            # 4.
+            # The reach d of a mark: up to this distance from it, the surface is accurate to a fourth of the image's
+            # voxel H. Its error there is 0.3 d^2 / (2 R), where R is the radius of the body.
             radius = 3 * report["surface"]["volume"] / report["surface"]["area"]
             self.assertAlmostEqual(found[-1]["reach"], math.sqrt(radius * H / 0.6), delta=0.01 * H)
         one, other = (e["unsupported_area"] / e["area"] for e in found)
@@ -478,7 +478,7 @@ class Evidence(Case):
             self.assertLess(abs(math.dist(s["world"], self.CENTER) - self.RADIUS), 0.3 * H)
             for axis in range(3):
                 self.assertAlmostEqual(s["world"][axis], ORIGIN[axis] + H * s["index"][axis], places=4)
-        # The marked half supports the sphere up to one `reach`, as a chord, beyond the equator: this is the latitude there.
+        # The marks end at the equator, and support the sphere up to a chord of length `reach` beyond: this latitude.
         angle = 2 * math.asin(report["reach"] / (2 * self.RADIUS))
         self.assertAlmostEqual(report["unsupported_area"] / report["area"], (1 - math.sin(angle)) / 2, delta=0.02)
 

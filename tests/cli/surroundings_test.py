@@ -50,7 +50,7 @@ class Run(Case):
 
 class Disks(Run):
     def test_a_quota(self):
-        # As if a quota or a file size limit ended the writing, for each output in turn.
+        # A limit for the size of files, as by a quota, lets the writing of the outputs fail. The sizes are bytes.
         before = self.with_older_outputs()
         for size in 100, 20_000, 60_000:
             with self.subTest(size):
@@ -124,7 +124,7 @@ class Names(Run):
         done = self.go(folder=folder)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual({name: hashlib.sha256(pathlib.Path(folder, name).read_bytes()).hexdigest() for name in expected}, expected)
-        # Names beyond the system's limit cause an error, and no files are left.
+        # A folder name longer than the system allows is an error.
         self.refused(self.go(folder=folder + "/" + "e" * 300), 4, "too long")
 
 
@@ -150,7 +150,7 @@ class Processes(Run):
                                       preexec_fn=lambda: [os.close(stream) for stream in closed])
                 self.assertEqual(done.returncode, 0)
                 self.assertEqual(self.files(), ["r.json", *sorted(OUTPUTS.values())])
-        # It is an error if output that was requested on such a stream cannot be written.
+        # For info, standard output is the result: it is an error if it is closed or full.
         done = subprocess.run([COVOL, "info", str(self.image)], stderr=subprocess.PIPE, timeout=300, preexec_fn=lambda: os.close(1))
         self.assertEqual(done.returncode, 4, done.stderr)
         with open("/dev/full", "w") as full:
@@ -164,7 +164,8 @@ class Processes(Run):
         done = self.go(env=keep)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.state(), expected)
-        # A run that needs a folder for temporary files, without HOME and TMPDIR, and with a TMPDIR that does not exist.
+        # rerun needs a folder for temporary files. It succeeds without HOME and TMPDIR; a TMPDIR that does not exist is
+        # an error.
         self.run_covol("segment", self.image, "--points", self.points, "--init", "tag", "--max-steps", "1", "-o", "again.vdb")
         for environment in (keep, {**keep, "TMPDIR": "/nowhere"}):
             done = subprocess.run([str(pathlib.Path(COVOL).resolve()), "rerun", "again.vdb", "--inputs", str(self.inputs), "--quiet"],
@@ -188,7 +189,7 @@ class Processes(Run):
         self.assertEqual(self.state(), expected)
 
 
-del Run, Case  # base classes without tests
+del Run, Case  # base classes: unittest would run them, too
 
 if __name__ == "__main__":
     unittest.main()

@@ -21,7 +21,7 @@ import pyopenvdb as vdb
 from cli_test import CENTER, COVOL, Case, sphere_points, write_xyz
 
 ESC = "\x1b]0;title\x07\x1b[31m"
-# Control characters except line ends, C1 in UTF-8, and characters that change the direction of writing.
+# Characters that steer a terminal: controls (C0 without line ends, C1), and those that change the direction of writing.
 STEERS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 FUZZ = pathlib.Path(__file__).resolve().parent.parent / "fuzz"
 
@@ -96,7 +96,7 @@ class Provenance(Stranger):
                 self.assertIn("bit-identical", done.stdout)
                 self.assertEqual(self.state(), before)
                 self.assertIsNone(STEERS.search(done.stderr))
-                # The command is shown in the form in which a shell accepts it.
+                # The printed command is quoted so that a shell parses it to the original words.
                 shown = next(line for line in done.stderr.splitlines() if "running covol" in line).split("running ", 1)[1]
                 words = subprocess.run(["bash", "-c", f"printf '%s\\0' {shown}"], capture_output=True, check=True).stdout.decode().split("\0")
                 self.assertEqual(os.path.normpath(words[-2]), str(self.out / name))
@@ -115,7 +115,7 @@ class Provenance(Stranger):
         self.untouched("rerun", "t.vdb", expected_text="expected a file's name")
         self.write(inputs=[])
         self.untouched("rerun", "t.vdb", expected_text="not among the inputs that the file lists")
-        os.mkfifo(self.out / "pipe")  # a pipe without a writer
+        os.mkfifo(self.out / "pipe")  # a pipe without a writer: opening it for reading would block forever
         self.write(options=facts["options"] | {"image": "pipe"}, inputs=[*facts["inputs"], {"name": "pipe", "digest": "xxh128:0"}])
         done = subprocess.run([COVOL, "rerun", "t.vdb"], cwd=self.out, capture_output=True, timeout=60)
         self.assertEqual(done.returncode, 4, done.stderr)
@@ -137,7 +137,7 @@ class Provenance(Stranger):
         for value in ("/tmp/stolen.vdb", "../../stolen.vdb", str(self.out / "ball.vdb"), "~/x.vdb"):
             self.write(options=facts["options"] | {"density": value})
             before = self.state()
-            self.run_covol("rerun", "t.vdb", code=3)  # two .vdb files with names other than t.vdb
+            self.run_covol("rerun", "t.vdb", code=3)  # neither s.vdb nor the density has the name t.vdb
             self.assertEqual(self.state(), before)
             self.assertFalse(pathlib.Path("/tmp/stolen.vdb").exists())
         for output in ("s.ply", "..", ".", "x/.."):
@@ -193,7 +193,7 @@ class Provenance(Stranger):
         time.sleep(0.5)
         run.send_signal(signal.SIGKILL)
         run.wait()
-        run.stderr.read()  # this ends with the last process that has the stream open
+        run.stderr.read()  # returns when the inner run, which has the same stderr, ends
         deadline = time.monotonic() + 30
         while (alive() or self.files() != before) and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -348,7 +348,7 @@ class Checkpoints(Stranger):
             (folder / "job.txt").write_text(text)
             self.untouched(*words, expected_text="other options")
         (folder / "job.txt").unlink()
-        os.mkfifo(folder / "job.txt")  # a pipe without a writer
+        os.mkfifo(folder / "job.txt")  # a pipe without a writer: opening it for reading would block forever
         done = subprocess.run([COVOL, *words], cwd=self.out, capture_output=True, timeout=60)
         self.assertEqual(done.returncode, 3, done.stderr)
 
@@ -368,7 +368,7 @@ class Configurations(Stranger):
                 given = ["./" + name, "ball.xyz"]
                 subprocess.run([COVOL, *words, "--points", *given, "--save-config", "c.toml"], cwd=self.out, check=True)
                 subprocess.run([COVOL, "segment", "--config", "c.toml", "--quiet", "--save-config", "d.toml", "--json", "r.json"], cwd=self.out, check=True)
-                # The line below the head is the same in both files.
+                # A configuration that was saved from a read one has the same bytes.
                 self.assertEqual((self.out / "c.toml").read_bytes(), (self.out / "d.toml").read_bytes())
                 printed = json.loads((self.out / "r.json").read_bytes().decode(errors="replace"))["options"]["points"]
                 self.assertEqual(len(printed), 2)

@@ -79,7 +79,7 @@ class OneFile(Folder):
         for name, other in ("surface", "alone.vdb"), ("density", "fog.vdb"):
             together = pyopenvdb.read(str(self.out / "both.vdb"), name)
             self.assertEqual(together.activeVoxelCount(), pyopenvdb.read(str(self.out / other), name).activeVoxelCount())
-        # Commands that need a level set choose it, and not the first grid.
+        # compare chooses the level set of both.vdb, although its first grid is the density.
         report = self.report("compare", "both.vdb", "alone.vdb")
         self.assertEqual(report["compare"]["dice"], 1)
         self.run_covol("surface", "both.vdb:surface", "-o", "again.vdb", "--density", "again.vdb", "--quiet")
@@ -117,7 +117,7 @@ class Sequences(Folder):
         movie = np.stack([np.uint8(20 + 200 * ball(c)) for c in cls.centres])
         tifffile.imwrite(cls.out / "movie.tif", movie, imagej=True, resolution=(1 / SPACING[0], 1 / SPACING[1]),
                          metadata={"axes": "TZYX", "spacing": SPACING[2], "unit": "um"})
-        # The movie has no origin in its header.
+        # The TIFF has no origin, so that positions begin at 0: the image's usual origin (10, -20, 5) is subtracted.
         np.savetxt(cls.out / "first.xyz", sphere(300, np.subtract(CENTRE, (10.0, -20.0, 5.0))))
 
     def test_names_and_scene(self):

@@ -70,7 +70,7 @@ class Wheel(unittest.TestCase):
     def test_nothing_of_this_machine(self):
         for entry in self.zip.infolist():
             self.assertFalse(entry.filename.startswith("/") or ".." in entry.filename.split("/"), entry.filename)
-            self.assertNotIn((entry.external_attr >> 16) & 0o170000, (0o120000,), entry.filename)  # no links
+            self.assertNotIn((entry.external_attr >> 16) & 0o170000, (0o120000,), entry.filename)  # no symbolic links
             if entry.filename.endswith((".py", ".pyi", "RECORD", "FILES.txt")):
                 self.assertNotIn(str(BUILD), self.zip.read(entry).decode(), entry.filename)
         listed = self.zip.read("covol/program/share/doc/covol/FILES.txt").decode().splitlines()[1:]
@@ -104,7 +104,7 @@ class Wheel(unittest.TestCase):
                 self.assertRegex(run(home / "bin/covol", "--version", env=environment), r"^covol \d")
                 folder = self.work / f"used{n}"
                 folder.mkdir()
-                # The result of the build's own program for the same job.
+                # The expected result: the same job run by the program of the build.
                 run(COVOL, "phantom", "sphere", "--size", 40, "--count", 120, "-o", "p.nrrd", "--points", "p.csv", cwd=folder)
                 run(COVOL, "segment", "p.nrrd", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--mask", "s.nrrd", "--json", "s.json",
                     cwd=folder)

@@ -45,7 +45,7 @@ checks["image"] = image.shape == (40, 40, 40) and image.dtype == voxels.dtype ==
 checks["image geometry"] = np.allclose(image.world_to_index(image.index_to_world([[1, 2, 3]])), [[1, 2, 3]])
 checks["points"] = len(marks) == 120 and marks.array.shape == (120, 3) and marks.space == "world"
 
-# From files and from arrays: exactly the program's own result.
+# segment() from files and from arrays gives exactly the result of the program covol (s.json, s.ply, s.nrrd).
 by_files = covol.segment("p.nrrd", "p.csv")
 by_arrays = covol.segment(voxels, np.asarray(marks), spacing=image.spacing, origin=image.origin, direction=image.direction)
 data = pathlib.Path("s.ply").read_bytes()
@@ -66,7 +66,7 @@ checks["log"] = isinstance(by_files.log, list) and by_files.warnings == by_files
 checks["suggest"] = all(s.area >= 0 for s in by_files.suggest(2)) and len(by_files.suggest(2)) <= 2
 checks["html"] = "covol.Result" in by_files._repr_html_() and "volume" in repr(by_files)
 
-# Other calls.
+# Further arguments of segment(), and the other functions.
 checks["index space"] = np.array_equal(covol.segment(voxels, image.world_to_index(marks)[:, ::-1], points_space="index", spacing=image.spacing,
                                                      origin=image.origin).mask, by_arrays.mask)
 checks["zyx"] = np.array_equal(covol.segment(image, np.asarray(marks)[:, ::-1], points_order="zyx").mask, by_arrays.mask)
@@ -93,7 +93,8 @@ checks["phantom"] = phantom.shape == truth.shape == (32, 32, 32) and places.shap
 covol.save_mask("labels.nii.gz", np.where(truth > 0, 300, 0), phantom)
 checks["save_mask"] = covol.read_image("labels.nii.gz").array.max() == 300
 
-# A time-lapse: one frame is invalid, the body moves along z by one voxel per frame, and the last frame has marks of its own.
+# A time-lapse of four frames: the second is invalid, the body moves along z by one voxel between the others, and the
+# last has marks of its own.
 where = dict(spacing=image.spacing, origin=image.origin)
 further = [np.roll(voxels, n, axis=0) for n in (1, 2)]
 places, step = np.asarray(marks), np.array([0, 0, image.spacing[2]])
@@ -107,7 +108,7 @@ both = list(covol.timelapse([voxels, further[0]], {"a": places, "b": {"points": 
 checks["structures of frames"] = [list(found) for found in both] == [["a", "b"]] * 2 and set(np.unique(both[1].mask)) == {0, 1, 2}
 checks["no frame succeeds"] = [e.code for e in covol.timelapse([voxels, voxels], places + 1e4, **where)] == ["invalid_input"] * 2
 
-# Errors.
+# An unknown argument raises TypeError; an invalid one raises covol.Error with a code and the name of the argument.
 checks["option that is none"] = raises(TypeError, covol.segment, image, marks, tag_distanc=3)
 checks["bad option"] = error(covol.segment, image, marks, theta=2) == ("invalid_options", "theta")
 checks["bad length"] = error(covol.segment, image, marks, tau="3px") == ("invalid_options", "tau")
@@ -118,7 +119,7 @@ seeds = list(covol.timelapse([voxels], {"points": np.asarray(marks), "inside": [
 checks["seeds of a time-lapse"] = [e.code for e in seeds] == ["unsupported"]
 checks["read_study"] = error(covol.read_study, "none")[0] == "unsupported"
 
-# Progress, exceptions from its callback, Ctrl-C, the log.
+# The log, the callback for progress, exceptions that it raises, and Ctrl-C.
 lines = []
 handler = logging.Handler()
 handler.emit = lambda record: lines.append((record.levelno, record.getMessage()))

@@ -20,7 +20,7 @@ try:
 except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
-SHAPE = (13, 21, 34)   # z, y, x: no multiple of a chunk
+SHAPE = (13, 21, 34)   # z, y, x; not multiples of CHUNKS, so that chunks at the ends are only partly used
 CHUNKS = (5, 8, 16)
 
 
@@ -250,7 +250,7 @@ class Version3(Case):
               "zstd-crc32c": [{"name": "zstd"}, {"name": "crc32c"}], "crc32c": [{"name": "crc32c"}]}
 
     def test_codecs(self):
-        self.assertEqual(crc32c(b"123456789"), struct.pack("<I", 0xE3069283))  # the usual check value
+        self.assertEqual(crc32c(b"123456789"), struct.pack("<I", 0xE3069283))  # the published check value of CRC-32C
         data = pixels("uint16")
         for name, codecs in self.CODECS.items():
             with self.subTest(name):
@@ -417,7 +417,7 @@ class Lazy(Case):
         text = self.run_covol("check", "large.zarr", "--spacing", "1,1,1")
         self.assertIn("27 of 4096 chunks were read", text.stdout + text.stderr)
 
-        # the content of a needed chunk is checked when it is read
+        # A damaged chunk that the job needs is found when it is read.
         (self.path("large.zarr") / "7.7.7").write_bytes(b"\0" * 30)
         error = self.run_covol("segment", "large.zarr", "--spacing", "1,1,1", "--points", "marks.xyz", "-o", "b.vdb", code=3).stderr
         self.assertIn("large.zarr/7.7.7", error)

@@ -1,5 +1,5 @@
-// Uses only the public headers: a sphere passes through start, surface, mesh and measure, and an exception crosses the
-// library boundary.
+// Uses only the public headers of covol: makes a start from a sphere, extracts its surface and its mesh, and measures
+// the mesh; and catches an exception that the library throws.
 #include <cmath>
 #include <cstdio>
 #include <string>

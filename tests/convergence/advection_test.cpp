@@ -72,10 +72,11 @@ TEST_CASE("a plane runs at unit speed in each of the six directions") {
             }
 }
 
-// The lag after a step is that of the beginning: (1+2c)/6 voxels for every h, which is first order.
+// With a ramp of half a voxel the start is a jump. It lags behind by (1+2c)/6 voxels, c = τ/h, from the beginning on,
+// for every h. This error is of first order.
 TEST_CASE("a plane arrives on time, first order in h, and stays") {
-    const auto [power, fraction] =
-        GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));  // of the time step, fraction * h^power
+    // The time step is fraction * h^power.
+    const auto [power, fraction] = GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));
     for (const double h : {0.1, 0.05, 0.025}) {
         const PlaneRun run{h, -0.613, 0.4, 0, 1, 0.5};
         const double way = run.to - run.from, tau = fraction * std::pow(h, power);
@@ -104,9 +105,10 @@ TEST_CASE("a plane that starts as a distance arrives on time and stays") {
     }
 }
 
-// The scheme's own error: its one-sided differences give a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
+// The error of the scheme itself: its one-sided differences give a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
 TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
-    const auto [power, fraction, maximum] =  // of the time step, fraction * h^power, and of the error, voxels
+    // The time step is fraction * h^power; `maximum` is the largest allowed error in voxels.
+    const auto [power, fraction, maximum] =
         GENERATE(table<double, double, double>({{1, 1, 0.5}, {2, 1, 0.6}, {2, 0.25, 0.6}}));
     double previous = 0;
     for (const int n : {24, 48, 96}) {

@@ -14,10 +14,10 @@ using namespace covol::test;
 
 namespace {
 
-constexpr double kStart = 1.0, kEnd = 0.7;  // radii
+constexpr double kStart = 1.0, kEnd = 0.7;  // radii of the sphere at the start and at the end
 constexpr double kTime = (kStart * kStart - kEnd * kEnd) / 4;
 
-/// Mean of | |x| - r | over the zero level set.
+/// The mean of | |x| - r | over the positions x of the zero level set.
 double radius_error(const Domain& domain, const DenseField& u, double radius) {
     const auto crossings = zero_crossings(domain, u);
     REQUIRE(crossings.size() > 50);
@@ -93,7 +93,7 @@ double tracked_error(int n, double fraction) {
     return radius_error(domain, to_dense(domain, *u), kEnd);
 }
 
-// Values frozen on the band's border slow the surface if sqrt(δτ) approaches the band's width, hence τ ~ h².
+// Values frozen on the band's border slow the surface down if sqrt(δτ) is close to the band's width. Hence τ ~ h².
 TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or better") {
     const double fraction = GENERATE(1.0, 0.25);
     double previous = 0;

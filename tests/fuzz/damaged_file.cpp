@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using covol::Image;
 
-// A damaged chunk is detected when its first voxel is read.
+// Reads the first 32^3 voxels of an image, because damaged chunks are detected only when their voxels are read.
 void touch(const Image& image) {
     covol::VoxelBox box = image.held();
     for (int a = 0; a < 3; ++a) box.max[a] = std::min(box.max[a], box.min[a] + 31);
@@ -81,7 +81,7 @@ DamagedFile::DamagedFile(const std::string& end) {
     const auto reader = kReaders.find(end);
     if (reader == kReaders.end()) throw std::invalid_argument("no reader for '" + end + "'");
     reader_ = reader->second;
-    // In a memory file system if there is one.
+    // The file is written very often, so it is in a file system in memory if there is one.
     std::string name =
         (fs::exists("/dev/shm") ? "/dev/shm" : fs::temp_directory_path().string()) + "/covol-fuzz-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for files in " + name);

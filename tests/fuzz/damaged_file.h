@@ -4,19 +4,20 @@
 #include <string>
 #include <string_view>
 
-/// Bytes as a file of some format, in a folder of their own, read by the reader that covol would use: all of the
-/// header, and of an image the first 32^3 voxels.
+/// Writes bytes to a file of a given format, in a folder of its own, and reads the file with the reader that covol uses
+/// for this format. Of an image, the header and the first 32^3 voxels are read.
 class DamagedFile {
 public:
-    /// @param end  of the file's name ("nii.gz"); "points.ply" and "image.vdb" are read as points and as an image,
-    /// "zarr" and "zarr3" are metadata followed by a NUL and the first chunk. @throws std::invalid_argument
+    /// @param end  ending of the file's name, which selects the reader ("nii.gz"). A "points.ply" is read as points, an
+    /// "image.vdb" as an image. The bytes of "zarr" and "zarr3" are the metadata, a NUL, and the first chunk.
+    /// @throws std::invalid_argument  no reader for this ending
     explicit DamagedFile(const std::string& end);
     ~DamagedFile();
     DamagedFile(const DamagedFile&) = delete;
     DamagedFile& operator=(const DamagedFile&) = delete;
 
-    /// A covol::Error is an accepted outcome; other exceptions are passed on. Aborts at a mesh or lines with indices
-    /// beyond their end.
+    /// Reads the bytes. A covol::Error of the reader is accepted and not thrown; other exceptions are thrown. Aborts if
+    /// the result is a mesh or lines with indices of vertices that do not exist.
     void read(std::string_view bytes) const;
 
 private:

@@ -26,7 +26,7 @@ import mutate
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "cli"))
-LARGEST = 1 << 16  # bytes per file
+LARGEST = 1 << 16  # maximum size of a file, in bytes
 
 
 def fiji_roi():
@@ -146,7 +146,8 @@ def seeds_of(covol, folder):
               "parameter\tunits\tbits\tum\tum\tnm\nend\n")
     values = np.arange(60, dtype="<u2").tobytes()
     seeds["ics"] = [header.encode() + values, header.replace("uncompressed", "gzip").encode() + gzip.compress(values),
-                    header.replace("ics_version\t2.0", "ics_version\t1.0").encode()]  # whose voxels are not there
+                    # The voxels of version 1.0 are in another file.
+                    header.replace("ics_version\t2.0", "ics_version\t1.0").encode()]
     write_hdf5(folder / "a.h5", lambda file, values: file.create_dataset("data", data=values, chunks=(2, 5, 6), compression="gzip"))
     write_hdf5(folder / "a.ims", imaris)
     for frames, packed in ((2, False), (1, False), (1, True)):
@@ -201,7 +202,8 @@ def fuzz(program, end, seeds, seconds, limit, keep, corpus):
         environment = os.environ | {"COVOL_FUZZ_FORMAT": end, "ASAN_OPTIONS": "allocator_may_return_null=0:detect_leaks=0:handle_abort=1",
                                     "UBSAN_OPTIONS": "print_stacktrace=1"}
         executions, computed, covered = 0, 0.0, []
-        # Wall clock time is meaningless on a shared machine: fuzzing continues until the fuzzer has used these seconds of CPU time.
+        # Fuzzing continues until the fuzzer has used `seconds` of CPU time: wall clock time depends on the load of the
+        # machine.
         while (left := seconds - computed) > 0.02 * seconds:
             took, output = run_once([str(word) for word in [*words, f"-max_total_time={max(1, int(left))}"]], environment, work)
             states = re.findall(r"^#(\d+): cov: (\d+)", output, re.MULTILINE)
@@ -209,7 +211,8 @@ def fuzz(program, end, seeds, seconds, limit, keep, corpus):
                 sys.exit(f"{end}: the fuzzer did not run:\n{output[-2000:]}")
             executions, computed = executions + int(states[-1][0]), computed + took
             covered += [int(edges) for _, edges in states]
-        # Findings are repeated in a process of their own: after thousands of damaged files a process holds leaked memory, and a busy machine is slow.
+        # Findings of too much memory or time are repeated in a new process, and dropped if they do not recur: after
+        # thousands of damaged files a process holds leaked memory, and a busy machine is slow.
         alone = [program, f"-timeout={limit}", f"-malloc_limit_mb={maximum}", "-rss_limit_mb=512"]
         findings = []
         for path in sorted(found.iterdir()):

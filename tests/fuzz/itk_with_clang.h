@@ -1,5 +1,6 @@
 #pragma once
-// ITK's generated header supports only the compiler with which the library was built: clang is presented to it as gcc.
+// itk_compiler_detection.h supports only the compiler that built ITK, which is gcc in Debian. For this header, clang
+// pretends to be gcc 12.
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wbuiltin-macro-redefined"
 #pragma push_macro("__clang__")

@@ -1,5 +1,5 @@
-// Messages of a page and lines of a journal: any text is either an action or an error, and an action that was read is
-// written as a text that reads as the same action.
+// Fuzzes the parser of actions, which are the messages of the page of `covol mark` and the lines of a journal. Any text
+// must give an action or a covol::Error, and an action must not change if it is written as text and parsed again.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

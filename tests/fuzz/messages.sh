@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Fuzzes what `covol mark` receives from a browser, requests and messages, under libFuzzer with clang's address and
-# undefined-behaviour sanitizers.
+# Fuzzes the code of `covol mark` that parses requests and messages of a browser, under libFuzzer with clang's address
+# and undefined-behaviour sanitizers.
 #
 #   bash tests/fuzz/messages.sh [SECONDS of each, 60]
 set -euo pipefail

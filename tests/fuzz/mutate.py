@@ -52,7 +52,7 @@ def mutate(data, rng):
     for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
         if not data:
             break
-        # The bytes that matter most to a reader are at the beginning or at the end.
+        # Two of three changes are in the first or the last 400 bytes, where most formats have their metadata.
         length = len(data)
         at = rng.choice((rng.randrange(length), rng.randrange(min(length, 400)), length - 1 - rng.randrange(min(length, 400))))
         kind = rng.randrange(9)
@@ -70,7 +70,7 @@ def mutate(data, rng):
         elif kind == 6:
             block = bytes(data[at:at + rng.choice((1, 8, 100, 5000))])
             data[at:at] = block * rng.choice((1, 2, 20))
-        else:  # a number in a text
+        else:  # replaces the next number that is written as text
             text = at
             while text < len(data) and not 48 <= data[text] <= 57:
                 text += 1

@@ -24,8 +24,8 @@ import pyopenvdb as vdb
 
 STEERS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 GOOD = {0, 2, 3, 4, 5, 6}
-LONG = 20       # seconds, then SIGTERM
-PATIENCE = 20   # seconds, after which it counts as hanging
+LONG = 20       # seconds after which a command gets SIGTERM
+PATIENCE = 20   # seconds after SIGTERM, after which a command counts as hanging
 
 
 class Sandbox:
@@ -183,7 +183,8 @@ def provenance(box, values, rng):
         for _ in range(rng.randrange(1, 4)):
             value = values.changed(value)
         changed[key] = json.dumps(value) if rng.random() < 0.93 else values.damaged(json.dumps(value))
-    if rng.random() < 0.5 and "covol_options" in changed:  # an option that the file states as given
+    # Lists the options as given by the user, so that rerun uses them.
+    if rng.random() < 0.5 and "covol_options" in changed:
         try:
             changed["covol_given"] = json.dumps(sorted({*json.loads(changed.get("covol_given", facts["covol_given"])), *json.loads(changed["covol_options"])} - {"command"}))
         except (TypeError, ValueError):
@@ -196,7 +197,7 @@ def provenance(box, values, rng):
         if rng.random() < 0.1:
             grid.name = values.text().replace("\0", "") or "g"
     vdb.write(str(box.here / "t.vdb"), grids, facts | changed)
-    for name in ("ball.xyz", "ball.nrrd"):  # a file with a name that the metadata may contain
+    for name in ("ball.xyz", "ball.nrrd"):  # further inputs with names that a shell or covol may misinterpret
         if rng.random() < 0.2:
             shutil.copy(box.here / name, box.here / rng.choice(["--json=stolen", "-o", "$(touch stolen)", "a=b", "\x1b[31m"]))
     yield ["rerun", "t.vdb", "--memory-limit", "600M"], []
@@ -259,18 +260,20 @@ def config(box, values, rng):
         kind = rng.randrange(3)
         if kind == 0:
             text = values.damaged(text)
-        elif kind == 1:  # a quoted TOML string
+        elif kind == 1:  # adds an option with a random name and value
             name = rng.choice(["points", "image", "init", "theta", "delta", "exterior-seed", "segment.theta", "quiet", "mesh", "[x]\nname", values.text().replace("\n", "")])
             text += f"\n{name} = {rng.choice((json.dumps(values.text()), str(rng.choice(values.numbers)), json.dumps([values.text(), values.text()])))}\n"
         else:
             text = re.sub(r'"[^"\n]*"', lambda m: json.dumps(values.text()) if rng.random() < 0.4 else m[0], text)
-    # A configuration belongs to the user and may name outputs, as a command line may: they are removed here.
+    # A configuration may name outputs, as a command line may. These options are removed here, so that any other file
+    # that is written is a finding.
     text = "\n".join(line for line in text.splitlines() if not re.match(r"\W*(segment\W+)?(json|checkpoint|resume|output|mesh|mask|report|density|fields|table|usda|evidence|keep-failed)\b", line))
     (box.here / "c.toml").write_text(text, errors="replace")
     yield ["segment", "--config", "c.toml", "-o", "c.vdb", "--save-config", "again.toml", "--memory-limit", "600M"], ["inputs/(c\\.vdb|again\\.toml)"]
     for shell in ("sh", "bash"):
         subprocess.run([shell, "-c", ". ./again.toml"], cwd=box.here, capture_output=True, stdin=subprocess.DEVNULL, timeout=60)
-    yield ["info", "ball.nrrd"], ["inputs/(c\\.vdb|again\\.toml)"]  # and then the effects of the shell are checked
+    # After this command, files that the shell created are found.
+    yield ["info", "ball.nrrd"], ["inputs/(c\\.vdb|again\\.toml)"]
 
 
 def names(box, values, rng):

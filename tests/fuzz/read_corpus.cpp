@@ -2,8 +2,9 @@
 //
 //   read_corpus FOLDER
 //
-// The name of a file is printed before it is read, so that the last name is that of the file that crashed or hung. Exit
-// code 1 if a file needs more memory than 64 MB and ten times its size, or throws anything but a covol::Error.
+// The name of a file is printed before the file is read: if the program crashes or hangs, the last name is that of the
+// file that caused it. The exit code is 1 if a file needs more memory than 64 MB plus ten times its size, or if reading
+// it throws anything but a covol::Error.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -21,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A number in /proc/self/status, in bytes.
+/// The number after `key` in /proc/self/status, which is in kB there, converted to bytes.
 std::uint64_t status_of(const std::string& key) {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
@@ -41,7 +42,7 @@ bool read(const DamagedFile& file, const fs::path& path) {
     std::ifstream stream(path, std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
     std::cout << path.string() << std::endl;
-    std::ofstream("/proc/self/clear_refs") << 5;  // resets the peak
+    std::ofstream("/proc/self/clear_refs") << 5;  // 5: resets VmHWM, the peak of resident memory
     const std::uint64_t before = status_of("VmRSS");
     try {
         file.read(bytes);
@@ -66,5 +67,5 @@ int main(int argc, char** argv) {
         for (const fs::path& path : sorted(format)) good = read(file, path) && good;
     }
     std::cout.flush();
-    std::_Exit(good ? 0 : 1);  // HDF5's library prints errors at exit because of damaged headers
+    std::_Exit(good ? 0 : 1);  // at a normal exit, the HDF5 library prints errors about damaged files
 }

@@ -1,7 +1,8 @@
-// Each reader under a coverage-guided fuzzer (clang's libFuzzer): tests/fuzz/run.sh builds and runs it.
+// Fuzzes a reader of files with libFuzzer, clang's coverage-guided fuzzer; tests/fuzz/run.sh builds and runs this
+// program.
 //
-// COVOL_FUZZ_FORMAT is the end of the file's name, which selects the reader. Exceptions other than covol::Error, and
-// reports of a sanitizer, are findings.
+// The environment variable COVOL_FUZZ_FORMAT is the ending of the file's name, which selects the reader. Findings are
+// exceptions other than covol::Error, and reports of a sanitizer.
 #include <pthread.h>
 #include <sanitizer/common_interface_defs.h>
 
@@ -12,8 +13,8 @@
 
 namespace {
 
-// If a sanitizer ends the forked copy of this process (io/child.h), the file counts as refused; but the copy inherits
-// the fuzzer's handler, which would record a finding.
+// Some readers run in a forked copy of the process (io/child.h). If a sanitizer ends this copy, the file only counts as
+// refused. The handler that the copy inherits from the fuzzer would record a finding, so it is removed.
 void end_copies_without_a_finding() { __sanitizer_set_death_callback(nullptr); }
 
 }  // namespace

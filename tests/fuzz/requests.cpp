@@ -1,7 +1,8 @@
-// The rules for requests under a coverage-guided fuzzer (clang's libFuzzer).
+// Fuzzes the rules by which the server of `covol mark` accepts or refuses requests, with libFuzzer, clang's
+// coverage-guided fuzzer.
 //
-// The input is the head of a request as a client would write it: a first line and fields. Findings are reports of a
-// sanitizer, and accepted requests that violate a rule.
+// The input is the head of an HTTP request: a first line and fields. Findings are reports of a sanitizer, and accepted
+// requests that violate a rule.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Each reader under libFuzzer, with clang's address and undefined-behaviour sanitizers.
+# Fuzzes the reader of each file format under libFuzzer, with clang's address and undefined-behaviour sanitizers.
 #
 #   bash tests/fuzz/run.sh [--seconds 1800] [--formats dcm,h5,...] [--corpus FOLDER] ...     (--help lists the rest)
 set -euo pipefail

@@ -27,7 +27,7 @@ except ImportError as error:
     MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
 
 IMAGEJ = pathlib.Path("/usr/share/java/ij.jar")
-DISPLAY = shutil.which("xvfb-run")  # these programs need a screen, if only a virtual one
+DISPLAY = shutil.which("xvfb-run")  # runs the programs on a virtual screen, as they need one
 
 
 def needs(program, package):
@@ -94,8 +94,8 @@ class ImageJ(Programs):
                 inside = tifffile.imread(self.out / name) > 0
                 self.assertTrue((inside == (levels < 0))[np.abs(levels) > 0.1].all())
                 reported, *slices = self.imagej(self.MACRO, self.out / name)
-                unit, numbers = reported[0], reported[-7:]  # the unit may be missing
-                if name == "mask.tif":  # plain ImageJ ignores OME's XML
+                unit, numbers = reported[0], reported[-7:]  # numbers from the end: ImageJ may print no unit
+                if name == "mask.tif":  # ImageJ without plugins ignores the unit and spacing in OME-XML
                     self.assertIn(unit, ("µm", "um", "micron"))
                     np.testing.assert_allclose([float(n) for n in numbers[:3]], self.lattice.spacing, rtol=1e-6)
                 self.assertEqual([int(n) for n in numbers[3:6]], [SIZE[2], SIZE[0], SIZE[1]])
@@ -129,7 +129,7 @@ class ImageJ(Programs):
             getSelectionCoordinates(x, y);
             for (n = 0; n < nResults; n++) print(x[n], y[n], getResult("Slice", n));
         """
-        # ImageJ prints its results table, too.
+        # The last lines are those of the macro; ImageJ prints its results table before them.
         rows = self.imagej(macro, f"{self.stack}|{self.out / 'places.roi'}")[-len(suggested):]
         self.assertEqual(len(rows), len(suggested), rows)
         for row, place in zip(rows, suggested):
@@ -144,7 +144,7 @@ class MeshLab(Programs):
         (self.out / "measure.mlx").write_text('<!DOCTYPE FilterScript>\n<FilterScript><filter name="Compute Geometric Measures"/></FilterScript>\n')
         covariance = self.covariance()
         inertia = self.volume() * (np.trace(covariance) * np.eye(3) - covariance)
-        for name in self.mesh_files("ply", "stl", "off"):  # Debian's MeshLab fails an assertion of its own with every OBJ
+        for name in self.mesh_files("ply", "stl", "off"):  # no OBJ: Debian's MeshLab fails an assertion with any
             with self.subTest(name):
                 reported = self.run_program("meshlabserver", "-i", name, "-s", "measure.mlx")
                 number = r"\s*(-?[\d.]+)"

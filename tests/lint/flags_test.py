@@ -9,13 +9,15 @@ import re
 import sys
 
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)+\'|//[^\n]*|/\*.*?\*/', re.S)
-FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # a single "--" precedes a name
+# Matches "--x", and a "--" at the end of a string, to which a name is appended.
+FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")
 FIELD = re.compile(r"`([a-z_]+)(?=`| = )|(?:^|, )([a-z_]{2,}) = ")
 ROW = re.compile(r'Option\{\s*"([a-z_]+)",\s*&')
-# Flags that do not belong to a struct of options.
+# Options that are not in a table of a struct of options, so that ROW does not find them.
 BY_HAND = {"checkpoint", "checkpoint_every", "contours", "guess", "inside", "outside", "resume", "structure_column"}
-# Options of every kind that are named only in their row, from which everything else is generated. Other options are named elsewhere if they depend on
-# each other, if a report has a result of the same name, and in messages that recommend them.
+# Examples of options of every kind that must be named only in their row of a table, from which everything else is
+# generated. Other options may also be named where options depend on each other, where a report has a result of the same
+# name, and in messages that recommend them.
 PLAIN = ("guess_weight", "epsilon", "edge_epsilon", "solver_tolerance", "coarse_levels", "guess_radius", "hole_distance", "contour_curve",
          "points_scale", "points_channels", "painted_outside", "correct_level_shift", "zoom", "seed")
 

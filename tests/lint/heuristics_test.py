@@ -10,7 +10,8 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
 from heuristics import read_heuristics  # noqa: E402
 
-# Floating-point constants in a .cpp of a folder that has a heuristics.h. Those that are not heuristic: tolerances of solvers, mathematics.
+# CONSTANT finds floating-point constants, which a .cpp must not define if its folder has a heuristics.h. ALLOWED lists
+# those that are not heuristic: tolerances of solvers, and constants of mathematics.
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 DECLARED = re.compile(r"^(?:struct|COVOL_HEURISTICS \w+) (\w+)", re.M)
 ALLOWED = {

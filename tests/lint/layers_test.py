@@ -6,8 +6,8 @@ import pathlib
 import re
 import sys
 
-# Folders of lib/src from the bottom up, with the public headers that they implement; a file may include headers of its own
-# level and of those below.
+# Levels from the lowest to the highest: {folder of lib/src: public headers that it implements}. A file may include
+# headers of its own folder and of lower levels, but not of another folder of the same level.
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "options_table", "run", "domain", "safe_text"], "scheme": []},
     {"files": ["file_set", "digest"], "limits": []},
@@ -30,7 +30,8 @@ LAYERS = [
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}
 MAX_FILES, MAX_LINES = 20, 500
-# The modules of segment(), in the same form; segment/pipeline.cpp is above them all.
+# The same for the modules of segment(), from the lowest level to the highest. segment/pipeline.cpp is above all of
+# them.
 PIPELINE = [
     ["heuristics", "options", "problem", "step", "vanished"],
     ["choices"],
@@ -49,9 +50,9 @@ HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|Ope
 LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
-# Readers and writers, which the core does not use: COVOL_IO.
+# Folders with readers and writers, which are built only with COVOL_IO; the core must not include their headers.
 READERS = {"io/chunked", "io/dicom", "io/hdf5", "io/ics", "io/image", "io/inputs", "io/modules", "io/points", "io/points/programs", "io/read", "io/reader", "io/study", "io/write"}
-ROW = re.compile(r"^\| (\d+) \| `([\w/]+)` \| .", re.M)  # of the table in docs/architecture.md
+ROW = re.compile(r"^\| (\d+) \| `([\w/]+)` \| .", re.M)  # a row of the table in docs/architecture.md: level, folder
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 
 
@@ -128,7 +129,7 @@ def self_test():
     assert not misplaced(fields, "segment/problem", root) and not misplaced(solve, "segment/solve/flow", root) and not misplaced(edge, "grid/halo", root)
     assert misplaced(fields, "segment/solve/flow", root) and misplaced(solve, "segment/none", root)
     assert misplaced(edge, "segment/problem", root) and misplaced(edge, "covol/pipeline", root) and misplaced(edge, "nowhere/x", root)
-    assert misplaced(edge, "redistance/redistance", root)  # same level, another folder
+    assert misplaced(edge, "redistance/redistance", root)  # on the same level as edge, but in another folder
     for quiet in ('std::snprintf(text, 3, "x");', "run.exit_code(3);", "std::fprintf(file, 1);"):
         assert not LOUD.search(quiet), quiet
 

@@ -9,8 +9,10 @@ import sys
 
 
 def findings(root):
-    text = re.sub(r"#.*", "", (root / "tests/CMakeLists.txt").read_text())  # a test program named in a comment runs nothing
-    listed = set(re.findall(r"(?<![\w/])[a-z0-9_]+_test(?:\.[A-Za-z]\w*)?(?=[\s)]|\.\$)", text))  # .$: of a loop
+    # Comments are removed: a test named there is not run.
+    text = re.sub(r"#.*", "", (root / "tests/CMakeLists.txt").read_text())
+    # ".$": the class is a variable of a loop.
+    listed = set(re.findall(r"(?<![\w/])[a-z0-9_]+_test(?:\.[A-Za-z]\w*)?(?=[\s)]|\.\$)", text))
     files = sorted((root / "tests/cli").glob("*_test.py"))
     if len(files) < 20:
         yield f"{root}: expected the tests of the command line"

@@ -9,14 +9,15 @@ import pathlib
 import re
 import sys
 
-# Functions without an underscore that once began messages; commands of the program may begin them if they were requested.
+# Names of functions without an underscore with which messages once began. Names of commands are not listed: a message
+# may begin with the command that the user requested.
 KNOWN = ("carried", "covering", "decimate", "densify", "orient", "placed", "rasterize", "separate", "offset")
 NAME = r"(?P<name>[a-z]+(?:_[a-z]+)+|" + "|".join(KNOWN) + r")"
 LEADING = re.compile('"' + NAME + ": ")
-ALONE = re.compile('"' + NAME + r': "\s*(?:\+|<<)\s*')  # and if another operand follows
+ALONE = re.compile('"' + NAME + r': "\s*(?:\+|<<)\s*')  # a literal that is only the name, and the operator after it
 OPTION = re.compile(r'(?:Option\{|require(?:_valid)?\(|\.require\(|field\()\s*"([a-z_]+)"')
 CODE = re.compile(r"^\s*(?://|\*)")
-# The server's own settings, which are not options.
+# Settings of the server of covol mark, which are not options; messages may begin with their names.
 SETTINGS = ("frame_origins", "page_policy", "live_path", "max_message_bytes", "max_connections", "messages_per_second",
             "message_burst", "live_idle", "get_threads")
 

@@ -6,11 +6,13 @@ import re
 import subprocess
 import sys
 
-# Code from headers that request default visibility themselves: the same in every library that uses them.
+# Symbols from headers of other libraries, which set default visibility. Every library that includes them exports the
+# same.
 FOREIGN = re.compile(r"^(std|__gnu_cxx|openvdb|tbb|boost|itk)::|^(guard variable|typeinfo|typeinfo name|vtable|VTT) for "
                      r"((std|__gnu_cxx|openvdb|tbb|boost|itk)::|void \(\*\)\()")
 ABOUT = re.compile(r"^(?:(?:guard variable|typeinfo|typeinfo name|vtable|VTT) for |(?:non-)?virtual thunk to )")
-# A lower-case namespace within covol is internal: covol::detail, covol::pipeline. Names of classes begin with a capital.
+# Names in a namespace within covol, such as covol::detail and covol::pipeline, which is internal. It is recognised by
+# its lower-case first letter: names of classes begin with a capital.
 INTERNAL = re.compile(r"\bcovol::[a-z_]\w*::")
 
 

@@ -12,7 +12,7 @@ import sys
 
 FOLDERS = ["lib/src", "tools/covol"]
 NOISE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'', re.S)
-PATTERNS = [  # at the top level of an unnamed namespace, in which every body has been replaced by {}
+PATTERNS = [  # definitions at the top level of an unnamed namespace, after every body has been replaced by {}
     re.compile(r"\b(?:class|struct|enum(?:\s+class)?|union)\s+(?P<name>\w+)[^;(){}]*\{\}"),
     re.compile(r"\busing\s+(?P<name>\w+)\s*=(?P<more>[^;]*)"),
     re.compile(r"\b(?P<name>\w+)\s*\((?P<more>[^;{}]*)\)\s*(?:const|noexcept|->[^{};]*)?\s*\{\}"),

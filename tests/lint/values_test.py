@@ -8,12 +8,12 @@ import re
 import sys
 
 FOLDERS = ("segment", "bricks")
-# Types of inputs and choices: functions take them by const reference or by value.
+# Parameters that would allow a function to change inputs or choices: references and pointers that are not const.
 WRITTEN_TO = re.compile(r"(?<!const )(?<!struct )(?<!class )\b(?:covol::)?(?:pipeline::)?(?:Problem|Choices|Resolved|\w*Options)\s*[&*]")
-# Report fields that are used in a condition, or searched.
+# Code that makes a result depend on the report: fields of texts that are searched or used in a condition.
 READ_BACK = re.compile(r"\.(?:automatic|warnings)\s*(?:\.(?:contains|count|find|erase|empty|at)\b|\[)"
                        r"|\b(?:if|while)\s*\((?:[^()]|\([^()]*\))*\b(?:reason|why_not|summary)\b")
-# The only module that may read a log: the one that keeps it.
+# The module that keeps the log, and the only one that may read it.
 KEEPER = "segment/step.cpp"
 
 

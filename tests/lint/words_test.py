@@ -14,7 +14,7 @@ import tokenize
 
 RETIRED = {"least", "most", "share", "shares", "tell", "tells", "told", "hear", "hears", "heard", "ask", "asks", "asked", "say", "says", "said",
            "foretell", "foretells", "foretold", "jury", "voice"}
-# Names with a proper meaning, and names of other programs' interfaces.
+# Names that contain a retired word in a proper sense, or that belong to interfaces of other programs.
 PROPER = {"at_least", "at_least_one", "most_frequent", "most_frequent_of"}
 PROSE = [
     re.compile(pattern, re.I) for pattern in (
@@ -27,7 +27,7 @@ PROSE = [
         r"\b(?:without|with) a word\b",
     )
 ]
-CODE = re.compile(r"`[^`]*`|\"[^\"]*\"")  # names and messages that are quoted
+CODE = re.compile(r"`[^`]*`|\"[^\"]*\"")  # quoted names and messages, which are not prose
 CPP = re.compile(r'(?P<skip>R"(?P<mark>[^()\s\\]*)\((?:.|\n)*?\)(?P=mark)"|"(?:\\.|[^"\\\n])*"|(?<![0-9A-Za-z_])\'(?:\\.|[^\'\\\n])+\')'
                  r"|(?P<comment>//[^\n]*|/\*(?:.|\n)*?\*/)|(?P<name>[A-Za-z_]\w*)")
 

@@ -19,7 +19,8 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# Files, and the programs of their tests. A third of the faults each are made in kernels, in readers, and in other modules.
+# {source: programs of its tests}. One third of the faults is made in KERNELS, one third in READERS, and one third in
+# other modules.
 KERNELS = {
     "scheme/scheme_kernels.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
     "scheme/scheme.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
@@ -83,9 +84,12 @@ FAULTS = [
     (r"\btrue\b", "false"), (r"\bfalse\b", "true"), (r" \+= ", " -= "), (r"if \(!", "if ("),
 ]
 SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory|reserve")
-SECONDS = 120  # CPU time limit of a test: faults cause endless loops. Unlike wall clock time, it does not depend on other load.
-BYTES = 12 << 30  # of address space: other faults cause absurd sizes
-WAITING = 3600  # seconds of wall clock time for a test that neither ends nor computes, including times at which it was stopped
+# Limit of CPU time for a test, because a fault may cause an endless loop; unlike wall clock time, it does not depend on
+# other load.
+SECONDS = 120
+BYTES = 12 << 30  # limit of address space for a test, because a fault may cause an absurd size
+# Limit in seconds of wall clock time for a test that waits forever; long, because a test may be stopped for some time.
+WAITING = 3600
 
 
 @functools.cache
@@ -110,7 +114,7 @@ class Build:
         if not self.source.exists():
             subprocess.run(["git", "clone", "-q", ROOT, self.source], check=True)
         subprocess.run(["cmake", "--preset", self.preset], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
-        # Removes the fault of a run that was interrupted.
+        # A run that was interrupted may have left its fault in the source.
         subprocess.run(["git", "-C", self.source, "checkout", "-q", "--", "lib"], check=True)
         names = (*KERNELS, *READERS, *others(self.source))
         for name in names:

@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Matrix
 
 archive, image, points, folder = (pathlib.Path(word) for word in sys.argv[sys.argv.index("--") + 1:])
-STEP = 0.5  # seconds, for Blender to draw
+STEP = 0.5  # seconds between two actions, in which Blender draws the window
 
 
 def find():

@@ -24,7 +24,8 @@ sys.path[:0] = [str(ROOT / "tests/cli"), str(ROOT / "tools/napari")]
 
 BLUE, YELLOW, WHITE = (68, 119, 170), (255, 220, 60), (255, 255, 255)
 COLORS = (BLUE, (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119))
-# The font is named explicitly: the width of the default one, and with it that of a picture, depends on the installed fonts.
+# The font is named because the default font, and with it the width of a picture, depends on the fonts that are
+# installed.
 STYLE = """body { margin: 0; padding: 10px; font: 13px/1.35 "DejaVu Sans", sans-serif; color: #222; background: #fff; width: max-content }
 .row { display: flex; gap: 8px; align-items: flex-start } .column { display: flex; flex-direction: column; gap: 8px }
 figure { margin: 0 } figcaption { padding: 2px 0 } img { display: block } pre { margin: 0; font: 12px/1.4 "DejaVu Sans Mono", monospace }
@@ -96,7 +97,7 @@ def plane(voxels, axis, index, spacing, scale=1.0, labels=None, color=BLUE, opac
 def scene(parts, size, points=(), point_color=WHITE, towards=(0.35, 1.0, -0.55), up=(0, 0, -1), zoom=1.5):
     """Draws surfaces, (vertices, faces, colour), and points by VTK, on white."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - needed for rendering
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - the import registers the OpenGL renderer
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
     from vtkmodules.vtkFiltersCore import vtkGlyph3D, vtkPolyDataNormals
@@ -223,7 +224,7 @@ def itksnap(work, path):
     home = work.new_folder()
     work.covol("convert", work.stack, home / "image.nii.gz", "--quiet")
     job = ["segment", home / "image.nii.gz", "--voxel-size", 3, "--quiet"]
-    # In place of a person's painting: a surface through the marks, of which every sixth slice is kept.
+    # The painted slices, which a person would draw, are every sixth slice of the mask of a surface through the marks.
     work.covol(*job, "--points", work.marks_file, "-o", home / "hand.vdb", "--mask", home / "hand.nii.gz")
     painted = nibabel.load(home / "hand.nii.gz")
     voxels = np.asarray(painted.dataobj).copy()
@@ -283,7 +284,8 @@ def notebook(work, path):
     origin = f"http://localhost:{server.server_port}"
     study = covol.mark(volume, {"embryo": work.marks}, spacing=work.spacing, notebook=origin, program=work.program, height=520)
     try:
-        # Voxels of 3 pixels, as in the other pictures. Page and result each solve the study, and would take half a minute with voxels of 1.
+        # Voxels of 3 pixels, as in the other pictures. The page and study.result each solve the study, which would take
+        # half a minute with voxels of 1 pixel.
         live = Live(Page(study.url))
         _, done = live.act(do="set_options", options={"voxel_size": 3})
         live.wait_for(1, "refined", done["seq"])
@@ -300,7 +302,7 @@ def notebook(work, path):
             wait.until(lambda _: driver.execute_script(
                 "const m = window.covolMark; return Boolean(m && m.state.get('link') === 'open' && m.study.structures.length "
                 "&& m.study.structures[0].result && m.panels.every((p) => p.slice))"))
-            time.sleep(3)  # for the 3D view
+            time.sleep(3)  # seconds until the 3D view has been drawn
             driver.switch_to.default_content()
             photograph(driver, path)
     finally:

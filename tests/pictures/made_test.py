@@ -17,7 +17,7 @@ sys.path.insert(0, str(HERE))
 import make  # noqa: E402
 
 DOCS = HERE.parents[1] / "docs"
-COARSE = (48, 32)  # at which letters and noise have no effect
+COARSE = (48, 32)  # columns and rows of cells; in cells this large, letters and noise have almost no effect
 
 
 def look(path):
@@ -51,7 +51,8 @@ class Made(unittest.TestCase):
         """The new picture has the size of that in docs, and is far more similar to it than to any other."""
         if absent := make.missing(name):
             self.skipTest(f"SKIPPED: {', '.join(absent)} not installed; see tests/run.sh")
-        for _ in range(3):  # on a busy machine a window may not be painted when it is captured; a stale picture differs each time
+        # Repeated, as a busy machine may capture a window before it is painted; a stale picture differs each time.
+        for _ in range(3):
             far = self.distances(name)
             own = far.pop(name)
             if own < 0.1 * min(far.values()):

@@ -12,7 +12,7 @@ import pathlib
 import shutil
 import sys
 
-NEEDS = {  # for each picture: the module that makes it, and the programs that it needs
+NEEDS = {  # {picture: (module that makes it, programs that it needs)}
     "fiji": ("windows", ("java", "imagej")),
     "blender": ("windows", ("blender",)),
     "napari": ("figures", ("chromium", "chromedriver")),
@@ -22,7 +22,7 @@ NEEDS = {  # for each picture: the module that makes it, and the programs that i
     "notebook": ("figures", ("chromium", "chromedriver")),
 }
 SCREEN = "1100x700x24"
-MAX_BYTES = 200_000  # per picture
+MAX_BYTES = 200_000  # maximum size of a picture file
 
 
 def missing(name):
@@ -44,7 +44,8 @@ def main(folder, names):
     unknown = set(names) - set(NEEDS)
     if unknown:
         sys.exit(f"no such picture: {', '.join(sorted(unknown))}; expected {', '.join(NEEDS)}")
-    if "COVOL_SCREEN" not in os.environ:  # never the user's own screen, whose windows would be in the way
+    # Starts this script again on a virtual screen, since windows on the user's would cover those in the picture.
+    if "COVOL_SCREEN" not in os.environ:
         os.environ["COVOL_SCREEN"] = SCREEN
         os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", f"-screen 0 {SCREEN}", sys.executable, *sys.argv])
     from work import Work

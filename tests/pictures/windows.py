@@ -12,7 +12,7 @@ from work import ROOT, crop
 sys.path.append(str(ROOT / "tests/cli"))
 from imagej_test import JAR, MACRO, roi_of_points  # noqa: E402
 
-SHOWN_SLICE = 13  # of ImageJ, from 1
+SHOWN_SLICE = 13  # the slice that is shown in ImageJ, counted from 1
 IMAGEJ = """
 open("%(stack)s");
 open("%(marks)s");
@@ -54,7 +54,7 @@ def blender(work, path):
     subprocess.run([sys.executable, ROOT / "tools/plugins/pack.py", "blender", "--output", home], check=True, capture_output=True)
     [archive] = home.glob("covol_blender-*.zip")
     np.savetxt(home / "marks.xyz", work.marks)
-    stack = shutil.copy(work.stack, home)  # the window shows the file's path
+    stack = shutil.copy(work.stack, home)  # a copy in `home`, because the window shows the file's path
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(home / "scripts"), "COVOL": str(work.program)}
     done = subprocess.run(["blender", "--factory-startup", "--enable-event-simulate", "--python-exit-code", "1", "-p", "0", "0", "1100", "700",
                            "--python", ROOT / "tests/pictures/blender_window.py", "--", archive, stack, home / "marks.xyz", home],

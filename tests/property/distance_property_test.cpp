@@ -1,4 +1,4 @@
-// compute_distance() against brute force on random clouds of several kinds.
+// Compares compute_distance() with brute force on random clouds of several kinds.
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>

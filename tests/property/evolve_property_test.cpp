@@ -58,7 +58,7 @@ TEST_CASE("min u0 <= u <= max u0 for every time step") {
         }
 }
 
-// Sums in a different order may round a coefficient (16 bits) to the next unit.
+// Sums in another order may round a coefficient, which has 16 bits, to the next unit, which changes u by up to this.
 constexpr double kRounding = 4e-4;  // h
 
 TEST_CASE("evolve() is the dense reference on random fields") {
@@ -154,7 +154,7 @@ TEST_CASE("evolve() in a band is the dense double-precision solver on the zero l
             seed, exact.count, moved, exact.max, exact.mean, usual.max, usual.mean);
         INFO("seed " << seed);
         CHECK(exact.count > 1000);
-        CHECK(moved > 0.8);  // otherwise there is nothing to compare
+        CHECK(moved > 0.8);  // otherwise the surface has hardly moved, and there is nothing to compare
         CHECK(exact.max < 1e-3);
         CHECK(usual.mean < 1e-3);
         CHECK(usual.max < 1e-2);

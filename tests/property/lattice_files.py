@@ -359,7 +359,7 @@ def read_ics(path):
 def write_vdb(path, data, lattice):
     grid = pyopenvdb.FloatGrid()
     grid.copyFromArray(data.transpose(2, 1, 0).astype(np.float32), tolerance=-1)
-    matrix = np.eye(4)  # rows: OpenVDB multiplies vectors from the left
+    matrix = np.eye(4)  # OpenVDB multiplies row vectors from the left: the rows are the steps and the origin
     matrix[:3, :3], matrix[3, :3] = lattice.steps.T, lattice.origin
     grid.transform = pyopenvdb.createLinearTransform(matrix.tolist())
     grid.name = "density"

@@ -28,7 +28,9 @@ from lattice_files import Lattice  # noqa: E402
 PROGRAM = os.environ.get("COVOL", "build/bin/covol")
 COUNT, FIRST, LAST = [*map(int, os.environ.get("COVOL_LATTICES", "30").split(":")), 0, 0][:3]
 
-MAX_VOXELS, MIN_VOLUME = 2.0 ** 32, 0.05  # docs/formats.md: origins, sheared lattices
+# As docs/formats.md states for origins and sheared lattices: the maximum coordinate of the origin in voxels, and the
+# minimum volume of a voxel with edges of length 1.
+MAX_VOXELS, MIN_VOLUME = 2.0 ** 32, 0.05
 
 
 def draw(number):
@@ -67,7 +69,7 @@ FORMATS = {
     "ICS": Format(".ics", files.write_ics, files.read_ics, UPRIGHT, ("nm", "um", "mm", "m")),
     "OpenVDB": Format(".vdb", files.write_vdb, files.read_vdb, ANY, ("",)),
 }
-# Format in which masks are written, by the lattices that the file stores.
+# For each format in which masks are written, its reader and the lattices that it stores.
 MASKS = {
     ".nrrd": (files.read_nrrd, ANY), ".mha": (files.read_metaimage, ANY), ".nii.gz": (files.read_nifti, ANY),
     ".tif": (files.read_imagej, UPRIGHT), ".zarr": (files.read_ome_zarr, UPRIGHT), ".ome.tif": (files.read_ome_tiff, SPACING),
@@ -145,10 +147,11 @@ class Trial:
         if self.format.units != ("",):
             assert found.unit == lattice.unit, (found.unit, lattice.unit)
         differences = same_body((np.asarray(read.array), found), (truth, lattice))
-        # libtiff has TIFF's resolution in single precision, and ImageJ stores the origin in voxels.
+        # libtiff stores the resolution in single precision, and ImageJ stores the origin in voxels, so that the world
+        # position of a distant origin is inexact.
         far = 1.2e-7 * np.abs(lattice.origin / lattice.spacing).max() if self.name == "ImageJ" else 0
         assert max(differences) < 0.01 + far, differences
-        # Voxel by voxel, whatever the order and direction of axes.
+        # The values are compared voxel by voxel, whatever the order and direction of axes.
         places = lattice.index(found.world(indices()))
         at = np.round(places).astype(int)
         assert np.abs(places - at).max() < 0.01 + far

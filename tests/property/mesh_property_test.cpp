@@ -25,7 +25,7 @@ void check_proper(const TriangleMesh& mesh, const MeshMeasures& expected) {
     CHECK(count_self_intersections(mesh) == 0);
 }
 
-/// The minimum for each kind of solid.
+/// The minimum of an angle, in degrees, for each kind of solid.
 class Worst {
 public:
     void add(const std::string& kind, double value) {
@@ -55,7 +55,7 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         const MeshDeviation deviation = measure_deviation(*solid.level_set, mesh);
         const RelaxReport report = relax_mesh(mesh, *solid.level_set);
         check_proper(mesh, before);
-        // Parts thinner than the lattice resolves have no space for triangles as large as voxels.
+        // Parts that are thinner than the lattice resolves have no space for triangles as large as voxels.
         if (solid.resolved)
             CHECK(report.smallest_angle >= 20);
         else

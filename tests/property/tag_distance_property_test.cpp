@@ -1,4 +1,4 @@
-// The choice of D on real clouds, and the leak test at that D. Needs COVOL_DATA.
+// Tests of the choice of the tag distance D on real clouds, and of leaks at that D. They need COVOL_DATA.
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
@@ -32,7 +32,7 @@ TEST_CASE("D is chosen so that real scans are closed") {
         // The ball's missing cap is a hole of radius 21 to 23 mm.
         {"clouds/apc_rawlings_baseball.ply", 0.001, {}, 21.0, 24.5},
         {"clouds/apc_fitness_gear_3lb_dumbbell.ply", 0.001, {}, 10.0, 15.0},
-        // Nuclei 4.1 apart: 1.8 spacings are 3.7 voxels.
+        // The nuclei are 4.1 apart, so that 1.8 spacings are 3.7 voxels.
         {"clouds/drosophila_embryo_nuclei.xyz", 2.0, {}, 2.3, 3.7},
         {"phantoms/embryo_ve_points.ply", 0.35, {{89.6, 89.6, 28.5}}, 2.0, 3.2},
         {"phantoms/embryo_exe_points.ply", 0.35, {}, 1.8, 3.2},

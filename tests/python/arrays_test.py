@@ -15,7 +15,8 @@ def segment(array, like):
 def expected(sphere):
     """The voxels of the sphere, 0 to 127, which every number type represents."""
     mask = segment(sphere[0].array // 2, sphere[0])
-    assert not np.array_equal(mask, segment(np.roll(sphere[0].array, 3, 0), sphere[0]))  # the image has an effect
+    # The test is only meaningful if the image changes the result.
+    assert not np.array_equal(mask, segment(np.roll(sphere[0].array, 3, 0), sphere[0]))
     return mask
 
 
@@ -107,5 +108,5 @@ def test_results_are_arrays(solved, sphere):
     assert again.measure() == mesh.measure() and again.measure()["closed"]
     normals = mesh.normals
     outward = ((mesh.vertices - mesh.vertices.mean(0)) * normals).sum(1)
-    assert outward.min() > 0  # for a sphere
+    assert outward.min() > 0  # the mesh is a sphere, so that its normals point away from the centre
 

@@ -129,7 +129,7 @@ def test_errors(sphere, options, code, field):
 
 def test_an_error_names_what_would_help(sphere):
     image, points, _ = sphere
-    voxels = image.world_to_index(points)  # z, y, x
+    voxels = image.world_to_index(points)  # indices z, y, x, which are wrong as world positions
     with pytest.raises(covol.Error) as error:
         covol.segment(image, voxels)
     assert error.value.field == "points_space" and "points_space = 'index'" in str(error.value)

@@ -61,7 +61,7 @@ def test_busy_threads_stall_no_reader(tmp_path):
 
     def work():
         while not done.is_set():
-            np.sort(np.random.default_rng(2).random(20000))  # releases the GIL
+            np.sort(np.random.default_rng(2).random(20000))  # NumPy releases the GIL here, so that threads switch often
             "".join(str(n) for n in range(500))
 
     threads = [threading.Thread(target=work) for _ in range(8)]
@@ -78,7 +78,7 @@ def test_busy_threads_stall_no_reader(tmp_path):
         done.set()
         for thread in threads:
             thread.join()
-    assert slowest < 50  # a deadlock ends after 100 s; otherwise each takes at most a second
+    assert slowest < 50  # seconds; a reader that is blocked by a deadlock is ended after 100 s, others take at most one
 
 
 def test_a_module_without_its_compiled_part_states_how_to_build_it(tmp_path):

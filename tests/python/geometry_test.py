@@ -46,7 +46,8 @@ def test_positions(ellipsoid):
     assert np.allclose(img.index_to_world(marks[:, ::-1]), world, atol=1e-12)
     assert np.allclose(img.world_to_index(world), marks[:, ::-1], atol=1e-12)
     assert img.shape == (30, 40, 50) and img.spacing == SPACING and img.origin == ORIGIN
-    flat = covol.Image(image, spacing=SPACING, origin=ORIGIN, direction=tuple(direction.ravel()))  # GetDirection()
+    # Nine numbers, as GetDirection() of SimpleITK returns.
+    flat = covol.Image(image, spacing=SPACING, origin=ORIGIN, direction=tuple(direction.ravel()))
     assert np.array_equal(flat.direction, direction)
 
 
@@ -67,12 +68,12 @@ def test_points_in_voxels(ellipsoid):
     for given, space, order in [(marks, "index", "xyz"), (marks[:, ::-1], "index", "zyx"), (marks + 1, "index1", "xyz"),
                                 (marks * SPACING, "local", "xyz"), (world * (-1, -1, 1), "ras", "xyz")]:
         mask = covol.segment(image, given, points_space=space, points_order=order, **where).mask
-        assert (mask != expected).mean() < 1e-4, (space, order)  # only positions are rounded
+        assert (mask != expected).mean() < 1e-4, (space, order)  # equal up to the rounding of positions
 
 
 def test_nibabel(tmp_path, ellipsoid, program):
     image, labels, marks, _, direction, _ = ellipsoid
-    affine = np.eye(4)  # nibabel: voxels (i, j, k) to RAS
+    affine = np.eye(4)  # nibabel's affine maps voxels (i, j, k) to RAS
     affine[:3, :3], affine[:3, 3] = np.diag([-1, -1, 1]) @ direction * SPACING, np.array(ORIGIN) * (-1, -1, 1)
     nifti = nibabel.Nifti1Image(image.T, affine)
     nibabel.save(nifti, tmp_path / "image.nii.gz")
@@ -81,7 +82,7 @@ def test_nibabel(tmp_path, ellipsoid, program):
         (nifti, {}), (image, {"affine": affine}), (tmp_path / "image.nii.gz", {}), (nibabel.load(tmp_path / "image.nii.gz"), {})]]
     assert dice(masks[0], labels) > 0.97
     for mask in masks[1:]:
-        assert (mask != masks[0]).mean() < 5e-4  # NIfTI stores floats
+        assert (mask != masks[0]).mean() < 5e-4  # NIfTI stores the affine in single precision
     read = covol.read_image(tmp_path / "image.nii.gz")
     assert np.array_equal(read.array, image) and np.allclose(read.affine, affine, atol=1e-5)
     covol.save_mask(tmp_path / "mask.nii.gz", masks[0], read)
@@ -96,7 +97,7 @@ def test_affine_and_back(ellipsoid):
     img = covol.Image(image, spacing=SPACING, origin=ORIGIN, direction=direction)
     spacing, origin, turned = covol.from_affine(img.affine)
     assert np.allclose(spacing, SPACING) and np.allclose(origin, ORIGIN) and np.allclose(turned, direction)
-    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])  # left-handed, which NIfTI allows
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])  # axes that form a left-handed system, which NIfTI allows
     assert covol.segment(image, affine=mirrored, init="sphere:27,-18,14,6").mask[14, 18, 27] == 1
 
 

@@ -49,7 +49,7 @@ def test_the_program_gives_the_same(tmp_path, program, kind, count, options):
         assert result.report[part] == theirs[part]
     assert result.warnings == theirs.get("warnings", [])
     assert any("not steady" in line for line in result.warnings) == (options.get("max_steps") == 2)
-    # arrays in memory give the same result
+    # Arrays in memory give the same mask as files.
     read, marks = covol.read_image(image), covol.read_points(points)
     again = covol.segment(np.array(read.array), marks.array, spacing=read.spacing, origin=read.origin, **options)
     assert np.array_equal(again.mask, result.mask)
@@ -63,7 +63,7 @@ def test_a_real_stack(tmp_path, program):
     result = covol.segment(stack, marks, voxel_size=3)
     assert np.array_equal(result.mask, covol.read_image(tmp_path / "e.nrrd").array)
     held_out = covol.read_points(check).to_world(result.image)
-    assert covol.distances(held_out, result)["mean"] < 1.0  # voxels; docs/commands/segment.md states 0.74
+    assert covol.distances(held_out, result)["mean"] < 1.0  # in voxels; docs/commands/segment.md states 0.74
     found = result.suggest(2)
     theirs = json.loads((tmp_path / "e.json").read_text())["evidence"]["suggestions"]
     assert len(found) == 2 and [(s.slice, s.area) for s in found] == [(s["slice"], s["area"]) for s in theirs]
@@ -114,11 +114,12 @@ def test_every_flag_is_an_option(program):
              "spacing"}
     files = {"output", "mask", "mask_label", "rtstruct", "mesh", "density", "fields", "table", "evidence", "suggest", "suggestions", "structure_column", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
-             "report", "keep_failed", "usda", "compression", "study"}  # for reading and writing, which are separate functions
+             # Options for files, which separate functions read and write.
+             "report", "keep_failed", "usda", "compression", "study"}
     later = {"brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
-    for name, default in ours.items():  # a number shown in the help is also the default here
+    for name, default in ours.items():  # numbers in the program's help are also the defaults of the Python module
         shown = flags[name]["default"]
         try:
             number = float(shown)
@@ -140,7 +141,7 @@ def test_mesh_and_mask(tmp_path, solved, sphere):
     assert covol.compare(tmp_path / "s.nrrd", solved)["dice"] > 0.99
     assert np.array_equal(covol.mesh(tmp_path / "s.vdb").vertices, covol.mesh(solved.surface).vertices)
     solved.mesh.save(tmp_path / "up.ply", y_up=True)
-    solved.mesh.save(tmp_path / "up.glb")  # y-up according to its format, and read as such
+    solved.mesh.save(tmp_path / "up.glb")  # glTF is y up; read_mesh() turns it back
     solved.surface.save(tmp_path / "half.vdb", half=True)
     assert (tmp_path / "half.vdb").stat().st_size < (tmp_path / "s.vdb").stat().st_size
     rotated = solved.mesh.vertices[:, [0, 2, 1]] * (1, 1, -1)
@@ -168,7 +169,8 @@ def test_contours_paint_and_guesses(sphere):
     painted = np.zeros_like(labels)
     painted[8:33:6] = 3 * labels[8:33:6]
     assert dice(covol.segment(image, painted=painted).mask, labels) > 0.96
-    shifted = np.roll(labels, 3, axis=2) * 5  # another program's mask, labelled 5, off to one side
+    # A mask with label 5, shifted by three voxels, as a wrong result of another program.
+    shifted = np.roll(labels, 3, axis=2) * 5
     corrected = covol.segment(image, points, guess=shifted).mask
     assert set(np.unique(corrected)) == {0, 5} and dice(corrected, labels) > dice(shifted, labels) + 0.05
     from_mask = covol.segment(image, points, init=covol.Image(labels, spacing=image.spacing, origin=image.origin))
@@ -209,7 +211,7 @@ def two_balls():
     centers, radius = {"left": np.array((-2.5, 0, 0)), "right": np.array((2.5, 0.3, 0))}, 4.0
     away = {name: np.sqrt((x - c[0]) ** 2 + (y - c[1]) ** 2 + (z - c[2]) ** 2) for name, c in centers.items()}
     pixels = 200 * np.clip((radius - np.minimum(*away.values())) / h + 0.5, 0, 1)
-    count = 150  # marks on each
+    count = 150  # number of marks on each ball
     up = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (3 - 5 ** 0.5) * np.arange(count)
     normals = np.stack([np.sqrt(1 - up ** 2) * np.cos(turn), np.sqrt(1 - up ** 2) * np.sin(turn), up], axis=1)
@@ -259,7 +261,7 @@ def test_structures_from_paint_seeds_and_names():
 
 def test_timelapse():
     image, points, _ = two_balls()
-    frames = [np.roll(image.array, n, axis=0) for n in range(3)]  # by a voxel along z
+    frames = [np.roll(image.array, n, axis=0) for n in range(3)]  # each frame is shifted by a voxel along z
     geometry = {"spacing": image.spacing, "origin": image.origin}
     first = {"left": points["left"]}
     requested = []
@@ -277,7 +279,7 @@ def test_timelapse():
     heights = [r["left"].mesh.vertices[:, 2].mean() for r in (second, third)]
     assert heights[1] - heights[0] == pytest.approx(0.5, abs=0.2)
     assert second["left"].report["input"]["points"]["count"] == 0
-    # one structure, with marks for a later frame
+    # A single structure; the second frame has marks of its own.
     alone = list(covol.timelapse([frames[0], (frames[1], points["left"] + (0, 0, 0.5))], points["left"], rho=0, **geometry))
     assert [r.report["input"]["points"]["count"] for r in alone] == [len(points["left"])] * 2
     assert alone[1].mesh.vertices[:, 2].mean() == pytest.approx(0.5, abs=0.1)

@@ -30,7 +30,7 @@ def test_marks_and_result_follow_the_page(sphere, study):
     mask = study.result.mask
     assert mask.shape == labels.shape
     assert 2 * ((mask > 0) & (labels > 0)).sum() / ((mask > 0).sum() + (labels > 0).sum()) > 0.95
-    assert study.result is study.result  # computed once
+    assert study.result is study.result  # computed once, while the study is unchanged
     before = study.result
     live = Live(Page(study.url))
     live.add_mark(1, points[1].tolist())

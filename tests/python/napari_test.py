@@ -16,7 +16,7 @@ PLUGIN = pathlib.Path(__file__).resolve().parents[2] / "tools/napari"
 sys.path.insert(0, str(PLUGIN))
 from covol_napari import layers  # noqa: E402
 
-TURN = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])  # about the last axis
+TURN = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])  # a rotation in the plane of the first two axes
 
 
 def manifest():
@@ -71,7 +71,8 @@ def test_transforms():
 def scene():
     """A ball in an image layer that is scaled, rotated and moved, with marks in a layer with a transform of its own."""
     k, j, i = np.mgrid[0:24, 0:36, 0:40]
-    r = np.sqrt(((k - 12) * 1.5)**2 + (j - 18)**2 + (i - 20)**2)  # world units: a ball of radius 12
+    # Distance from the centre of the ball, in voxels along the last two axes; the radius is 12.
+    r = np.sqrt(((k - 12) * 1.5)**2 + (j - 18)**2 + (i - 20)**2)
     labels = (r < 12).astype(np.uint8)
     image = Layer(data=np.clip(128 - 40 * (r - 12), 0, 255).astype(np.uint8), name="cells", scale=[3, 2, 2],
                   translate=[5, -7, 11], rotate=TURN, shear=np.zeros(3), affine=np.eye(4))
@@ -92,7 +93,8 @@ def test_segment(scene):
     middle = np.array([12, 18, 20]) * (3, 2, 2) @ TURN.T + (5, -7, 11)
     assert np.linalg.norm(vertices.mean(0) - middle) < 0.5
     a, b, c = (vertices[faces[:, n]].astype(float) for n in range(3))
-    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(4 / 3 * np.pi * 24**3, rel=0.03)  # outward
+    # volume; positive if the triangles face outward.
+    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(4 / 3 * np.pi * 24**3, rel=0.03)
     for positions, meta, kind in more:
         assert kind == "points" and positions.shape[1] == 3 and len(meta["features"]["area"]) == len(positions)
         assert np.all(np.linalg.norm(positions - middle, axis=1) < 30)

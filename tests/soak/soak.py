@@ -24,9 +24,10 @@ import warnings
 import numpy as np
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
-ALLOWED = {0, 3, 130}  # success, refused, interrupted
-LOADING = 0.4          # seconds to load the program's libraries on a busy machine
-GROWTH = 24 << 20      # for all jobs together after the first tenth, during which thread pools and memory settle
+ALLOWED = {0, 3, 130}  # accepted exit codes: success, input refused, interrupted
+LOADING = 0.4          # seconds that the program may take to load its libraries on a busy machine
+# Bytes by which memory may grow over all jobs after the first tenth, in which thread pools are created.
+GROWTH = 24 << 20
 
 
 def resident():
@@ -51,7 +52,7 @@ def one_process(jobs, seed):
             else:
                 covol.segment(image, points[:3 if n % 2 else 200])
         except covol.Error:
-            pass  # a job with refused marks counts, too
+            pass  # jobs with refused marks must not leak memory either
         if n % max(1, jobs // 20) == 0:
             gc.collect()
             held.append(resident())
@@ -174,12 +175,13 @@ def old_or_new(kills, seed):
                 time.sleep(folder.generator.uniform(0, kind.seconds))
                 run.kill()
                 code = run.wait()
-                folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()  # removes what it left
+                # This run removes the temporary files of the killed one.
+                folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()
                 hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
                 state = kind.state()
                 if hidden or state not in kind.sets:
                     wrong.append(f"{words[0]}, kill {killed}: left {hidden}, {state}")
-                    kind.start(last).wait()  # restores the outputs before
+                    kind.start(last).wait()  # writes the previous set of outputs again
                     state = kind.state()
                 killed += code != 0
                 new += state == kind.sets[1 - last] and code != 0
@@ -206,13 +208,15 @@ def random_kills(minutes, seed):
             if how not in (None, signal.SIGKILL) and time.monotonic() - begin > 10:
                 wrong.append(f"{how.name} took {time.monotonic() - begin:.1f} s: {words}")
             ended[code] = ended.get(code, 0) + 1
-            # The next run in the folder removes what a killed one left, and completes the set of files that it had begun to publish.
+            # The next run in the folder removes the temporary files of a killed run, and completes the set of outputs
+            # if the killed run had begun to put them in place.
             folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()
             (folder.path / "next.nrrd").unlink()
             there = [name for name in outputs if (folder.path / name).exists()]
             if code == -signal.SIGKILL and there not in ([], outputs):
                 wrong.append(f"killed, and left {there} of {outputs}")
-            # Before main() a signal ends a process that has not touched any file.
+            # A signal that arrives while libraries are loaded, before main(), ends the process without a message. This
+            # is accepted if there are no outputs.
             early = how is not None and code == -how and waited < LOADING and not there
             if not early:
                 wrong += folder.problems(code, words, outputs)

@@ -11,7 +11,7 @@ namespace covol::test {
 
 struct Problem {
     Domain domain;
-    DenseField u;  ///< where the step starts; rounded() to compare the two
+    DenseField u;  ///< the start, rounded() if both solvers are compared
     std::vector<char> active;
     DenseField distance;  ///< empty: none
     DenseField edge;      ///< empty: none
@@ -45,7 +45,7 @@ inline DenseField run_dense(const Problem& p, int steps) {
     return u;
 }
 
-/// Options of evolve() for exactly `steps` steps, solved far below float's precision.
+/// Options of evolve() for exactly `steps` steps, whose systems are solved far below float's precision.
 inline EvolveOptions evolve_options(const DenseOptions& o, int steps) {
     EvolveOptions e;
     e.theta = o.theta;

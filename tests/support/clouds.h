@@ -52,7 +52,7 @@ inline float value_at(const FloatGrid& grid, const Vec3& world) {
     return grid.tree().getValue({int(std::lround(at[0])), int(std::lround(at[1])), int(std::lround(at[2]))});
 }
 
-/// Same topology and bitwise equal values.
+/// Whether two grids have the same topology, and bitwise equal values in their leaves.
 inline bool identical(const FloatGrid& a, const FloatGrid& b) {
     if (!a.tree().hasSameTopology(b.tree())) return false;
     auto other = b.tree().cbeginLeaf();
@@ -61,7 +61,7 @@ inline bool identical(const FloatGrid& a, const FloatGrid& b) {
     return true;
 }
 
-/// Number of voxels with a value below 0, including tiles.
+/// The volume of the voxels with a value below 0, including tiles, in cubed world units.
 inline double negative_volume(const FloatGrid& grid) {
     double n = 0;
     for (auto value = grid.tree().cbeginValueAll(); value; ++value)

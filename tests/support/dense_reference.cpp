@@ -10,7 +10,7 @@ namespace {
 double norm(const Gradient& g) { return std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]); }
 double regularised(double x, double epsilon) { return std::sqrt(epsilon * epsilon + x * x); }
 
-constexpr int kTrialSweeps = 500;  // with over-relaxation
+constexpr int kTrialSweeps = 500;  // number of sweeps after which over-relaxation is given up
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
@@ -91,7 +91,7 @@ std::array<Gradient, 24> gradients_from(const DenseField& u, const double vertex
     return result;
 }
 
-/// Each vertex of the domain once: vertex (i,j,k) of the result is the one at (i,j,k) - 1/2.
+/// The values at all vertices of the domain, each once: vertex (i,j,k) of the result is the one at (i,j,k) - 1/2.
 DenseField all_vertices(const DenseField& u) {
     DenseField z(u.nx() + 1, u.ny() + 1, u.nz() + 1, u.h());
     for (int i = 0; i <= u.nx(); ++i)
@@ -106,7 +106,7 @@ void vertices_of(const DenseField& z, int i, int j, int k, double vertex[2][2][2
             for (int c = 0; c < 2; ++c) vertex[a][b][c] = z.at(i + a, j + b, k + c);
 }
 
-/// M_p and the six W_pq.
+/// The factors M_p and W_pq of the curvature term, for a voxel p and its six faces.
 struct Curvature {
     double m = 0;
     std::array<double, 6> w{};
@@ -132,7 +132,7 @@ Curvature curvature(const std::array<Gradient, 24>& gradients, const DenseOption
 
 double difference(const DenseField& field, std::size_t p, std::size_t q) {
     const double d = field[q] - field[p];
-    return std::isnan(d) ? 0.0 : d;  // unknown at p or q
+    return std::isnan(d) ? 0.0 : d;  // 0 if the field is unknown at p or q
 }
 
 bool inside(const DenseField& u, int i, int j, int k) {
@@ -150,7 +150,7 @@ std::array<std::array<int, 3>, 26> voxels_around() {
     return all;
 }
 
-/// The six of kFaces first.
+/// The 26 voxels around a voxel, the six of kFaces first.
 const std::array<std::array<int, 3>, 26> kNeighbours26 = voxels_around();
 
 std::vector<std::ptrdiff_t> offsets(const DenseField& u, bool all_26) {
@@ -162,7 +162,7 @@ std::vector<std::ptrdiff_t> offsets(const DenseField& u, bool all_26) {
     return result;
 }
 
-/// v_pq of Eqs. (17) and (20), the fields' ghosts mirrored.
+/// The velocity v_pq of Eqs. (17) and (20). The ghosts of the fields are mirrored.
 class Velocity {
 public:
     Velocity(const DenseFields& fields, const DenseOptions& options, const std::vector<std::ptrdiff_t>& neighbour)
@@ -287,7 +287,8 @@ int solve(const DenseSystem& system, DenseField& u, const DenseOptions& options)
         largest_value = std::max(largest_value, std::abs(system.right_side[row]));
     }
     const double rounding = 1e-12 * largest_value;
-    // The optimal factor for the diffusion of a regular row; rows at kinks of u are larger, but few.
+    // The over-relaxation factor that is optimal for rows with regular diffusion. Rows at kinks of u have larger sums,
+    // but they are few.
     const double row_sum = 4 * options.tau * options.delta / (u.h() * u.h()), jacobi = row_sum / (1 + row_sum);
     double omega = 2 / (1 + std::sqrt(1 - jacobi * jacobi));
     double first = 0;

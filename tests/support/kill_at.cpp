@@ -1,5 +1,5 @@
-/// Preloaded into a program, or linked into it: kills it before its KILL_AT-th call (from 1) of those that put files in
-/// place, as a power failure or the out-of-memory killer would. 0 or unset: never.
+/// Preloaded into a program, or linked into it: counts, from 1, the calls below, which put files in place. Kills the
+/// program before call number KILL_AT, as a power failure or the out-of-memory killer would. 0 or unset: never.
 #include <dlfcn.h>
 #include <sys/types.h>
 
@@ -31,7 +31,7 @@ int pass_on(const char* name, Arguments... arguments) {
 }  // namespace
 
 extern "C" {
-/// Restarts the count.
+/// Restarts the count, and sets the number of the call before which the program is killed; 0: never.
 void covol_kill_before(long number) {
     counted().calls = 0;
     counted().last = number;

@@ -5,7 +5,7 @@
 
 namespace covol::test {
 
-/// Both in one mesh, without merging vertices.
+/// Both meshes in one, without merging vertices.
 inline TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
     const auto shift = std::uint32_t(a.vertices.size());
     a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());

@@ -1,4 +1,4 @@
-/// A reading program for io/child_test.cpp: the text of a piece determines its behaviour.
+/// A reading program for io/child_test.cpp. What it does with a piece of work is determined by the text of the piece.
 #include <fcntl.h>
 #include <unistd.h>
 

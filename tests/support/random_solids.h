@@ -68,7 +68,8 @@ private:
                 middle_[2] + uniform(-reach, reach)};
     }
 
-    /// A sum of plane waves with these lengths in voxels, divided by the root mean square of its slope.
+    /// A sum of plane waves with wavelengths from `shortest` to `longest` voxels, divided by the root mean square of
+    /// its slope.
     Shape waves(double shortest, double longest) {
         struct Wave {
             Vec3 k;

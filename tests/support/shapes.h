@@ -63,7 +63,7 @@ inline DenseField rounded(DenseField field) {
     return field;
 }
 
-/// Nonzero if keep(world) holds, in the form that dense_evolve() takes.
+/// 1 at the voxels for which keep(world position) is true, else 0, in the form that dense_evolve() takes.
 inline std::vector<char> active_where(const Domain& d, const DenseField& shape,
                                       const std::function<bool(const Vec3&)>& keep) {
     std::vector<char> active(shape.size(), 0);

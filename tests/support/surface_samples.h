@@ -7,7 +7,7 @@
 
 #include "covol/domain.h"
 
-// Points of known surfaces with their outward normals, as the truth for the modules for clouds.
+// Points of known surfaces with their outward normals, with which results of the modules for clouds are compared.
 namespace covol::test {
 
 using SignedDistance = std::function<double(const Vec3&)>;  ///< negative inside
@@ -63,7 +63,7 @@ inline void add_noise(SurfaceSample& sample, double sigma, unsigned seed) {
         sample.points[n] = sum(sample.points[n], scaled(off(random), sample.normals[n]));
 }
 
-/// A shape and a box around it.
+/// A solid, given by its signed distance, and a box around it.
 struct Solid3 {
     SignedDistance distance;
     WorldBox box;

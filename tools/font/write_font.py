@@ -14,7 +14,7 @@ FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSansCondensed.ttf"
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LETTERS = [chr(c) for c in range(32, 127)] + list("\xb0\xb1\xb2\xb3\xb5\xb7\xd7") + [chr(c) for c in range(0xc0, 0x100)
                                                                                       if c not in (0xd7, 0xf7)] + list("–−…�")
-UNITS = 512  # per em; the font has 2048
+UNITS = 512  # units per em of the written outlines; the font file has 2048 units per em
 
 HEAD = '''// Made by tools/font/write_font.py from DejaVu Sans Condensed 2.37; do not edit. Attribution and licence: docs/licences.md.
 // A glyph: its code point, its advance, then steps in 1/512 em, y up, each from where the last one ended: m(ove to), l(ine),
@@ -44,7 +44,7 @@ def outline(font, letter):
         words.append(kind + " ".join(numbers))
 
     for kind, points in pen.value:
-        if kind == "qCurveTo" and points[-1] is None:  # a contour without on-curve points
+        if kind == "qCurveTo" and points[-1] is None:  # a contour without on-curve points: starts at the middle of two control points
             first = tuple((a + b) / 2 for a, b in zip(points[0], points[-2]))
             step("m", first)
             kind, points = "qCurveTo", [*points[:-1], first]

@@ -12,13 +12,14 @@ function settingOf(lines, name, missing) {
     return missing;
 }
 
-// 1 for a selection that is an area (types 0 to 4 and 9), 0 for points (10) and lines (5 to 8), whose corners are marks like points.
+// Returns 1 for a selection that is an area (types 0 to 4 and 9), otherwise 0: for points (10), and for lines (5 to 8), whose corners
+// are used as marks like points.
 function isArea(type) {
     if (type <= 4 || type == 9) return 1;
     return 0;
 }
 
-// Saves the ROIs of the ROI Manager that are areas, or those that are not; returns their number.
+// Saves those ROIs of the ROI Manager that are areas (areas = 1), or those that are not (areas = 0); returns their number.
 function saveManaged(areas, path) {
     chosen = newArray(0);
     for (i = 0; i < roiManager("count"); i++) {
@@ -33,7 +34,7 @@ function saveManaged(areas, path) {
     return chosen.length;
 }
 
-// Runs a command, whose arguments a shell reads unchanged from a file, and returns its output.
+// Runs a command and returns its output. A shell reads the arguments from a file, one per line, so that it does not interpret them.
 function runProgram(words, path) {
     text = "";
     for (i = 0; i < words.length; i++) text = text + words[i] + "\n";
@@ -111,7 +112,7 @@ if (options != "") {
 if (report != "") words = Array.concat(words, newArray("--report", report));
 words = Array.concat(words, newArray("-o", folder + "/surface.vdb", "--mask", folder + "/mask.tif", "--table", folder + "/table.csv"));
 
-// The displayed stack, without its selection; its name and its marks are kept.
+// Saves a copy of the displayed stack without its selection. The stack itself keeps its name and its marks.
 showStatus("covol: saving the stack");
 wasBatch = is("Batch Mode");
 if (!wasBatch) setBatchMode(true);
@@ -134,7 +135,7 @@ if (!File.exists(folder + "/mask.tif")) {
     exit("covol: " + said);
 }
 
-// Outlines on every slice that contains the structure.
+// Adds an outline to the overlay on every slice that contains the structure.
 open(folder + "/mask.tif");
 rename("Mask of " + title);
 mask = getImageID();

@@ -106,8 +106,8 @@ def packages_of(origins):
     """{copy: (package, version)}"""
     candidates = {origin: [origin, origin.removeprefix("/usr") if origin.startswith("/usr/lib") else "/usr" + origin]
                   for origin in origins.values()}
-    # One call for all paths, because each call reads the file lists of all installed packages. Its exit code is 1: most libraries are
-    # known by one of their two paths only.
+    # One call for all paths, because each call reads the file lists of all installed packages. The exit code is not checked: it is 1 if
+    # dpkg does not know a path, and dpkg knows most libraries by only one of their two paths, with or without /usr.
     done = subprocess.run(["dpkg", "-S", *(path for paths in candidates.values() for path in paths)], capture_output=True, text=True)
     owners = dict(reversed(line.split(": ", 1)) for line in done.stdout.splitlines())
     found = {}
@@ -131,7 +131,7 @@ def write_licences(root, origins):
     texts = doc / "licences"
     texts.mkdir(parents=True, exist_ok=True)
     common = pathlib.Path("/usr/share/common-licenses")
-    for path in sorted(common.iterdir()):  # referenced by the packages' copyright files
+    for path in sorted(common.iterdir()):  # full texts of licences, to which the packages' copyright files refer
         shutil.copyfile(os.path.realpath(path), texts / f"common-{path.name}")
     rows = []
     for copy, (package, version) in sorted(packages_of(origins).items()):

@@ -1,4 +1,5 @@
-# Files installed below /usr need no paths to their libraries, and Debian does not allow any.
+# Removes the RPATH from programs and libraries in the package. Files below /usr find their libraries without it, and Debian does
+# not allow it.
 file(GLOB_RECURSE files ${CPACK_TEMPORARY_DIRECTORY}/*)
 foreach(file ${files})
   if(IS_SYMLINK ${file} OR NOT file MATCHES "/(covol|covol-reader|[^/]*\\.so[^/]*)$")

@@ -19,7 +19,7 @@ import time
 import zipfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
-LEFT_OUT = ("share/man/", "share/bash-completion/", "share/zsh/", "share/fish/", "README.txt")  # shells do not search for them there
+LEFT_OUT = ("share/man/", "share/bash-completion/", "share/zsh/", "share/fish/", "README.txt")  # shells and man do not search for these files in a Python package
 METADATA = """Metadata-Version: 2.1
 Name: covol
 Version: {version}
@@ -102,7 +102,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="covol-wheel-") as work:
         with tarfile.open(options.bundle) as tar:
             times = {entry.mtime for entry in tar.getmembers()}
-            tar.extractall(work)  # a trusted archive that this machine has made
+            tar.extractall(work)  # the archive is trusted: bundle.py made it on this machine
         [root] = pathlib.Path(work).iterdir()
         c_library = re.search(r"glibc (\d+)\.(\d+)", (root / "README.txt").read_text())
         if not c_library:
@@ -118,7 +118,7 @@ def main():
             ("licenses/LICENSE", (SOURCE / "LICENSE").read_text()), ("licenses/licences.md", (SOURCE / "docs/licences.md").read_text())]]
         record = "".join(f"{name},{digest(data)},{len(data)}\n" for name, data, _ in entries) + f"{about}/RECORD,,\n"
         entries.append((f"{about}/RECORD", record.encode(), False))
-    stamp = time.gmtime(max(max(times), 315532800))[:6]  # zip files have no earlier times
+    stamp = time.gmtime(max(max(times), 315532800))[:6]  # seconds, 1980-01-01: zip files cannot store earlier times
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"covol-{version}-{tag}.whl"
     partial = path.with_name(path.name + ".part")

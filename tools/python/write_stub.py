@@ -22,7 +22,7 @@ def parameter(name, type_name, default):
 def filled(text):
     lines = sorted(parameter(*option) for option in _covol.list_options())
     without_image = [line.replace("rho: float = 1.0", "rho: float = 0.0") for line in lines]
-    blocks = iter([lines, without_image])  # of segment() and reconstruct()
+    blocks = iter([lines, without_image])  # options of segment(), then of reconstruct()
     result, count = re.subn(f"{re.escape(BEGIN)}.*?{END}", lambda _: BEGIN + "".join(next(blocks)) + END, text, flags=re.S)
     if count != 2:
         sys.exit(f"{STUB}: expected two places for options, found {count}")

@@ -82,8 +82,8 @@ Response refusal(int status, const std::string& why) {
 Response cookie_answer(const std::string& cookie_name, const std::string& cookie, bool is_link) {
     Response response;
     if (is_link) {
-        // The answer is a page that loads "/", and not a redirection: a browser would treat that as a request of the
-        // linking page, and send no cookie.
+        // The answer is a page that loads "/", and not a redirection: a browser would treat a redirected request as one
+        // of the linking page, and not send the cookie with it (SameSite=Strict).
         response.type = "text/html; charset=utf-8";
         response.body =
             "<!doctype html>\n<title>covol</title><meta http-equiv=\"refresh\" content=\"0;url=/\"><a "
@@ -99,7 +99,8 @@ Response cookie_answer(const std::string& cookie_name, const std::string& cookie
 
 std::string attachment(std::string_view file_name) {
     std::string name(file_name);
-    // Browsers replace most of these characters themselves, but other programs that download files may not.
+    // Control characters, slashes and a leading dot are replaced. Browsers replace most of them themselves, but other
+    // programs that download files may not.
     for (char& c : name) {
         if ((c >= 0 && c < ' ') || c == '\x7f' || c == '/' || c == '\\') c = '_';
     }

@@ -42,7 +42,8 @@ void HttpConnection::read() {
     serializer_.reset();
     parser_.emplace();
     parser_->header_limit(kMaxHeaderBytes);
-    // The limit is a maximum, because judge() checks the length, and Boost 1.74 interprets "none" as 0.
+    // No limit is needed here, because judge() checks the length of the body. The limit is set to the largest number,
+    // because Boost 1.74 interprets "none" as 0.
     if (hub_.rules.max_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     waits_since_ = std::chrono::steady_clock::now();
     stream_.expires_after(hub_.options.idle);
@@ -89,8 +90,9 @@ void HttpConnection::answer_with(const std::string& path, std::function<Response
             hub.report(path + ": " + what_was_thrown());
             response = refusal(500, "The request failed because of an internal error.");
         }
-        handler = nullptr;  // releases the body that it may hold
-        // Moved, because the socket must be destroyed on its own thread.
+        handler = nullptr;  // releases the body of a POST now
+        // `self` is moved, not copied: the last reference must be released on the thread of hub.io, where the socket
+        // has to be destroyed.
         asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
             self->end_post();
             beast::error_code ignored;
@@ -100,12 +102,12 @@ void HttpConnection::answer_with(const std::string& path, std::function<Response
     });
 }
 
-// Waits for the client to close the connection while its request is handled, and then closes it, too. A page does this
-// when it switches to another slice.
+// Waits for the client to close the connection while its request is handled, sets `gone`, and closes it, too. A page
+// closes the connection of a slice that it no longer needs because it displays another one.
 void HttpConnection::watch(std::shared_ptr<std::atomic<bool>> gone) {
     stream_.socket().async_wait(asio::ip::tcp::socket::wait_read, [self = self(), gone](beast::error_code status) {
         char next = 0;
-        // Available bytes belong to the next request.
+        // recv() returns 0 if the client has closed the connection. Available bytes belong to the next request.
         if (status || ::recv(self->stream_.socket().native_handle(), &next, 1, MSG_PEEK | MSG_DONTWAIT) != 0) return;
         *gone = true;
         self->finish();
@@ -132,7 +134,7 @@ void HttpConnection::take_body(Request request) {
     read_body(std::move(parser), std::move(request));
 }
 
-// Reads in pieces, so that the time limit applies to each piece, as in write().
+// Reads the body in pieces. The time limit applies to each piece, because a large body may take long, as in write().
 void HttpConnection::read_body(std::shared_ptr<BodyParser> parser, Request request) {
     stream_.expires_after(hub_.options.idle);
     BodyParser& into = *parser;
@@ -199,7 +201,8 @@ void HttpConnection::write() {
     });
 }
 
-// Reads and ignores data until the client closes: if the socket is closed before, the client may lose the answer.
+// Reads and ignores data until the client closes the connection. If this socket were closed before, the client might
+// lose the answer.
 void HttpConnection::drain() {
     constexpr std::size_t kMax = 1 << 20, kPiece = 4096;
     buffer_.consume(buffer_.size());

@@ -59,7 +59,7 @@ private:
     std::optional<StringResponse> response_;
     std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
     bool is_head_ = false, keeps_ = false, is_posting_ = false;
-    std::optional<bool> wants_to_stay_;  // stored for a POST, whose header is released before the answer
+    std::optional<bool> wants_to_stay_;  // set for a POST, whose parser is moved before the answer
     std::size_t drained_ = 0;
     std::optional<MessageRate::Time> waits_since_;
 };

@@ -11,7 +11,8 @@ Hub::Hub(Options its_options, Handlers its_handlers)
       get_pool(std::size_t(options.get_threads)),
       live_pool(2) {}
 
-// Maximum number of connections that are being refused; further ones are closed without an answer.
+// Maximum number of connections beyond Options::max_connections that are refused with a message at the same time.
+// Further ones are closed without an answer.
 constexpr std::size_t kMaxRefused = 8;
 
 void Hub::serve_socket(boost::asio::ip::tcp::socket socket) {
@@ -71,7 +72,8 @@ bool Hub::send(Client client, std::string text) {
 void Hub::broadcast(std::string text) {
     if (is_stopping) return;
     const auto shared = std::make_shared<const std::string>(std::move(text));
-    // Locked, so that texts that are broadcast at the same time arrive in the same order at all clients.
+    // The lock is held for the whole loop, so that texts that two threads broadcast at the same time arrive in the same
+    // order at all clients.
     const std::lock_guard lock(recipients_mutex_);
     for (const auto& [client, recipient] : recipients_) recipient->send(shared, true);
 }

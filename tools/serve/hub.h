@@ -23,7 +23,8 @@ public:
     virtual ~Connection() = default;
     /// Closes the connection within Hub::kCloseTimeout.
     virtual void stop() = 0;
-    /// When the connection began to wait for a request, or for the client to close; nullopt while it is busy.
+    /// The time at which the connection began to wait for a request, or for the client to close it; nullopt while it is
+    /// busy.
     [[nodiscard]] virtual std::optional<MessageRate::Time> waits_since() const = 0;
     /// Closes the connection at once.
     virtual void finish() = 0;
@@ -48,10 +49,10 @@ public:
     const Handlers handlers;
     Rules rules{};                         ///< set before the first connection
     std::atomic<bool> is_stopping{false};  ///< may be used by any thread
-    bool is_posting = false;               ///< a body is being read or handled; bodies may be large
+    bool is_posting = false;               ///< a POST is being read or handled; one at a time, as bodies may be large
     /// Threads of handlers. There are two pools, so that messages are answered while many images are being read.
     boost::asio::thread_pool get_pool, live_pool;
-    boost::asio::io_context io{1};  // after the pools, which its pending handlers refer to
+    boost::asio::io_context io{1};  // declared after the pools, to which its pending handlers refer
 
     /// Serves an accepted socket. If there are too many connections, closes the one that has been waiting longest for a
     /// request, or refuses the new one if all are busy.
@@ -60,7 +61,7 @@ public:
     [[nodiscard]] bool has_room_for_client() const { return live_count_ < options.max_clients; }
     [[nodiscard]] Client next_client() { return {++last_client_}; }
     void enter(std::shared_ptr<Connection> connection, bool is_live);
-    /// Has no effect if the connection has left before.
+    /// Removes a connection that enter() has added; has no effect if it has been removed before.
     void leave(const std::shared_ptr<Connection>& connection, bool is_live);
     void stop_all();
 

@@ -41,7 +41,7 @@ void LiveConnection::accept(http::request<http::empty_body> request) {
     socket_.read_message_max(0);
     socket_.auto_fragment(false);
     socket_.text(true);
-    // Pings are counted as messages, because they cost as much time.
+    // Pings are counted as messages for the limit of messages per second, because they take as much time.
     socket_.control_callback([this](websocket::frame_type kind, beast::string_view) {
         if (kind == websocket::frame_type::close || !is_too_fast()) return;
         asio::post(hub_.io, [self = self()] {
@@ -63,7 +63,8 @@ void LiveConnection::call(const char* name, const Call& handler) {
     }
 }
 
-// Releases a reference on the thread of Hub::io, where the socket has to be destroyed.
+// Releases a reference to a connection on the thread of Hub::io: if it is the last one, the socket is destroyed, which
+// has to happen on that thread.
 void LiveConnection::release(std::shared_ptr<LiveConnection> self) {
     asio::io_context& io = self->hub_.io;
     asio::post(io, [self = std::move(self)] {});
@@ -98,7 +99,7 @@ bool LiveConnection::has_much_to_handle() const {
 void LiveConnection::on_read(beast::error_code status) {
     is_reading_ = false;
     if (status) return finish();
-    if (is_closing_) return;  // close() continues to read until the client's answer
+    if (is_closing_) return;  // async_close() reads until the client's answer
     if (buffer_.size() > hub_.options.max_message_bytes) {
         return close(websocket::close_code::too_big, "a message is too large", kPartingTime);
     }

@@ -4,7 +4,7 @@
 
 namespace covol::serve {
 
-/// Limits the messages of a client: the number at once, and the mean number per second.
+/// Limits the messages of a client: at most `burst` at once, and at most `per_second` per second on average.
 class MessageRate {
 public:
     using Time = std::chrono::steady_clock::time_point;

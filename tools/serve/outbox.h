@@ -10,17 +10,18 @@ namespace covol::serve {
 /// A text that may be sent to several clients, stored once.
 using SharedText = std::shared_ptr<const std::string>;
 
-/// The texts that are queued for one client, of limited size. May be used from any thread; one thread writes.
+/// The texts that are queued for one client; their total size is limited. May be used from any thread, but only one
+/// thread sends the texts with next() and written().
 class Outbox {
 public:
     enum class Added {
         Waiting,  ///< the writer is running, and will send the text
         First,    ///< the writer has to be started
         TooMuch,  ///< no more texts are accepted: the client must be disconnected
-        Refused   ///< closed, or not ready for broadcasts
+        Refused   ///< the queue is closed, or the text is a broadcast and these are not accepted yet
     };
 
-    /// @param max_bytes  of all unsent texts; if the queue is empty, a single text may be larger
+    /// @param max_bytes  maximum size of all unsent texts; if the queue is empty, a single text may be larger
     explicit Outbox(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
     /// Adds a text. Broadcasts are refused before the first other text or take_broadcasts().
@@ -57,7 +58,7 @@ public:
         return !texts_.empty();
     }
 
-    /// Accepts no more texts. Queued texts are kept, because a writer may be active.
+    /// Accepts no more texts. Queued texts are kept, because the writer may be sending one of them.
     void close() {
         const std::lock_guard lock(mutex_);
         is_closed_ = true;

@@ -22,12 +22,12 @@ struct RequestHead {
 /// The values and limits that a request is checked against.
 struct Rules {
     std::vector<std::string> authorities;  ///< values of `Host`, see allowed_authorities()
-    std::string token;                     ///< part of the link that the user opens
+    std::string token;                     ///< secret in the link that the user opens
     std::string cookie_name, cookie;
     std::string live_path;
     std::size_t max_target_bytes = 4096;
     bool may_be_framed = false;      ///< pages of the same host on other ports may show the link in a frame
-    std::size_t max_body_bytes = 0;  ///< of a POST; 0: all POSTs are refused
+    std::size_t max_body_bytes = 0;  ///< maximum size of a POST's body; 0: all POSTs are refused
 };
 
 /// The decision about a request.

@@ -13,7 +13,7 @@
 #include <vector>
 
 // A web server for one user's browser, on the loopback address of this machine: HTTP for requests, WebSockets for
-// messages in both directions. It controls the access; handlers compute the answers.
+// messages in both directions. The server controls who has access; handlers compute the answers.
 namespace covol::serve {
 
 /// A GET, HEAD or POST that passed all checks.
@@ -50,7 +50,7 @@ struct Handlers {
     /// A POST with its body, one at a time, if Options::max_body_bytes > 0. Otherwise like `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
-    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, the client is closed (1011)
+    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, the client is closed (code 1011)
     std::function<void(Client)> closed{};                     ///< exactly once for each client that was `opened`
     std::function<void(const std::string&)> on_error{};  ///< errors in a handler or in accepting connections, for a log
 };
@@ -67,12 +67,12 @@ struct Options {
     std::string live_path = "/live";                 ///< path of WebSockets
     std::size_t max_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
     std::size_t max_body_bytes = 0;                         ///< of a POST; 0: all POSTs are refused
-    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< unsent data of a client; above it, it is closed
+    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< unsent data of a client; with more, it is closed
     /// Maximum number of open connections, >= 1, including WebSockets. For a further one, the connection that has been
     /// waiting longest for a request is closed; if none is waiting, the new one is refused (503).
     std::size_t max_connections = 16;
-    std::size_t max_clients = 8;                  ///< WebSockets open at once
-    double messages_per_second = 200;             ///< > 0, of each client; if exceeded, it is closed (1008)
+    std::size_t max_clients = 8;                  ///< maximum number of open WebSockets
+    double messages_per_second = 200;             ///< > 0, of each client; with more, it is closed (code 1008)
     double message_burst = 400;                   ///< >= 1, maximum number of messages at once
     std::chrono::milliseconds idle{30'000};       ///< >= 1, maximum time without request or progress of an answer
     std::chrono::milliseconds live_idle{60'000};  ///< >= 2, maximum time to answer a ping, and for handlers to catch up

@@ -10,7 +10,7 @@ from slicer.ScriptedLoadableModule import ScriptedLoadableModule, ScriptedLoadab
 
 from CovolLib import _process, job
 
-TICK = 100  # milliseconds between two checks of a run
+TICK = 100  # milliseconds between two checks whether the running program has sent events
 
 
 class Covol(ScriptedLoadableModule):

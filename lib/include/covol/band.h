@@ -10,7 +10,8 @@
 namespace covol {
 
 struct BandOptions {
-    double tag_distance = 0.0;         ///< D, world units; > 0.
+    /// the tag distance D, half of the widest gap between points that is closed; world units, > 0
+    double tag_distance = 0.0;
     std::vector<Vec3> exterior_seeds;  ///< world positions that are outside, for example in cavities
 };
 
@@ -22,12 +23,16 @@ inline constexpr auto kOptions<BandOptions> =
                       "a position outside the structure, for example in a cavity; repeatable"}};
 
 struct BandReport {
-    double tag_distance = 0;     ///< D
-    double enclosed_volume = 0;  ///< volume that the flood fill did not reach, world units^3
-    double core_volume = 0;      ///< volume of the part of it in which d > D
-    bool leaks = false;  ///< no core (a part with d > D) is enclosed at any of several values from D to 0.6 D, or one
-                         ///< more is enclosed at D + h
-    /// if it leaks: the smallest tested D that would enclose one more core; 0 if none was found
+    double tag_distance = 0;     ///< the value of BandOptions::tag_distance that was used
+    double enclosed_volume = 0;  ///< volume of the voxels that the flood fill did not reach, world units^3
+    /// volume of the cores, the parts of these voxels in which the distance to the points exceeds D, world units^3
+    double core_volume = 0;
+    /// Whether the points have gaps that D does not close: the body contains no core, neither for D nor for three
+    /// smaller distances down to 0.6 D, or it would contain a further core if it were tagged with D + h, where h is the
+    /// voxel size.
+    bool leaks = false;
+    /// If the body leaks: the smallest tested distance above D, in world units, at which it would contain a further
+    /// core; 0 if none was found.
     double holding_distance = 0;
     std::int64_t active_voxels = 0;
 
@@ -36,21 +41,26 @@ struct BandReport {
 };
 
 struct BandResult {
-    FloatGridPtr grid;  ///< named "band": u0, active where d <= D + 3h; elsewhere 3h outside of the body and -3h inside
+    /// The initial level set u0, named "band". It is active where d <= D + 3h, with d the distance to the points and h
+    /// the voxel size; all other voxels are 3h outside of the body and -3h inside.
+    FloatGridPtr grid;
     BandReport report;
 };
 
 /// The tag distance D that was derived from the points, and how it was found.
 struct TagDistanceChoice {
     double tag_distance = 0;
-    bool encloses = false;  ///< whether a core was found that is clearly distinct from small gaps
-    std::string reason;     ///< one line for the user
+    /// whether the points enclose a core (see choose_tag_distance()) that is not just a small gap between them
+    bool encloses = false;
+    std::string reason;  ///< how the value was found, one line for the user
 };
 
-/// Chooses D from the points. As D grows, {d > D} splits into the exterior and enclosed cores; each core appears when
-/// its last gap closes (at a saddle of d) and vanishes at its inner radius (a peak of d). D is chosen just above the
-/// largest saddle of the main cores. If no core is clearly distinct, D is 1.8 times the mean spacing.
-/// @throws Error InvalidInput.
+/// Chooses D from the points. Let d be the distance to the nearest point. As D grows, the set {d > D} splits into the
+/// exterior and enclosed cores; each core appears when its last gap closes (at a saddle of d) and vanishes at its inner
+/// radius (a maximum of d). D is chosen just above the largest saddle of the main cores, that is, of those whose inner
+/// radius clearly exceeds their saddle and which are not small compared with the largest one. If there are none, D is
+/// 1.8 times the mean spacing. D is at least 1.5 voxels.
+/// @throws Error InvalidInput (no point, or none in the domain).
 [[nodiscard]] COVOL_API TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
                                                               const std::vector<Vec3>& exterior_seeds,
                                                               const RunContext& run = {});

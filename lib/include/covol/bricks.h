@@ -26,8 +26,9 @@ namespace covol {
 struct BrickOptions {
     /// > 0: maximum number of active voxels in a brick, without the layers of its neighbours
     std::int64_t max_voxels = 8'000'000;
-    int overlap = 16;         ///< voxels, a multiple of 8, 8 to 2^23: width of the layers of the neighbours
-    double tolerance = 0.05;  ///< voxels, > 0: neighbours agree if their surfaces differ by less than this
+    /// width of the layers of neighbouring voxels with which a brick is solved, in voxels: a multiple of 8, 8 to 2^23
+    int overlap = 16;
+    double tolerance = 0.05;  ///< the surfaces of neighbours agree if they differ by less than this; voxels, > 0
     int max_sweeps = 4;       ///< maximum number of sweeps over all bricks, >= 1
 };
 
@@ -53,14 +54,16 @@ struct BrickPlan {
     BrickOptions options;
     Domain domain;        ///< of all bricks together
     EdgeOptions edge;     ///< parameters of the edge detector g, the same for all bricks
-    FloatGridPtr coarse;  ///< a level set on a coarser lattice
+    FloatGridPtr coarse;  ///< the result of the coarse solve, from which the bricks start; a level set
     std::vector<Brick> bricks;
-    bool has_sweeps = true;  ///< false (clouds): each brick is solved once, independently of its neighbours
+    /// false for clouds: each brick is solved only once, because its surface does not depend on the states of its
+    /// neighbours
+    bool has_sweeps = true;
     [[nodiscard]] COVOL_API std::int64_t active_voxels() const;
 };
 
 struct SolvedBrick {
-    FloatGridPtr state;  ///< level set; without leaves if no surface passes through the brick
+    FloatGridPtr state;  ///< the new level set of the brick; without leaves if no surface passes through the brick
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
     std::int64_t active_voxels = 0;

@@ -7,8 +7,9 @@
 namespace covol {
 
 /// Saves the states of a run's flows to disk at intervals, so that a run that was killed can resume from them, with
-/// bit-identical results. Flows are numbered in the order of the calls of evolve(), which has to be the same in each
-/// run. Results of other steps (tagging, distances, edges) are not saved; a resumed run computes them again.
+/// bit-identical results. A state is recognised by the number of its flow: flows are numbered in the order of the calls
+/// of evolve(), which has to be the same in each run. Results of other steps (tagging, distances, edges) are not saved;
+/// a resumed run computes them again.
 ///
 /// Flow N is stored in flow-N.vdb (u, and the edge grid if the band has reached new voxels; meant for viewing) and
 /// flow-N.state; both files are replaced together.
@@ -36,8 +37,9 @@ public:
     [[nodiscard]] int begin_flow();
     /// The path of a file of a flow, for example "FOLDER/flow-03.vdb".
     [[nodiscard]] std::string file(int flow, const char* ending) const;
+    /// Whether `every` seconds have passed since the last call of restart_clock() or begin_flow().
     [[nodiscard]] bool is_due() const;
-    /// Has to be called after a state was written; is_due() counts from there.
+    /// Begins a new interval, after which is_due() returns true; to be called after a state was written.
     void restart_clock();
 
 private:

@@ -31,8 +31,8 @@ struct CloudCleanupOptions {
     double simplify = 0;
     CloudSmoothing smooth = CloudSmoothing::None;
     double wlop_fraction = 0.25;  ///< Number of points that WLOP creates, as a fraction of its input, in (0,1].
-    /// Radius of WLOP's neighbourhoods, world units, > 0; automatic: twice the mean distance of the new points
-    /// to their eight neighbours.
+    /// Radius of WLOP's neighbourhoods, world units, > 0; automatic: twice the mean distance of the new points to their
+    /// eight nearest neighbours.
     std::optional<double> wlop_radius;
     int neighbours = 24;  ///< Number of nearest neighbours used for outliers and jets, >= 6.
 
@@ -65,7 +65,7 @@ struct CloudCleanupReport {
     int outlier_passes = 0;
     std::size_t simplified = 0;  ///< number of points removed by `simplify`
     std::size_t smoothed = 0;    ///< number of points that the jets moved or that WLOP created
-    double mean_shift = 0;       ///< mean distance by which the jets moved the points, world units
+    double mean_shift = 0;       ///< mean distance by which the jets moved the points, world units; 0 without jets
     double max_shift = 0;        ///< maximum of that distance
     std::size_t kept = 0;        ///< number of points after cleaning
 };

@@ -13,23 +13,25 @@ class Creases;
 
 /// Measurements of surface_from_cloud().
 struct CloudReport {
-    double spacing = 0;          ///< CloudScale::spacing
-    double turned = 0;           ///< Orientation::turned
-    double noise = 0;            ///< median over the local quadrics of the standard deviation of their points;
-                                 ///< CloudScale::noise if there are no quadrics
-    double radius = 0;           ///< median radius of the neighbourhoods to which the quadrics were fitted
+    double spacing = 0;  ///< CloudScale::spacing
+    double turned = 0;   ///< Orientation::turned
+    /// The standard deviation of the points from their local quadric, median over the quadrics; CloudScale::noise if
+    /// there are no quadrics. World units.
+    double noise = 0;
+    double radius = 0;           ///< median radius of the neighbourhoods to which the quadrics were fitted, world units
     double nearest = 0;          ///< CloudScale::nearest
     double near_reach = 0;       ///< CloudScale::near_reach
     double near_noise = 0;       ///< CloudScale::near_noise
     int iterations = 0;          ///< Orientation::iterations
     bool encloses = true;        ///< CloudOrientation::encloses
     bool fills = false;          ///< CloudOrientation::fills
-    double indicator_cell = 0;   ///< cell size of the indicator's finest lattice
+    double indicator_cell = 0;   ///< cell size of the indicator's finest lattice, world units
     std::size_t stray = 0;       ///< CloudOrientation::stray
     std::size_t enclosed = 0;    ///< CloudOrientation::enclosed
     std::size_t bare_nodes = 0;  ///< number of positions near the points to which no quadric could be fitted, because
                                  ///< the points form no sheet there; the surface follows the indicator there
-    std::size_t dropped_pieces = 0;  ///< number of removed pieces of the surface that have too few points
+    /// number of pieces of the surface that were removed because they have too few points
+    std::size_t dropped_pieces = 0;
     /// number of small pieces that were joined to the nearest piece because there are points all along the gap
     std::size_t joined_pieces = 0;
     std::size_t held_voxels = 0;  ///< number of voxels whose sign is that of the indicator, so that the surface has the

@@ -9,11 +9,13 @@
 
 namespace covol {
 
-/// Similarity of two solids. Distances between their surfaces are symmetric (both directions pooled), in world units.
+/// Similarity of two solids. The distances are measured from positions on either surface to the other surface, in world
+/// units; those of both directions are evaluated together, so that the result does not depend on the order of the
+/// solids.
 struct CompareReport {
     double dice = 0, jaccard = 0;
     double volume_a = 0, volume_b = 0;
-    double hausdorff = 0;  ///< the maximum distance
+    double hausdorff = 0;  ///< the maximum distance (Hausdorff distance)
     double hd95 = 0;       ///< the 95th percentile of the distances
     double assd = 0;       ///< the mean distance (average symmetric surface distance)
 };
@@ -29,8 +31,9 @@ struct Solid {
 /// read_vdb_level_set().
 [[nodiscard]] COVOL_API Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
-/// Measures the overlap on the finer of the two lattices (if only one is a mask, on its voxels), and the distances
-/// between the surfaces.
+/// Measures the overlap of two solids and the distances between their surfaces. The overlap is counted on the finer
+/// lattice of two masks or two level sets, on the mask's lattice if only one solid is a mask, on the level set's
+/// lattice for a level set and a mesh, and on a lattice of 256 voxels along the longest side for two meshes.
 [[nodiscard]] COVOL_API CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
 
 }  // namespace covol

@@ -57,11 +57,12 @@ public:
     [[nodiscard]] COVOL_API bool may_meet(const Vec3& center, double radius) const;
     /// A box that contains the body.
     [[nodiscard]] COVOL_API WorldBox box() const;
-    /// Intersections of the surface with the lines of a grid, between the slices and on the domes, in world units. At
-    /// each node, only the grid axis closest to the surface's normal is used.
+    /// Points on the surface between the slices and on the domes, world units: intersections with the lines of a grid.
+    /// At each node, only the line along the grid axis that is closest to the surface's normal is used.
     /// @param step  maximum distance between the grid's layers along the normal of the slices
     [[nodiscard]] COVOL_API std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
-    /// The deepest position of each hole of each slice.
+    /// For each hole of each slice, the position in the hole that is farthest from the contours; these positions are
+    /// outside of the body.
     [[nodiscard]] COVOL_API std::vector<Vec3> hole_seeds() const;
 
 private:
@@ -89,14 +90,16 @@ struct Contours {
     std::shared_ptr<const ContourSolid> solid;  ///< null if there is no closed contour on parallel slices
     std::size_t closed = 0, open = 0;           ///< numbers of closed and open lines
     std::size_t slices = 0;  ///< number of slices with closed contours; for a network, number of planes
-    bool flat = false;  ///< all marks lie in one plane, which is not the only slice of an image, and no thickness is
-                        ///< given: the thickness of the body is an estimate
+    /// All marks lie in one plane and no thickness is given, so that the thickness of the body is an estimate; false if
+    /// the image consists of that slice only.
+    bool flat = false;
     /// median distance between neighbouring marked slices, world units; the image's spacing for one slice
     double slice_distance = 0;
     std::string summary;      ///< one line for the user
     bool is_network = false;  ///< the planes have several directions: `solid` is null, and the sides of positions are
                               ///< in `inside` and `outside`
-    std::shared_ptr<const Sections> sections;  ///< for a network of closed lines only; else null
+    /// the closed lines of a network; null if there is no network, or if it has open lines or single points
+    std::shared_ptr<const Sections> sections;
     /// for a network: positions in its planes, determined by the even-odd rule in each plane
     std::vector<Vec3> inside, outside;
     /// For a network: for each point of `along`, the direction within its plane that points out of the section; empty
@@ -117,7 +120,7 @@ struct Contours {
 ///     messages name the line).
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,
                                          const ContourOptions& options, const RunContext& run = {});
-/// For clouds in world units without an image.
+/// The same for clouds in world units without an image.
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options,
                                          const RunContext& run = {});
 

@@ -34,8 +34,9 @@ struct EdgeOptions {
     std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: from edge_contrast
     std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
                                           ///< the band
-    /// the percentile for the automatic edge_contrast, in (0,1); automatic: 0.9 for slopes; for lines, edge_contrast is
-    /// a third of the median of s, so that g depends on the brightness relative to the surroundings
+    /// percentile of s in the band that is used as the automatic edge_contrast, as a fraction in (0,1); automatic: 0.9
+    /// for slopes. For lines, the automatic edge_contrast is a third of the median of s, so that g depends on the
+    /// brightness relative to the surroundings.
     std::optional<double> contrast_percentile;
     /// intensities mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
     std::optional<std::array<double, 2>> intensities;
@@ -62,7 +63,7 @@ inline constexpr auto kOptions<EdgeOptions> = std::tuple{
                       [](const EdgeOptions& o) { return !o.edge_k || !o.edge_contrast; }}};
 
 struct EdgeReport {
-    double sigma = 0;          ///< world units
+    double sigma = 0;          ///< width of the presmoothing, world units
     double edge_k = 0;         ///< K as used
     double edge_contrast = 0;  ///< 1/sqrt(K)
     double low = 0, high = 0;  ///< intensities that were mapped to 0 and 1
@@ -83,8 +84,8 @@ struct EdgeResult {
 /// The kind of edge that the image shows at marked positions, averaged over them.
 struct MarkedFeature {
     EdgeFeature feature = EdgeFeature::Slope;
-    double line = 0;  ///< intensity at the positions minus the mean of both sides
-    double step = 0;  ///< half the difference between the intensities outside and inside
+    double line = 0;  ///< mean intensity at the positions minus the mean intensity on both sides of them
+    double step = 0;  ///< half the difference between the mean intensities outside and inside
 };
 
 /// Finds a line if the intensity at the marked positions differs from both sides by more than the sides differ from

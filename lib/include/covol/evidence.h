@@ -14,7 +14,8 @@ namespace covol {
 /// Options of assess_evidence(), which determines which parts of a surface marks or image edges support.
 struct EvidenceOptions {
     double reach = 0.0;  ///< world units, > 0: marks support the surface within this distance
-    /// in (0,1): the image does not support the surface at positions with an edge strength 1 − g below this
+    /// In (0,1): the image does not support the surface at positions at which the edge strength 1 − g is below this; g
+    /// is the value of the edge detector (detect_edges()).
     double weak_edge = 0.25;
     int suggestions = 0;  ///< number of slices to suggest, >= 0
 };
@@ -30,11 +31,11 @@ struct SliceEvidence {
     int slice = 0;                ///< index, from 0
     double area = 0;              ///< area of the surface in the slice, world units^2
     double unsupported_area = 0;  ///< area that neither marks nor the image support
-    /// distance from the surface to the nearest mark of any slice; 0 without marks
+    /// mean and maximum distance from the surface to the nearest mark of any slice, world units; 0 without marks
     double to_marks_mean = 0, to_marks_max = 0;
     double edge_strength = 0;              ///< mean of 1 − g on the surface; 0 without an image
     int marks = 0;                         ///< number of marks in the slice
-    double marks_mean = 0, marks_max = 0;  ///< distance from these marks to the surface
+    double marks_mean = 0, marks_max = 0;  ///< mean and maximum distance from these marks to the surface, world units
 };
 
 /// A slice in which further marks would help, and the position in it where they would help most.
@@ -58,10 +59,10 @@ struct Evidence {
 
 /// Assesses a surface by its marks and the image's edges.
 ///
-/// Triangles are split between the slices. A triangle is unsupported if the means over its vertices exceed `reach` and
-/// are below `weak_edge`. Slices are suggested greedily: first the slice with the largest unsupported area within
-/// `reach` of the surface's outline in it; this area then counts as supported, and the next slice is chosen in the same
-/// way.
+/// Triangles are split between the slices. A triangle is unsupported if the mean distance of its vertices from the
+/// marks exceeds `reach` and the mean edge strength at its vertices is below `weak_edge`. Slices are suggested
+/// greedily: first the slice with the largest unsupported area within `reach` of the surface's outline in it; this area
+/// then counts as supported, and the next slice is chosen in the same way.
 /// @param mesh   world units
 /// @param marks  world positions, may be empty
 /// @param edge   g from detect_edges(); background 1

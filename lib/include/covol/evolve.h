@@ -29,10 +29,11 @@ struct EvolveOptions {
     /// in [0,1]: fraction by which ρ is reduced at marks; the reduction decreases with the distance from them like the
     /// attraction of the points. Automatic: 0; segment() chooses a value.
     std::optional<double> image_yields;
-    /// in [0,1]: factor of θ far from all trusted marks (EvolveFields::trusted); it increases to 1 towards them, with
-    /// the same dependence on the distance.
+    /// in [0,1]: factor of θ far from all trusted marks (EvolveFields::trusted). It increases to 1 towards these marks,
+    /// with the same dependence on the distance as the attraction of the points.
     double guess_weight = 1.0;
-    bool follow = false;  ///< the band moves with the surface; needed for starts other than tagging.
+    /// the band moves with the surface; needed for starts other than tagging, whose band is only 6 voxels wide
+    bool follow = false;
     int max_steps = 500;  ///< upper bound on time steps, >= 0
     /// the flow is steady if the zero crossings move by less than tolerance * τ per step on average. It is also steady
     /// if their net motion, which oscillations do not affect, is that small over 10 steps, or, with `follow`, over 3
@@ -76,8 +77,8 @@ inline constexpr auto kOptions<EvolveOptions> = std::tuple{
 enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
 [[nodiscard]] COVOL_API const char* to_string(StopReason reason);
 
-/// The instruction set of the kernels, as chosen for this processor: "baseline", "avx2" or "avx512". Results of
-/// different sets differ by less than 1e-4 voxels.
+/// The instruction set for which the innermost loops of evolve() were compiled, as chosen for this processor:
+/// "baseline", "avx2" or "avx512". Results of different sets differ by less than 1e-4 voxels.
 [[nodiscard]] COVOL_API const char* instruction_set();
 
 struct EvolveReport {
@@ -86,7 +87,7 @@ struct EvolveReport {
     double last_change = 0;      ///< mean displacement of the zero crossings in the last step, voxels
     std::vector<float> changes;  ///< that displacement for each step
     double sweeps_per_step = 0;
-    std::int64_t leaf_visits = 0;        ///< leaves swept, over all steps and sweeps
+    std::int64_t leaf_visits = 0;        ///< number of visits of a leaf, over all steps and sweeps
     std::int64_t leaf_visits_saved = 0;  ///< visits that were skipped because the leaf did not change
     std::int64_t active_voxels = 0;      ///< after the last step
     std::int64_t leaf_count = 0;
@@ -99,8 +100,9 @@ struct EvolveFields {
     /// distance d to the points, world units; points have no effect in inactive voxels
     const FloatGrid* distance = nullptr;
     const FloatGrid* edge = nullptr;  ///< g in (0,1]; the image has no effect in inactive voxels
-    /// distance to the trusted points, which are marks and not interpolated; image_yields and guess_weight refer to
-    /// these. Inactive voxels count as far from them; null: all points are trusted.
+    /// Distance to the trusted points, world units: the marks, without points that were interpolated between them.
+    /// EvolveOptions::image_yields and guess_weight depend on this distance. Inactive voxels count as far from all
+    /// trusted points; null: all points are trusted.
     const FloatGrid* trusted = nullptr;
     /// An upper bound of u, world units: after each step u <= obstacle, so that {obstacle < 0} stays inside. Outside of
     /// its leaves its background is the bound; null: no bound.
@@ -120,8 +122,9 @@ struct EvolveFields {
 ///
 /// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
 /// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).
-/// @post  without `follow`, u keeps its topology, and min u0 <= u <= max u0; with it, u gets a new tree (accessors
-///     become invalid). Values do not depend on the number of threads.
+/// @post  without `follow`, u keeps its active voxels, and its values stay between the minimum and the maximum of the
+///     given ones; with `follow`, u gets a new tree (accessors become invalid). Values do not depend on the number of
+///     threads.
 /// With RunContext::checkpoints the state is saved at intervals, at the end and on cancellation, and the flow resumes
 /// from a saved state; the final result is bit-identical.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a

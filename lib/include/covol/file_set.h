@@ -38,7 +38,8 @@ COVOL_API void wait_for_folder(const std::filesystem::path& folder, const RunCon
 /// empty or contain covol's own marker, made for this folder by this user.
 class COVOL_API ScratchFolder {
 public:
-    /// What the next run removes if this process is killed: the whole folder, or only the names given to list().
+    /// What the next run removes if this process is killed: the whole scratch folder, or only the names in it that were
+    /// given to list().
     enum class Clears { All, Listed };
     /// @param beside  the folder in which the scratch folder is made
     /// @throws Error Io (another program locks that folder for more than a minute), Cancelled.
@@ -51,7 +52,7 @@ public:
     /// For Clears::Listed: registers the name of a file or folder that will be created in the scratch folder. @throws
     /// Error Io.
     void list(const std::string& name);
-    /// Excludes this folder from remove_all().
+    /// Excludes this folder from remove_all(), so that the next run finds it and can complete an interrupted publish().
     void keep_for_next_run() noexcept;
 
     /// Removes all scratch folders of this process; for a process that ends without calling destructors, for example

@@ -36,6 +36,6 @@ struct WorldBox;
 
 using Vec3 = std::array<double, 3>;                    ///< x, y, z
 using Index3 = std::array<std::int32_t, 3>;            ///< i, j, k
-using Matrix3 = std::array<std::array<double, 3>, 3>;  ///< rows
+using Matrix3 = std::array<std::array<double, 3>, 3>;  ///< m[row][column]
 
 }  // namespace covol

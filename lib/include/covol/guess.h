@@ -20,12 +20,12 @@ struct GuessOptions {
     /// Standard deviation of a mark's position along three directions, as vectors in world units (for an image, its
     /// axes multiplied by a fraction of the spacing).
     std::array<Vec3, 3> deviation{};
-    /// Maximum to which the deviation may be raised if the marks are inconsistent; it is not raised if this is at most
-    /// the longest vector of `deviation`.
+    /// Maximum length, in world units, to which the longest vector of `deviation` may be raised if the marks are
+    /// inconsistent; the deviation is not raised if this is at most its stated length.
     double max_deviation = 0;
     std::vector<Vec3> inside, outside;  ///< positions whose side is known
-    /// The box at which the body is cut off. Marks on the cut faces inside the body are not used as marks on its
-    /// surface.
+    /// The box at which the body is cut off. Marks on its faces that lie inside the section of the body only show that
+    /// the body is cut there; they are not used as marks on its surface.
     std::optional<WorldBox> end;
     /// Approximate outward normals, one for each mark. Empty: unknown.
     std::vector<Vec3> normals;
@@ -43,9 +43,11 @@ inline constexpr auto kOptions<GuessOptions> =
 struct GuessReport {
     std::size_t marks = 0;      ///< number of marks that determine the surface
     std::size_t cut_marks = 0;  ///< number of marks that were not used because they lie on a cut face, inside the body
-    /// number of overlapping surfaces through subsets of the marks; 0: one surface through all marks
+    /// number of overlapping surfaces, each through a subset of the marks, of which the surface is composed; 0: one
+    /// surface passes through all marks
     std::size_t patches = 0;
-    /// constraints outside were added, because the surface would have extended far beyond the marks
+    /// whether additional constraints on an ellipsoid around the marks close the surface, because it would otherwise
+    /// extend far beyond the marks
     bool held_around = false;
     /// number of positions in GuessOptions::inside and outside that lie on the wrong side of the result
     std::size_t wrong_seeds = 0;
@@ -56,7 +58,7 @@ struct GuessReport {
 [[nodiscard]] COVOL_API bool can_enclose(const std::vector<Vec3>& marks);
 
 struct Guess {
-    FloatGridPtr u;           ///< a start: signed distance clamped to +-3h, active near the surface
+    FloatGridPtr u;           ///< a start: signed distance clamped to +-3h, h the voxel size; active near the surface
     std::vector<Vec3> marks;  ///< the marks that determine the surface, without those on a cut face
     GuessReport report;
 };

@@ -23,8 +23,9 @@ inline constexpr double kCorrectionVoxels = 12.0;
 struct CorrectionOptions {
     /// standard deviation of a mark's position, world units, > 0; automatic: half a voxel
     std::optional<double> precision;
-    std::optional<double> min_radius;  ///< minimum radius within which a mark changes the guess, world units, > 0;
-                                       ///< automatic: kCorrectionVoxels
+    /// minimum radius within which a mark changes the guess, world units, > 0; automatic: kCorrectionVoxels voxels; in
+    /// segment() also at least twice the widest spacing of the image
+    std::optional<double> min_radius;
 };
 
 template <>
@@ -36,18 +37,21 @@ inline constexpr auto kOptions<CorrectionOptions> =
                       "lies inside, 2.2 times if outside, if that is larger"}};
 
 struct CorrectionReport {
-    /// numbers of marks, and of seeds that act because they were on the wrong side of a surface
+    /// number of marks, and number of seeds that act like marks because they lie on the wrong side of the guess or of
+    /// the corrected surface
     std::size_t marks = 0, seeds = 0;
-    double before_mean = 0, before_max = 0;     ///< distances of the marks to the guess, world units
-    double after_mean = 0, after_max = 0;       ///< distances of the marks to the corrected surface
-    double min_radius = 0, largest_radius = 0;  ///< radii within which marks act, world units
+    double before_mean = 0, before_max = 0;  ///< distances of the marks to the guess, world units
+    double after_mean = 0, after_max = 0;    ///< distances of the marks to the corrected surface
+    /// minimum and maximum of the radii within which marks act, world units
+    double min_radius = 0, largest_radius = 0;
     double depth = 0;  ///< radius of the largest ball inside the guess, world units, accurate to 8 voxels
 };
 
 /// A mask after a correction, in the geometry of the original mask.
 struct CorrectedMask {
-    std::vector<std::int32_t> values;                 ///< i fastest
-    std::size_t added = 0, removed = 0, reached = 0;  ///< numbers of voxels; reached: voxels in which c is not 0
+    std::vector<std::int32_t> values;  ///< i fastest
+    /// numbers of voxels; reached: voxels at which GuessCorrection::shift() is not 0
+    std::size_t added = 0, removed = 0, reached = 0;
 };
 
 /// A guess, corrected by marks: its new level set is s - c, where s is the guess's signed distance and c a sum of

@@ -17,11 +17,13 @@ struct GuidanceOptions {
     /// standard deviation of a mark's position along each axis, >= 0; automatic: kUniformDeviation times the image's
     /// voxel
     std::optional<double> mark_precision;
-    /// maximum distance from the guess within which the border is searched, >= 0: twice the assumed standard deviation
-    /// of the guess; automatic: from the distance to the marks, and the deviation also from the image
+    /// Maximum distance from the guess at which the border is searched, >= 0. Half of it limits the standard deviation
+    /// of the guess that is assumed. Automatic: both are estimated from the distances to the marks, the standard
+    /// deviation also from the image.
     std::optional<double> range;
-    /// upper limit of the root mean square error of the guess divided by the distance from the nearest mark, >= 0, if
-    /// it was measured; automatic: no limit; the estimate from the image is too large if the image shows another border
+    /// Upper limit, >= 0, of the ratio of the root mean square error of the guess to the distance from the nearest
+    /// mark, from a measurement (InferenceReport::error_slope). Without it (automatic), this ratio is estimated from
+    /// the image alone; the estimate is too large if the image shows another border.
     std::optional<double> error_slope;
     double weight = 1;  ///< in [0,1]: weight of the image's evidence; 0 leaves the guess unchanged
 };
@@ -42,14 +44,17 @@ struct GuidanceReport {
     double inside = 0, border = 0, outside = 0;
     double sigma = 0;    ///< the width of the presmoothing with which the image predicted the marks best, world units
     bool local = false;  ///< the intensity profile was estimated separately for different parts of the surface
-    double gain = 0;     ///< mean increase by the image of the log-likelihood of held-out marks, nats
-    /// estimated distance of the border that the image alone gives from the true border (rms at the marks; rather too
-    /// large)
+    double gain = 0;     ///< mean increase, due to the image, of the log-likelihood of a held-out mark, nats
+    /// Estimated root mean square distance between the border that the image alone gives and the true border, measured
+    /// at held-out marks. It is rather too large, because a standard error is added.
     double image_error = 0;
-    double guess_error = 0;         ///< estimated distance of the guess from the true border (rms; rather too small)
-    double confident_fraction = 0;  ///< fraction of the area in which the image is more informative than the guess
-    double mean_offset = 0;         ///< mean over the area of the movement along the normals, outward > 0
-    double max_offset = 0;          ///< maximum of its absolute value
+    /// Estimated root mean square distance of the guess from the true border. It is rather too small, because a
+    /// standard error is subtracted from its growth with the distance from the marks.
+    double guess_error = 0;
+    /// fraction of the area in which the image determines the result more than the guess does
+    double confident_fraction = 0;
+    double mean_offset = 0;  ///< mean over the area of the movement along the normals, outward > 0
+    double max_offset = 0;   ///< maximum of the absolute value of that movement
 };
 
 struct Guided {

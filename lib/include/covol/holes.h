@@ -51,7 +51,7 @@ struct BoundaryLoop {
 struct HolesReport {
     Holes policy = Holes::Close;  ///< what was done, never Auto
     double distance = 0;          ///< the value of HolesOptions::distance that was used
-    double fraction = 0;          ///< of the closed surface's area that was trimmed or flattened
+    double fraction = 0;          ///< fraction of the closed surface's area that was trimmed or flattened
     /// only from segment(): the volume of the mesh before it was trimmed; 0 if it was not trimmed
     double closed_volume = 0;
     std::size_t dropped_pieces = 0;   ///< number of pieces between holes that were removed because they were too small
@@ -63,12 +63,12 @@ struct HolesReport {
 /// in 10^12 discs of that radius is empty.
 [[nodiscard]] COVOL_API double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size);
 
-/// The distance of each vertex to the nearest point. @pre there is a point
+/// The distance of each vertex to the nearest point, world units. @pre there is a point
 [[nodiscard]] COVOL_API std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points,
                                                              const RunContext& run = {});
 
-/// Fraction of the area whose triangles are farther than `distance` from every point.
-/// @param distances  at the vertices, from measure_distances()
+/// Fraction of the mesh's area that is farther than `distance` from every point.
+/// @param distances  of the vertices to the points, from measure_distances()
 [[nodiscard]] COVOL_API double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
                                                        double distance);
 

@@ -179,12 +179,12 @@ private:
     std::shared_ptr<const void> data_;             // points to voxel held_.min
     std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from one voxel to the next along i, j, k
     bool mapped_ = false;
-    std::shared_ptr<const detail::ChunkedVoxels> chunks_;  // for an image in chunks, instead of data_
+    std::shared_ptr<const detail::ChunkedVoxels> chunks_;  // used instead of data_ for an image that is read in chunks
     Index3 first_{0, 0, 0};                                // index in the file of voxel held_.min
     std::optional<ChunkCount> chunk_count_;
 };
 
-/// The information in a file's header.
+/// The information in the header of an image file.
 struct ImageInfo {
     ImageGeometry geometry;
     PixelType type = PixelType::Float;
@@ -230,8 +230,8 @@ struct ImageInfo {
 
 /// Writes an image with this geometry and these values (i fastest) as .nrrd, .nii, .nii.gz, .mha or .tif, by the file
 /// extension; compressed, except .nii. A TIFF has spacing, unit and origin (as Fiji writes them) but cannot store a
-/// direction; NIfTI stores only the units m, mm and um; the numbers are never converted. The file is written
-/// completely or not at all: under a temporary name in the same folder, then renamed.
+/// direction; NIfTI stores only the units m, mm and um. Lengths are written as they are, in whatever unit. The file is
+/// written completely or not at all: under a temporary name in the same folder, then renamed.
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);

@@ -47,7 +47,7 @@ public:
     [[nodiscard]] const Image& image() const noexcept { return image_; }
     [[nodiscard]] const std::vector<Level>& levels() const noexcept { return levels_; }  ///< the finest first
     [[nodiscard]] COVOL_API bool is_in_chunks() const noexcept;
-    /// Size of a level's chunks in voxels; 0 for an image that is held in memory.
+    /// Size of a level's chunks along i, j, k in voxels; 0 for an image that is held in memory.
     [[nodiscard]] COVOL_API Index3 chunk_size(std::size_t level) const;
     /// The coarsest level that suffices for pixels that are `step` voxels of the finest level wide: the coarsest one
     /// for which `step` is a multiple of its factors. @param step  >= 1

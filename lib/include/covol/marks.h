@@ -25,9 +25,10 @@ struct PaintedImage {
     Image image;
     PaintedOptions options;
     std::vector<LabelName> labels;  ///< the labels that belong to structures
-    std::string name;       ///< name of the structure to which all labels belong; empty: each label has its own name
-    bool is_shared = true;  ///< the image is shared by several structures: the paint of each is outside of the others,
-                            ///< and labels keep their values
+    std::string name;  ///< name of the structure to which all labels belong; empty: each label has its own name
+    /// Several structures share the image: each one's paint is outside of the others, and the labels are also the
+    /// structures' values in masks. false: the image belongs to one structure.
+    bool is_shared = true;
 };
 /// Makes a painted image and finds its labels. @throws Error as find_painted_labels().
 [[nodiscard]] COVOL_API PaintedImage make_painted(const Image& image, const PaintedOptions& options = {});
@@ -56,12 +57,14 @@ struct MarksOrigin {
     std::string name;  ///< of the structure; empty: it is the only one
     int label = 0;     ///< value of the structure in a mask of all structures; 0: number_labels() chooses it
     MarkFiles files;   ///< empty: the marks were given in memory
-    std::vector<std::string> rules;      ///< how the coordinates of each cloud of points were interpreted
+    /// how the coordinates of each cloud of points were interpreted, one line each for the user
+    std::vector<std::string> rules;
     std::size_t count = 0;               ///< number of marks that were given
     std::optional<std::size_t> thinned;  ///< number of points after thinning
 };
 
-/// The marks of one structure; world units, except for clouds, which have coordinates of their own.
+/// The marks of one structure, in world units, except for PointCloud, whose coordinates are those of its member
+/// `space`.
 struct Marks : MarksOrigin {
     std::vector<Vec3> points;
     PointHints hints;                         ///< for the points
@@ -96,8 +99,9 @@ COVOL_API void thin_points(Marks& marks, std::size_t maximum, const RunContext& 
 [[nodiscard]] COVOL_API Marks* find_structure(std::vector<Marks>& structures, const std::string& name);
 /// The structure with that name; if there is none, a new one at the end.
 COVOL_API Marks& find_or_add_structure(std::vector<Marks>& structures, const std::string& name);
-/// Assigns each painted label to the structure with its name. A single label without a name is assigned to the
-/// structure without a name.
+/// Assigns each painted label to the structure with its name, which is added if it does not exist. If there is only one
+/// label and its image has no name, it is assigned to the only structure if that has no name, or, if there is no
+/// structure and the label has no name, to a new structure without a name.
 COVOL_API void add_paint(std::vector<Marks>& structures,
                          const std::vector<std::shared_ptr<const PaintedImage>>& images);
 /// Gives each structure whose `label` is 0 its value in masks: that of its painted label in a shared image if no other
@@ -113,9 +117,9 @@ struct MarksOptions {
 
 /// Information about one structure in addition to its result.
 struct StructureFacts : MarksOrigin {
-    std::string grid;                           ///< name of its grid, from make_grid_names()
-    std::vector<Vec3> marks;                    ///< cleaned points and the marks of contours as they were set
-    std::vector<std::string> contour_rules;     ///< how each cloud of contours was interpreted
+    std::string grid;                        ///< name of its grid, from make_grid_names()
+    std::vector<Vec3> marks;                 ///< cleaned points and the marks of contours as they were set
+    std::vector<std::string> contour_rules;  ///< how each cloud of contours was interpreted, one line each for the user
     std::optional<CloudCleanupReport> cleanup;  ///< if points were cleaned
     /// paths of painted images, and the information derived from their paint
     std::vector<std::pair<std::string, PaintedLabel>> paint;

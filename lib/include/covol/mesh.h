@@ -37,7 +37,7 @@ struct MeshMeasures {
     double volume = 0;  ///< signed; positive when oriented outward
     double area = 0;
     int components = 0;     ///< number of parts whose triangles are connected by edges
-    int genus = 0;          ///< sum over all components, from Euler's characteristic; -1 if not closed
+    int genus = 0;          ///< sum over all components, from Euler's characteristic; -1 if the mesh is not closed
     bool closed = false;    ///< every edge belongs to exactly two triangles of opposite direction
     bool manifold = false;  ///< each vertex's triangles form one fan, and no edge has more than two triangles; the mesh
                             ///< need not be closed

@@ -41,7 +41,7 @@ struct CleanupStep {
 struct CleanupReport {
     int self_intersections = 0;  ///< number of pairs of triangles before the repair
     int holes_filled = 0;
-    bool closed = false, manifold = false, intersection_free = false;  ///< after all steps
+    bool closed = false, manifold = false, intersection_free = false;  ///< of the mesh after all steps
     std::optional<CleanupStep> decimation, smoothing;
 };
 /// Modifies a mesh so that it is closed, manifold, oriented outward and free of self-intersections (CGAL, OpenMesh).

@@ -26,7 +26,8 @@ struct RelaxReport {
     double smallest_angle_before = 0, smallest_angle = 0;
     std::int64_t flips = 0;      ///< number of flipped edges
     std::int64_t collapses = 0;  ///< number of short edges of slivers that were collapsed
-    MeshDeviation deviation;     ///< distance from the level set, including that of the vertices
+    /// distance of the vertices and triangles from the level set, as from measure_deviation()
+    MeshDeviation deviation;
 };
 
 /// Improves the shape of the triangles of a level set's mesh: edges are flipped if that increases the smallest angle,

@@ -30,7 +30,7 @@ class SurfaceTemplate {
 public:
     /// @param surface  level set, negative inside
     /// @param image    in which the surface lies; need not outlive the constructor
-    /// @throws Error InvalidOptions (memory), InvalidInput (no surface), Cancelled.
+    /// @throws Error InvalidOptions (more memory needed than the budget allows), InvalidInput (no surface), Cancelled.
     COVOL_API SurfaceTemplate(const FloatGridPtr& surface, const Image& image, const RunContext& run = {});
 
     /// Moves every patch of the surface to the position at which the brightness along its normal is most similar to the
@@ -39,7 +39,7 @@ public:
     /// maximisation. Brightness is compared up to a gain and an offset for the whole surface. If the image did not
     /// change, nothing moves.
     /// @return the result, which does not depend on the number of threads
-    /// @throws Error InvalidOptions (memory), Cancelled.
+    /// @throws Error InvalidOptions (more memory needed than the budget allows), Cancelled.
     [[nodiscard]] COVOL_API Followed follow(const Image& image, const RunContext& run = {}) const;
 
     struct Data;

@@ -49,7 +49,7 @@ enum class Offered {
     Always,
     WithImage,    ///< not for points alone
     PointsAlone,  ///< not for jobs with an image
-    SingleStep    ///< only if the struct's own step runs alone
+    SingleStep    ///< only for commands that run this step alone, such as `covol evolve`
 };
 
 /// Finite numbers between two limits.
@@ -102,7 +102,7 @@ struct OptionInfo {
     Place place{};
     const char* text = "";             ///< one line of help; names of options in backquotes
     const char* automatic = "";        ///< description of the automatic choice, unless the default is a plain value
-    const char* automatic_alone = "";  ///< the same if the step runs alone, if that differs
+    const char* automatic_alone = "";  ///< the automatic choice of a command that runs the step alone, if it differs
 };
 
 template <typename Struct, typename Value>
@@ -156,9 +156,9 @@ constexpr void for_each_option(Options& options, const Visit& visit) {
 template <typename T>
 inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
 
-/// For why_invalid(): adds a line "name: complaint" unless the complaint is empty.
+/// For why_invalid(): appends a line "name: complaint" to `lines` unless the complaint is empty.
 COVOL_API void add_complaint(std::string& lines, const char* name, const std::string& complaint);
-/// Adds such a line if a number is outside of the option's range.
+/// Appends such a line if `value` is outside of the option's range.
 COVOL_API void complain(std::string& lines, const OptionInfo& option, double value);
 
 namespace detail {
@@ -204,8 +204,8 @@ template <typename Options>
     return lines;
 }
 
-/// @throws Error InvalidOptions, "function: tau: expected ...", if a field is invalid; Error::option() is the first
-/// one.
+/// @throws Error InvalidOptions, "function: tau: expected ...", if a field is invalid; Error::option() is the name of
+/// the first invalid option.
 template <typename Options>
 void require_valid(const Options& options, const char* function) {
     const std::string why = why_invalid(options);

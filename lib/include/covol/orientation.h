@@ -33,13 +33,13 @@ public:
     COVOL_API explicit Indicator(std::unique_ptr<const Values> values);
     COVOL_API ~Indicator();
     struct Sample {
-        double inside;
-        Vec3 gradient;
-        double cell;  ///< cell size of the indicator's grid at this position
-    };                ///< units: 1, 1 / world unit, world units
+        double inside;  ///< value of the indicator
+        Vec3 gradient;  ///< of that value, per world unit
+        double cell;    ///< cell size of the indicator's grid at this position, world units
+    };
     [[nodiscard]] COVOL_API Sample at(const Vec3& world) const;
-    [[nodiscard]] COVOL_API double inside(const Vec3& world) const;  ///< as at(), but faster
-    [[nodiscard]] COVOL_API double cell() const;                     ///< cell size of its finest grid, world units
+    [[nodiscard]] COVOL_API double inside(const Vec3& world) const;  ///< the same as at(world).inside, but faster
+    [[nodiscard]] COVOL_API double cell() const;  ///< cell size of the indicator's finest grid, world units
     /// Calls visit(box), with the box in world units, for each cell that the indicator's level 1/2 crosses.
     COVOL_API void crossed(const std::function<void(const WorldBox&)>& visit) const;
 
@@ -56,7 +56,7 @@ struct Orientation {
     std::shared_ptr<const Indicator> screened;
     /// fraction of the points whose normal was turned by more than 90 degrees in the last iteration
     double turned = 0;
-    double off_half = 0;  ///< absolute difference between 1/2 and the indicator's mean over the points
+    double off_half = 0;  ///< absolute difference between 1/2 and the indicator's mean over the points; 0 is ideal
     int iterations = 0;
     /// number of normals that were replaced, because they were not perpendicular to the sheet of their neighbours or
     /// pointed to its wrong side
@@ -90,10 +90,11 @@ struct PointHints {
 [[nodiscard]] COVOL_API PointHints carried(const PointHints& hints, const std::vector<Vec3>& from,
                                            const std::vector<Vec3>& to);
 
-/// How the hints were used; they are checked first.
+/// Whether and how hints were used. They are used only if they are consistent with the points.
 struct HintsReport {
-    std::size_t normals = 0, sensors = 0;  ///< number of points that have them
-    bool used = false;                     ///< the hints determine the orientation
+    /// number of points with a given normal, and with a given direction to the sensor
+    std::size_t normals = 0, sensors = 0;
+    bool used = false;  ///< the hints determine the orientation
     /// the orientation follows from the sides from which points were seen, because there are no usable normals
     bool from_sensor = false;
     bool inward = false;  ///< all given normals were flipped, because most pointed inwards
@@ -126,7 +127,7 @@ struct CloudOrientation {
 /// The same, but uses normals and sensor directions if they are consistent: half of them has to predict the sides of
 /// the other half, and if the orientation without hints converges, the hints must not contradict it in whole regions.
 /// From a sensor direction, a point gets the normal of its local plane on the side that was seen.
-/// @throws Error also InvalidInput (a list of another size)
+/// @throws Error also InvalidInput (a list of hints that is neither empty nor as long as `points`)
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,
                                                       const RunContext& run = {});
 

@@ -27,15 +27,17 @@ struct SliceRequest {
 /// A slice of an image for a browser.
 struct PageSlice {
     int width = 0, height = 0;
-    /// longest edge, in voxels of the image, of the voxels from which the slice was made; above 1, these belong to a
-    /// coarser level
+    /// Longest edge of the voxels from which the slice was made, in voxels of the image; above 1 if these voxels belong
+    /// to a coarser level of the image.
     int factor = 1;
-    /// A zlib stream (RFC 1950) of 16-bit numbers, the low byte first, row by row: 0 is range[0] and 65535 range[1].
+    /// A zlib stream (RFC 1950) of 16-bit numbers, the low byte first, row by row: 0 stands for range[0] and 65535 for
+    /// range[1], where `range` is the argument of make_page_slice() or make_oblique_slice().
     std::string bytes;
 };
 
 /// Makes a slice whose pixels are voxels or means of step x step voxels, of fewer voxels at the end of a row or column.
-/// For an image with coarser levels, the coarsest one that suffices is used; its voxels are also thicker.
+/// For an image with coarser levels, the slice is made from the coarsest level that suffices, whose voxels are also
+/// thicker along the axis.
 /// @param range  values beyond it are clamped
 /// @throws Error InvalidOptions (outside of the image); whatever reading the image throws; Cancelled.
 [[nodiscard]] COVOL_API PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted,

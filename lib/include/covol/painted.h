@@ -59,24 +59,24 @@ struct PaintedLabel {
     std::string name;
     std::size_t voxels = 0;
     std::vector<PaintedView> views;  ///< empty if all paint is scribbles
-    std::vector<Vec3> inside;        ///< world positions of the outer voxels of scribbles
+    std::vector<Vec3> inside;        ///< seeds: world positions of the outer voxels of scribbles
     std::string summary;             ///< one line for the user
 };
 
 struct Painted {
     ImageGeometry geometry;  ///< of the label image
     std::vector<PaintedLabel> labels;
-    std::vector<Vec3> outside;  ///< world positions of the outside label's outer voxels
+    std::vector<Vec3> outside;  ///< seeds: world positions of the outer voxels of PaintedOptions::outside_label
 };
 
 /// Distinguishes, for each label, slices painted as a whole from scribbles.
 ///
-/// A slice counts as painted as a whole if it contains an area: a patch wider than 2 voxels that is not a stroke (a
+/// A slice counts as painted as a whole if it contains an area: a patch at least 2 voxels wide that is not a stroke (a
 /// stroke is at most 4 voxels wide, and at least 6 times as long). Slices perpendicular to an axis are accepted if they
-/// are separate, or form runs of adjacent slices that are thin compared with the widest patch (a third of its width, in
-/// voxels and in length); a ball of paint satisfies neither. Several axes may have such slices. If no axis has, thick
-/// runs along one axis are accepted if the paint ends abruptly there: its sections, extrapolated like those of an
-/// ellipsoid, would continue into the next slice. All other paint is a scribble.
+/// are separate, or form runs of adjacent slices that are thin compared with the widest patch (at most half of its
+/// width, in voxels and in length); a ball of paint satisfies neither condition. Several axes may have such slices. If
+/// no axis has, thick runs along one axis are accepted if the paint ends abruptly there: its sections, extrapolated
+/// like those of an ellipsoid, would continue into the next slice. All other paint is a scribble.
 ///
 /// The outline of a patch runs between the painted voxels and their neighbours. It is smoothed without shrinking (a
 /// local quadratic over 8 voxels to each side, fewer on small patches), which moves it by at most half a voxel. At the

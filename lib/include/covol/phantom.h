@@ -14,11 +14,11 @@ struct PhantomOptions {
     std::string kind = "sphere";  ///< sphere, torus, box, two-spheres, sphere-round, sphere-square, sphere-slit
     int size = 128;               ///< voxels along each axis, >= 16
     int point_count = 3000;  ///< number of points on the true surface; for the spheres with holes, in the holes only
-    double noise = 0.0;      ///< standard deviation of additive Gaussian noise, in units of the contrast
+    double noise = 0.0;      ///< standard deviation of additive Gaussian noise, relative to the contrast of 255
     std::uint64_t seed = 1;
 };
 struct Phantom {
-    Image image;  ///< uint8, contrast 0..255
+    Image image;  ///< uint8, from 0 (dark) to 255 (bright)
     std::vector<Vec3> points;
     std::vector<std::uint8_t> labels;  ///< voxels of the solid, on the image's lattice, i fastest
 };

@@ -29,12 +29,12 @@
 
 namespace covol {
 
-/// Up to 4,000 marks: a guess from the marks (see SegmentOptions::model). More marks are tagged if there is an image,
-/// and are treated as a cloud otherwise.
+/// The start depends on the number of marks: from up to 4,000 marks, a guess is made (see SegmentOptions::model). More
+/// marks are tagged if there is an image, and are treated as a cloud otherwise.
 struct AutoStart {};
 struct GuessStart {};  ///< the surface of minimum bending energy through the marks
 struct CloudStart {};  ///< surface_from_cloud(), for points without an image
-struct TagStart {};    ///< the tagged points, or the body between contours
+struct TagStart {};    ///< the body that tagging makes from the points, or the body between contours
 struct SphereStart {
     Vec3 center{0, 0, 0};
     double radius = 0;  ///< world units, > 0
@@ -49,8 +49,9 @@ struct MaskStart {
     std::shared_ptr<const Image> mask;  ///< voxels above 0 are inside
 };
 struct LevelSetStart {
-    FloatGridPtr level_set;   ///< negative inside
-    bool is_settled = false;  ///< the level set is a result: marks and image correct it, and no flow follows
+    FloatGridPtr level_set;  ///< negative inside
+    /// the level set is the result of an earlier run: marks and image only correct it, and no flow follows
+    bool is_settled = false;
 };
 /// The start: made from the marks, or given by the caller. read_start() reads the files of given starts.
 using Start = std::variant<AutoStart, GuessStart, CloudStart, TagStart, SphereStart, BoxStart, MeshStart, MaskStart,
@@ -101,7 +102,7 @@ struct SegmentOptions {
     /// For a network of contours, whose lines are given as marks: a guess that contradicts the sections is replaced by
     /// a surface that is interpolated between them.
     std::shared_ptr<const Sections> sections;
-    PointHints hints;                    ///< for the points as they are given; used for clouds
+    PointHints hints;  ///< normals and sensor directions of the given points, in their order; only used for clouds
     std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
     std::size_t painted_seeds = 0;       ///< number of these seeds that are voxels of paint; for messages
     std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
@@ -119,8 +120,8 @@ struct SegmentOptions {
     /// number of coarser levels, of voxel size 2h, 4h, ..., on which the flow runs first, >= 0; automatic: 1 for a
     /// sphere or a box, else 0
     std::optional<int> coarse_levels;
-    /// Whether, without an image, neither a guess nor a cloud is made from the points, because they are tagged or
-    /// belong to contours or another start; the argument `tagged` of choose_voxel_size().
+    /// Whether points without an image are tagged, or belong to contours or to another start, so that neither a guess
+    /// nor a cloud is made from them; the argument `tagged` of choose_voxel_size().
     [[nodiscard]] COVOL_API bool tags_points() const;
 };
 
@@ -199,8 +200,8 @@ struct SegmentReport {
     /// Marks that are far from the surface: they are wrong, or a part of the structure is missing.
     struct MarksOff {
         std::size_t count = 0;
-        /// distance from which on marks count, world units: twice the widest voxel, or 4 times a cloud's noise if that
-        /// is more
+        /// distance from the surface above which a mark counts, world units: twice the widest voxel, or 4 times a
+        /// cloud's noise if that is more
         double beyond = 0;
         double farthest = 0;  ///< maximum distance of all marks, world units
         Vec3 farthest_world{0, 0, 0};
@@ -213,8 +214,8 @@ struct SegmentReport {
     struct ImageBorder {
         int voxels = 0;  ///< distance from the marks, outward > 0, in voxels of the image, or in steps of voxel_size if
                          ///< that is longer
-        double fraction = 1;  ///< slope at the marks, within a voxel, divided by the slope at that position
-        double errors = 0;    ///< difference between the two slopes in standard errors of the mean
+        double fraction = 1;  ///< maximum slope within a voxel of the marks, divided by the slope at that position
+        double errors = 0;    ///< difference between these two slopes, in standard errors of its mean
     };
     std::optional<ImageBorder> image_border;  ///< none in the same cases as image_support
     /// If the start is a guess: fraction of the surface that is farther from all marks than half the diagonal of their
@@ -225,9 +226,10 @@ struct SegmentReport {
     CorrectionReport correction;  ///< of SegmentOptions::guess
     /// fraction of the closed surface's area that is farther than holes.distance from every point
     double fraction_without_points = 0;
-    HolesReport holes;                             ///< for points without an image; distance 0: not treated
-    SegmentOptions resolved;                       ///< the options that were used, with the values of automatic choices
-    std::map<std::string, std::string> automatic;  ///< each automatic choice: its name, value and reason
+    HolesReport holes;        ///< for points without an image; its `distance` is 0 if holes were not treated
+    SegmentOptions resolved;  ///< the options that were used, with the values of automatic choices
+    /// value and reason of each automatic choice, by the name of the option
+    std::map<std::string, std::string> automatic;
 };
 
 struct SegmentResult {
@@ -249,15 +251,17 @@ public:
           distance(std::move(distance_)),
           edge(std::move(edge_)) {}
     FloatGridPtr start;              ///< the level set before the flow
-    FloatGridPtr u, distance, edge;  ///< their last state
+    FloatGridPtr u, distance, edge;  ///< the fields of the flow as they were when the error occurred
 };
 
-/// The automatic voxel size h and its reason: the image's smallest spacing or, for points alone, the median distance to
-/// the nearest other point. For more than 4,000 points, h is larger if they are noisy (measure_cloud_scale()). For up
-/// to 4,000 points, h is smaller by the factor sqrt(n / 4000), because the guess is well defined between them. With
-/// `tagged`, the surface comes from tagging, contours or another start instead of a guess or a cloud; for up to 4,000
-/// points, h is then larger if they are noisy (choose_scan_voxel_size()), else smaller by sqrt(n / 1000) if that is
-/// below 1.
+/// The automatic voxel size h and its reason. With an image, h is its smallest spacing. For points alone, h is based on
+/// the median distance to the nearest other point:
+/// - For more than 4,000 points, h is this distance, or half of the noise (measure_cloud_scale()) if that is larger.
+/// - For n <= 4,000 points of a guess, h is this distance times sqrt(n / 4000): a guess is smooth between its points.
+/// - For n <= 4,000 points that are `tagged` (the surface comes from tagging, contours or another start), h is larger
+///   if the points are noisy (choose_scan_voxel_size()), else this distance times sqrt(n / 1000) if n < 1000.
+/// For n <= 4,000 points that are not noisy, h is larger if the points' bounding box would otherwise have more than
+/// 300,000 voxels on its sides.
 /// @throws Error InvalidInput if there are fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;

@@ -69,9 +69,10 @@ struct PointCloud {
     std::optional<Vec3> sensor;  ///< position from which a scan was taken; sensor and normals only occur in World
     PointSpace space = PointSpace::World;  ///< World, Index, Local or Slices
     ReadPointsOptions reading;             ///< the options with which the file's coordinates were interpreted
-    bool stated = false;  ///< the format or the caller specified `reading`; false: `reading` is an assumption
-    std::string source;   ///< path, for messages
-    std::string rule;     ///< how coordinates were interpreted, one line for the user
+    /// whether the format or the caller specified `reading`; otherwise `reading` is an assumption
+    bool stated = false;
+    std::string source;  ///< path, for messages
+    std::string rule;    ///< how coordinates were interpreted, one line for the user
     /// Unit of lengths, "mm"; empty: unknown, or the caller gave a scale. to_world() converts it to the image's unit.
     std::string unit = {};
 };
@@ -83,9 +84,10 @@ struct PointCloud {
 ///   .landmarks, .lmk: Convert3D
 /// - .dcm: the contours of a DICOM RT structure set
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
-/// Normals: nx, ny, nz of PLY and of columns; columns 4 to 6 of six without names, if all are unit vectors; normal_x,
-/// normal_y, normal_z of PCD; vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is
-/// organised or whose VIEWPOINT is not 0 0 0, the value of files without a known viewpoint.
+/// Normals are read from: nx, ny, nz of PLY and of columns; columns 4 to 6 of six columns without names, if all of them
+/// are unit vectors; normal_x, normal_y, normal_z of PCD; vn of an OBJ that has one for each vertex. The sensor's
+/// position is VIEWPOINT of a PCD, unless that is 0 0 0 in a PCD that is not organised: files without a known viewpoint
+/// contain this value.
 ///
 /// Coordinates are interpreted as the format specifies, unless the options override this; `rule` describes the result.
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
@@ -127,7 +129,7 @@ struct SpacingStatistics {
 
 struct IsolatedPoint {
     std::size_t index = 0;  ///< index in the list of points
-    double distance = 0;    ///< distance to the nearest point that is not isolated
+    double distance = 0;    ///< distance to the nearest point that is not isolated, in the unit of the points
 };
 /// Finds marks that are far from all others and are probably accidental clicks: single ones or groups of at most three,
 /// in total at most a tenth of the marks, and thus none among fewer than 10. By single linkage: the link from such

@@ -16,12 +16,10 @@ namespace covol {
 [[nodiscard]] COVOL_API double measure_layer_thickness(const std::vector<Vec3>& points, double radius,
                                                        const RunContext& run = {});
 
-/// The smallest voxel size at which the points of a scan form one thin layer. The sizes spacing * 2^(k/2), k = 5..0,
+/// The smallest voxel size at which the points of a scan form one thin layer. The sizes spacing * 2^(k/2), k = 4..0,
 /// are tested in descending order. A size passes if the layer thickness for a radius of 2.5 voxels is at most 0.35
-/// voxels, or at most 0.25 voxels if larger sizes have failed and none has passed (they may have failed because the
-/// surface bends). The result is the last of the first consecutive sizes that pass; if none passes, it is the largest
-/// size tested. Sizes above the spacing are skipped if 2.5 voxels exceed half the second longest edge of the points'
-/// box.
+/// voxels. The result is the last of the first consecutive sizes that pass; if none passes, it is the largest size
+/// tested. Sizes above the spacing are skipped if 2.5 voxels exceed half the second longest edge of the points' box.
 struct ScanVoxelSize {
     double voxel_size = 0;
     double thickness = 0;  ///< measure_layer_thickness() for a radius of 2.5 voxels

@@ -20,11 +20,12 @@ namespace covol {
 
 /// The result of checking seeds against a surface.
 struct SeedCheck {
-    std::size_t inside = 0, outside = 0;              ///< seeds that were checked
-    std::size_t painted = 0;                          ///< number of these seeds that are voxels of paint; for warning()
+    std::size_t inside = 0, outside = 0;  ///< seeds that were checked
+    std::size_t painted = 0;  ///< number of these seeds that are voxels of paint, which warning() names as such
     std::size_t wrong_inside = 0, wrong_outside = 0;  ///< number of seeds on the wrong side
     Vec3 first{0, 0, 0};                              ///< the first seed on the wrong side, world units
-    /// maximum distance of wrong seeds from the surface, limited by the half width of the level set
+    /// maximum distance of the wrong seeds from the surface, world units; at most the half width of the level set's
+    /// band
     double farthest = 0;
 
     [[nodiscard]] std::size_t wrong() const { return wrong_inside + wrong_outside; }

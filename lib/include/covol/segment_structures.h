@@ -25,7 +25,7 @@ struct StructuresOptions {
 /// The result of one structure.
 struct StructureResult : StructureFacts {
     SegmentResult result;  ///< the name of the grid `surface` is StructureFacts::grid
-    /// the guess that was corrected; with its mask only if there is a single structure
+    /// the guess that was corrected; its member `mask` is only kept if there is a single structure
     std::optional<GivenGuess> guess;
     std::optional<MotionReport> motion;  ///< motion since the previous frame, if the surface followed the image
 };
@@ -76,11 +76,12 @@ public:
 private:
     struct Last {
         std::string name;
-        /// without a flow SegmentResult::u, because redistancing would move its edges slightly; else the extracted
-        /// surface
+        /// The surface from which the next frame continues. Without a flow this is SegmentResult::u: the extracted
+        /// surface is redistanced, which would move its edges slightly in each frame. After a flow it is the extracted
+        /// surface.
         FloatGridPtr surface;
         std::optional<double> delta;
-        std::optional<SurfaceTemplate> look;  ///< for a surface that was not moved by a flow
+        std::optional<SurfaceTemplate> look;  ///< the image around the surface; none if the surface was moved by a flow
     };
     std::vector<Last> last_;
 };

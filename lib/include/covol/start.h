@@ -11,8 +11,9 @@
 
 namespace covol {
 
-// Starts other than tagging: u0 = clamp(signed distance, -3h, 3h), active where |u0| < 3h, named "band".
-// All throw Error InvalidOptions / InvalidInput if no surface lies in the domain.
+// Starts other than tagging. The result is u0 = clamp(signed distance, -3h, 3h), h the voxel size, active where |u0| <
+// 3h, named "band".
+// All functions throw Error InvalidOptions / InvalidInput if no surface lies in the domain.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);
 [[nodiscard]] COVOL_API FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box);
 [[nodiscard]] COVOL_API FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh,
@@ -25,7 +26,8 @@ namespace covol {
                                                          const RunContext& run = {});
 /// Computes a function, negative inside, at the world positions from + n * step, 0 <= n < count.
 using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
-/// The parts of a function's zero level set that pass near the seeds; the function's scale does not matter.
+/// The parts of the zero level set of `level` that pass near the seeds. Only the zeros of `level` matter, not its
+/// scale.
 [[nodiscard]] COVOL_API FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds,
                                                       const LevelRow& level, const RunContext& run = {});
 /// A surface from seeds alone: halfway between the nearest seeds inside and outside, but within a maximum distance of

@@ -106,8 +106,8 @@ private:
 /// A colour for structure n, red, green and blue in [0,255]; the first twelve are clearly distinct.
 [[nodiscard]] COVOL_API std::array<std::uint8_t, 3> structure_color(std::size_t n);
 
-/// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
-/// 1, 2, ... and extents.
+/// Key/value pairs for the header of an NRRD label image, with which 3D Slicer reads it as a segmentation (.seg.nrrd):
+/// names, colours, label values and extents.
 /// @param extents  the box of each structure's voxels; from 0 to -1 if it has no voxels
 /// @param values  label values in the file; empty: 1, 2, ...
 [[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(

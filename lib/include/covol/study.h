@@ -229,8 +229,8 @@ public:
     struct Changed {
         std::vector<StudyId> structures;  ///< structures that were changed, added or removed; empty for an undo without
                                           ///< an action to undo
-        StudyId made = 0;                 ///< id of the first new structure, mark or similar; 0: none
-        bool options = false;             ///< whether the options changed
+        StudyId made = 0;      ///< id of the first object (structure, mark, ...) that the action created; 0: none
+        bool options = false;  ///< whether the options changed
     };
     /// Applies an action. The same actions in the same order give the same state, including ids.
     /// @throws Error InvalidInput: the action is impossible (no such structure, a name that is in use, a position

@@ -10,8 +10,8 @@
 // Results of other programs that a study's structures start from.
 namespace covol {
 
-/// Makes the reference of a study in `folder` to a file: its path relative to the folder, and its digest. @throws Error
-/// Io.
+/// Makes a reference to a file, to be stored in the study in `folder`: the path relative to the folder, and the digest
+/// of the file. @throws Error Io.
 [[nodiscard]] COVOL_API StudyGuess guess_of_file(const std::string& folder, const std::string& file, int label = 0);
 
 /// A site whose read_guess reads guesses as read_guess() does. The most recent guesses are kept in memory, so that they

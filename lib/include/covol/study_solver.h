@@ -16,7 +16,7 @@ struct StudyResult {
         Empty,    ///< there is no surface yet: `message` states what is missing
         Working,  ///< the next surface is being computed, see `progress`
         /// A preliminary surface, computed without the image: the previous surface, corrected by the marks, or, if
-        /// there is none, the surface through the marks. Large structures are computed with twice the voxel size.
+        /// there is none, the surface through the marks. It is computed with twice the voxel size for large structures.
         First,
         Refined,  ///< the final surface, as from `covol segment`
         Failed    ///< `message` states why; the previous surface remains valid
@@ -55,8 +55,8 @@ public:
     COVOL_API void set_options(SegmentOptions options);
     /// Computes the surface of a structure; to be called when its marks have changed.
     COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
-    /// Computes the surface of a structure for whose marks the caller already has a surface: after all waiting
-    /// structures, and without the stage First.
+    /// Computes the surface of a structure if the caller already has a surface for the current marks. The computation
+    /// begins after those of all waiting structures, and omits the stage First.
     COVOL_API void confirm(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
     /// Discards a structure and its surface; to be called when the structure was removed.
     COVOL_API void forget(StudyId structure);

@@ -37,7 +37,7 @@ inline constexpr auto kOptions<ExtractOptions> =
 [[nodiscard]] COVOL_API std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry,
                                                             std::uint8_t label = 1, const RunContext& run = {});
 
-/// Distances from points to the surface, world units; they are exact distances to the mesh's triangles.
+/// Distances from points to the surface, world units.
 struct FitStatistics {
     double mean = 0, p95 = 0, max = 0;
     /// only from segment(): mean of the signed distances; > 0 if the points lie outside on average, that is, if the
@@ -47,8 +47,8 @@ struct FitStatistics {
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
                                                   const RunContext& run = {});
 
-/// The same without a mesh: within the level set's half width distances are interpolated, beyond it they are at most
-/// 0.12 voxels too large. @throws Error InvalidInput (no point)
+/// The same without a mesh: distances below the level set's half width are interpolated; larger ones are at most 0.12
+/// voxels too large. @throws Error InvalidInput (no point)
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface,
                                                   const RunContext& run = {});
 

@@ -18,7 +18,7 @@ template <>
 inline constexpr auto kWords<VdbCompression> = std::array{"none", "zip", "blosc"};
 
 struct WriteVdbOptions {
-    bool half = false;                            ///< values as 16-bit floats
+    bool half = false;                            ///< values are stored as 16-bit floats
     std::map<std::string, std::string> metadata;  ///< provenance, stored in the file and on every grid
     VdbCompression compression = VdbCompression::Blosc;
 };

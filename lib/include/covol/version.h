@@ -7,7 +7,7 @@
 #define COVOL_VERSION_MINOR 1
 #define COVOL_VERSION_PATCH 0
 #define COVOL_VERSION_STRING "0.1.0"
-/// For #if: 100 for 0.1.0, 10203 for 1.2.3.
+/// The version as one number, for comparisons with #if: 100 for 0.1.0, 10203 for 1.2.3.
 #define COVOL_VERSION_NUMBER (COVOL_VERSION_MAJOR * 10000 + COVOL_VERSION_MINOR * 100 + COVOL_VERSION_PATCH)
 
 namespace covol {

@@ -20,10 +20,11 @@
 namespace covol {
 namespace {
 
-constexpr int kMeshLatticeVoxels = 256;        // along the longest side, if only meshes are compared
-constexpr std::int64_t kSlabVoxels = 1 << 26;  // voxels held at a time
+// [voxels] along the longest side of the lattice on which two meshes are compared
+constexpr int kMeshLatticeVoxels = 256;
+constexpr std::int64_t kSlabVoxels = 1 << 26;  // maximum number of voxels of each solid in memory
 constexpr double kMaxLatticeVoxels = 1e12;
-constexpr double kMaxSamples = 4e6;  // on a surface
+constexpr double kMaxSamples = 4e6;  // approximate maximum number of samples on a surface
 
 double voxel_volume(const ImageGeometry& g) {
     return g.spacing[0] * g.spacing[1] * g.spacing[2] * std::abs(detail::determinant(g.direction));
@@ -33,7 +34,8 @@ bool is_label(double value, int label) { return label == 0 ? value != 0 : value 
 
 // ------------------------------------------------------------------------------------------------- surfaces of masks
 
-/// The boundary of a mask in world units: the isosurface of its voxel values at one half.
+/// The boundary of a mask in world units: the isosurface at 1/2 of the function that is 1 in the voxels with the label
+/// and 0 in the others.
 class MaskSurface {
 public:
     MaskSurface(const Image& mask, int label) : mask_(mask), label_(label), size_(mask.geometry().size) {}
@@ -55,7 +57,7 @@ public:
 private:
     using Tree = FloatGrid::TreeType;
 
-    /// -0.5 inside, 0.5 outside, in index space.
+    /// The level set of that isosurface, in index space: -0.5 in the voxels with the label and 0.5 in the others.
     FloatGridPtr level_set() {
         FloatGridPtr grid = make_grid({}, 0.5F, "mask");
         std::array<std::size_t, 3> blocks{};
@@ -99,7 +101,8 @@ private:
 
 // ----------------------------------------------------------------------------------------------- solids on a lattice
 
-/// Voxels (i fastest) of the slices [first, first + count) of a lattice.
+/// The part of a lattice that consists of geometry.size[2] slices, beginning with the slice `first`. `geometry` is that
+/// of this part.
 struct Slab {
     ImageGeometry geometry;
     int first = 0;
@@ -213,7 +216,9 @@ WorldBox box_of(const Shape& a, const Shape& b, const std::function<Vec3(const V
     return box;
 }
 
-/// A lattice with the orientation, spacing and alignment of one of the solids, restricted to the box of both.
+/// The lattice for the overlap, restricted to the box of both solids. It has the orientation, spacing and alignment of
+/// the finer lattice of two masks or two level sets, else of the mask, else of the level set. For two meshes it is
+/// parallel to the world's axes.
 ImageGeometry common_lattice(const Shape& a, const Shape& b) {
     const auto finer = [](const Shape& p, const Shape& q) {
         return voxel_volume(*p.lattice()) <= voxel_volume(*q.lattice()) ? *p.lattice() : *q.lattice();
@@ -279,8 +284,8 @@ void compare_overlap(Shape& a, Shape& b, const ImageGeometry& lattice, const Run
 
 // ---------------------------------------------------------------------------------------------------------- distances
 
-/// Points on a surface, each with the area that it represents; the mesh's vertices have area 0, but count for the
-/// maximum.
+/// Points on a surface, each with the area that it represents. The mesh's vertices are included with area 0, so that
+/// they affect only the maximum distance.
 struct Samples {
     std::vector<Vec3> points;
     std::vector<double> areas;
@@ -298,7 +303,7 @@ Samples sample_surface(const TriangleMesh& mesh, double spacing) {
         const double ab = length(minus(b, a)), bc = length(minus(c, b)), ca = length(minus(a, c));
         const double half = (ab + bc + ca) / 2;
         const double area = std::sqrt(std::max(0.0, half * (half - ab) * (half - bc) * (half - ca)));
-        // n^2 congruent pieces, one sample in the middle of each.
+        // The triangle is divided into n^2 congruent triangles, with one sample at the centroid of each.
         const int n = int(std::clamp(std::ceil(std::max({ab, bc, ca}) / spacing), 1.0, 1000.0));
         for (int i = 0; i < n; ++i)
             for (int j = 0; j < 2 * (n - i) - 1; ++j) {
@@ -313,7 +318,7 @@ Samples sample_surface(const TriangleMesh& mesh, double spacing) {
     return samples;
 }
 
-/// Appends (distance, area) of samples on `from` to the surface `to`.
+/// For each sample on the surface `from`, appends its distance to the surface `to` and the area that it represents.
 void append_distances(const TriangleMesh& from, const TriangleMesh& to, double spacing,
                       std::vector<std::pair<double, double>>& distances) {
     const Samples samples = sample_surface(from, spacing);

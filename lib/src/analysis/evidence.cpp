@@ -1,4 +1,5 @@
-// What supports the surface, slice by slice, and where marks are missing.
+// Determines which parts of a surface are supported by marks or image edges, slice by slice, and suggests slices for
+// further marks.
 #include "covol/evidence.h"
 
 #include <openvdb/openvdb.h>
@@ -47,17 +48,18 @@ std::vector<float> strengths_on(const TriangleMesh& mesh, const FloatGrid* edge)
     return result;
 }
 
-/// One triangle of the surface, with its values for the slices.
+/// A triangle of the surface, with the values that are summed over the triangles of each slice.
 struct Piece {
-    Vec3 center;                   ///< world
+    Vec3 center;                   ///< centroid, world units
     std::array<double, 3> levels;  ///< the corners' third image index, ascending
     double area;
-    double to_marks;  ///< 0 without marks
-    double strength;  ///< 0 without an edge grid
+    double to_marks;  ///< mean distance of the corners to the nearest mark, world units; 0 without marks
+    double strength;  ///< mean edge strength 1 - g at the corners; 0 without an edge grid
     bool unsupported;
 };
 
-/// The fraction of a triangle's area below a level; the levels of its corners are ascending.
+/// The fraction of a triangle's area in which the third image index is below `level`.
+/// @param l  this index at the triangle's corners, ascending
 double fraction_below(const std::array<double, 3>& l, double level) {
     if (level <= l[0]) return 0;
     if (level >= l[2]) return 1;
@@ -172,7 +174,8 @@ private:
 
     // ---- suggestions ---------------------------------------------------------------------------------------------
 
-    /// The intersection of each slice's plane with the surface: the middle of each triangle's cut, world.
+    /// Positions on the outline of the surface in each slice, world units: the midpoints of the segments in which the
+    /// slice's plane intersects the triangles.
     [[nodiscard]] std::vector<std::vector<Vec3>> outlines() const {
         std::vector<std::vector<Vec3>> result(geometry_.size[2]);
         for (const auto& t : mesh_.triangles) {
@@ -196,7 +199,7 @@ private:
             for (int axis = 0; axis < 3; ++axis) sum[axis] += from[axis] + x * (to[axis] - from[axis]);
             ++count;
         }
-        // The plane may touch only the highest corner.
+        // If the plane touches only the highest corner of the triangle, no side counts as intersected.
         if (count == 0)
             return mesh_.place(*std::max_element(
                 t.begin(), t.end(), [&](std::uint32_t a, std::uint32_t b) { return levels_[a] < levels_[b]; }));
@@ -204,7 +207,8 @@ private:
         return sum;
     }
 
-    /// For each slice the unsupported pieces that lie within the reach of its outline.
+    /// For each slice, the indices of the unsupported triangles whose centroid is within `reach` of the outline in this
+    /// slice.
     [[nodiscard]] std::vector<std::vector<std::uint32_t>> coverage(
         const std::vector<std::vector<Vec3>>& outline) const {
         std::vector<std::uint32_t> unsupported_pieces;
@@ -247,7 +251,8 @@ private:
         }
     }
 
-    /// The point of the outline with the largest area of pieces around it; estimated from a sample if there are many.
+    /// The point of the outline around which, within `reach`, the area of the triangles in `covered` is largest. Of
+    /// more than kSample points or triangles, only every n-th is examined.
     [[nodiscard]] Vec3 place(const std::vector<Vec3>& outline, const std::vector<std::uint32_t>& covered) const {
         constexpr std::size_t kSample = 2000;
         const std::size_t step = covered.size() / kSample + 1, stride = outline.size() / kSample + 1;
@@ -271,8 +276,8 @@ private:
     const ImageGeometry& geometry_;
     const EvidenceOptions& options_;
     const RunContext& run_;
-    std::vector<double> levels_;  ///< of the vertices
-    std::vector<Piece> pieces_;   ///< of the triangles
+    std::vector<double> levels_;  ///< the third image index of each vertex
+    std::vector<Piece> pieces_;   ///< one for each triangle
     std::map<int, SliceEvidence> slices_;
     Evidence result_;
 };
@@ -308,7 +313,8 @@ double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid
         double total = 0, bare = 0;
     } areas;
     with_threads(run, [&] {
-        // The same splits, and therefore the same bits, for any number of threads.
+        // This reduction divides the range in the same way for any number of threads, so that the sums are
+        // bit-identical.
         areas = tbb::parallel_deterministic_reduce(
             tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Areas{},
             [&](const tbb::blocked_range<std::size_t>& range, Areas sum) {

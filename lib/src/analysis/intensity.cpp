@@ -12,7 +12,7 @@
 namespace covol {
 namespace {
 
-/// The image's held voxels that the surface may enclose; none if there is no such voxel.
+/// The box of the image's held voxels that the surface may enclose; none if there is no such voxel.
 std::optional<VoxelBox> voxels_within(const Image& image, const FloatGrid& surface) {
     const openvdb::CoordBBox active = surface.evalActiveVoxelBoundingBox();
     if (active.empty()) return {};

@@ -1,4 +1,4 @@
-// Label images of solids, box by box.
+// Computes label images of solids, box by box.
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
@@ -16,7 +16,7 @@ namespace {
 using openvdb::Coord;
 using Accessor = FloatGrid::ConstAccessor;
 
-/// Trilinear samples of the structures' distances at world positions.
+/// Trilinear samples of the structures' signed distances at world positions.
 class Distances {
 public:
     explicit Distances(const std::vector<Structure>& structures) {
@@ -46,10 +46,12 @@ private:
 
 constexpr std::uint8_t kContested = 255;
 
-/// Decides the voxels that two structures claim, and those that no structure claims where two touch.
+/// Decides which structure a voxel belongs to if several structures claim it, or if none does but it lies between two
+/// that touch. A structure claims the voxels whose centres are inside its surface.
 class ConflictResolver {
 public:
-    /// @param box  of the claims: the box of the voxels to decide, and one more voxel around it within the image
+    /// @param box  the box of `claims`: the box of the voxels to be decided, enlarged by one voxel on every side within
+    ///     the image
     ConflictResolver(const std::vector<Structure>& structures, const ImageGeometry& geometry, const VoxelBox& box,
                      const std::vector<std::uint8_t>& claims)
         : structures_(structures), geometry_(geometry), box_(box), claims_(claims), distances_(structures) {
@@ -87,8 +89,8 @@ private:
         for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
         return all;
     }
-    /// The distinct structures of the six neighbours, ascending. At a slit of zero width, both structures beside it are
-    /// among them.
+    /// The structures that claim at least one of the six neighbours, ascending. If the voxel lies between two
+    /// structures that touch, both are among them.
     [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
         std::vector<std::size_t> found;
         const Index3 here{i, j, k};
@@ -129,7 +131,7 @@ void check_count(const std::vector<Structure>& structures) {
         throw Error(Errc::InvalidInput, "structures: expected at most 254, got " + std::to_string(structures.size()));
 }
 
-/// The number of each voxel's structure, from 1; 0: none.
+/// Computes the number of each voxel's structure, counted from 1; 0 if the voxel belongs to none.
 class Numbers {
 public:
     Numbers(const std::vector<Structure>& structures, const ImageGeometry& geometry)
@@ -139,7 +141,7 @@ public:
             solids_.push_back(std::make_unique<detail::Rasterizer>(*s.surface, geometry_));
     }
 
-    /// @param out  zeros, i fastest
+    /// @param out  the numbers, i fastest; must contain zeros before
     void fill(const VoxelBox& box, std::uint8_t* out) const {
         if (solids_.size() == 1) return solids_.front()->fill(box, 1, out);
         if (solids_.empty()) return;
@@ -172,7 +174,8 @@ public:
     }
 
 private:
-    /// The box and its neighbouring voxels, which are needed to recognise slits.
+    /// The box, enlarged by one voxel on every side within the image. ConflictResolver needs the neighbours of a voxel
+    /// to recognise that it lies between two structures.
     [[nodiscard]] VoxelBox widened(VoxelBox box) const {
         for (int a = 0; a < 3; ++a) {
             box.min[a] = std::max(box.min[a] - 1, 0);
@@ -215,7 +218,8 @@ struct LabelImage::State {
           numbers(structures, geometry),
           written(structures.size()) {}
 
-    /// Adds the voxels of all structures that `row` contains, run by run.
+    /// Adds the voxels of each structure to `found`. Runs of voxels with the same value along i are added at once.
+    /// @param row  the values of `box`, i fastest
     template <typename T>
     void count(const VoxelBox& box, const T* row, std::vector<Written>& found) const {
         const int length = box.size()[0];
@@ -314,7 +318,8 @@ std::vector<std::pair<std::string, std::string>> LabelImage::metadata() const {
     const Index3 last{size[0] - 1, size[1] - 1, size[2] - 1};
     for (std::size_t n = 0; n < state_->structures.size(); ++n) {
         names.push_back(state_->structures[n].name);
-        // Before the voxels are known, the numbers have their maximum width.
+        // Before any voxel is written, the extents are not known. The largest indices are used instead, because the
+        // header must not become longer when the extents are filled in.
         extents.push_back(before ? VoxelBox{last, last} : state_->written[n].extent);
     }
     return make_slicer_segments(names, extents, state_->values);
@@ -335,7 +340,8 @@ std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structu
     with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
         run.check();
         const Numbers numbers(structures, geometry);
-        // Slabs of a few slices, because each is rasterized with one more slice on both sides.
+        // Slabs of several slices: each slab is rasterized with one more slice on both sides, which would triple the
+        // work for slabs of one slice.
         constexpr int kSlab = 8;
         tbb::parallel_for(0, (nk + kSlab - 1) / kSlab, [&](int slab) {
             const int first = slab * kSlab;

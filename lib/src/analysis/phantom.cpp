@@ -13,13 +13,14 @@
 namespace covol {
 namespace {
 
-constexpr double kHalfSide = 1.3;  ///< of the domain, a cube centred on the origin
+constexpr double kHalfSide = 1.3;  ///< [world units] half the side of the domain, a cube centred on the origin
 constexpr double kPi = std::numbers::pi;
-const double kShellRadius = std::sqrt(3.0) / 2.0;  // the paper's spheres, section 5
+const double kShellRadius = std::sqrt(3.0) / 2.0;  // [world units] radius of the paper's spheres with holes (section 5)
 constexpr double kShellThickness = 0.04;
 constexpr double kContrast = 255.0;
 
-// The distributions of <random> differ between standard libraries; those of this class do not.
+// A generator whose distributions are the same everywhere, unlike those of <random>, which differ between standard
+// libraries.
 class Random {
 public:
     explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -56,15 +57,17 @@ struct PhantomShape {
     std::function<Vec3(Random&)> point;                      ///< on the true surface
 };
 
-/// A bright solid; the fraction of a voxel that lies inside is computed from the distance at its centre.
+/// A bright solid. The intensity of a voxel is the fraction of it that lies inside, estimated from the distance at its
+/// centre.
 PhantomShape solid(const char* name, const std::function<double(const Vec3&)>& distance,
                    std::function<Vec3(Random&)> point) {
     auto intensity = [distance](const Vec3& p, double h) { return std::clamp(0.5 - distance(p) / h, 0.0, 1.0); };
     return {name, distance, intensity, std::move(point)};
 }
 
-/// A thin bright shell around a sphere with holes where the axes meet it; the points lie in the holes.
-/// in_hole(a, b): for the hole on axis x, (a, b) = (y, z), and so on by cyclic permutation.
+/// A thin bright spherical shell with holes where the axes intersect it; the points lie in the holes.
+/// @param in_hole  whether a position near an axis is in the hole on this axis, from its other two coordinates: (y, z)
+///     for the x axis, (z, x) for the y axis and (x, y) for the z axis
 PhantomShape sphere_with_holes(const char* name, const std::function<bool(double, double)>& in_hole) {
     const auto is_open = [in_hole](const Vec3& p) {
         for (int axis = 0; axis < 3; ++axis) {
@@ -109,7 +112,8 @@ Vec3 point_on_box(const Vec3& half, Random& random) {
 }
 
 Vec3 point_on_torus(double major, double minor, Random& random) {
-    // The area at the angle b of the tube grows with the distance from the axis.
+    // The area of the torus is proportional to the distance from its axis. The angle b around the tube is drawn from
+    // this distribution by rejection sampling.
     double b;
     do b = random.uniform(0, 2 * kPi);
     while (random.uniform(0, major + minor) > major + minor * std::cos(b));

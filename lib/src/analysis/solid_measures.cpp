@@ -17,7 +17,7 @@ namespace {
 
 using openvdb::Coord, openvdb::Vec3d;
 
-/// Volume, moment and extent of the inside of some voxels, in voxels of the grid.
+/// Volume, first moment and bounding box of the part of some voxels that is inside the surface, with lengths in voxels.
 struct Moments {
     double volume = 0;
     Vec3d moment{0, 0, 0};
@@ -80,7 +80,7 @@ SolidMeasures measure_solid(const FloatGrid& surface, const RunContext& run) {
             if (!run.cancelled()) parts[n] = LeafMeasure(surface).of(leaves.leaf(n));
         });
         for (const Moments& part : parts) all.add(part);
-        // Tiles: boxes that are entirely inside.
+        // Tiles with a negative value are boxes of voxels that are entirely inside.
         auto tile = surface.cbeginValueAll();
         tile.setMaxDepth(FloatGrid::ValueAllCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile)

@@ -1,4 +1,4 @@
-// Makes several solids in one space disjoint, without slits where they touch.
+// Makes several solids disjoint, and closes narrow gaps between them.
 #include "covol/structures.h"
 
 #include <openvdb/openvdb.h>
@@ -35,7 +35,7 @@ std::string percent(double fraction) {
     return text.str();
 }
 
-/// Makes structures disjoint: holds their level sets while overlaps are found and removed.
+/// Makes structures disjoint. The object holds their level sets while overlaps are found and removed.
 class Separation {
 public:
     Separation(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run)
@@ -127,7 +127,8 @@ private:
         phi_ = carved;
     }
 
-    // In the middle of an overlap both distances are equal, so both must be known down to that depth.
+    // Extends the range of the stored distances until it includes the middle of each overlap. The two distances are
+    // equal there, which defines the new border; distances that are clamped before cannot show it.
     void deepen() {
         if (report_.overlaps.empty()) return;
         const double margin = 2 * h_;
@@ -139,7 +140,8 @@ private:
                 if (common(cores[overlap.a], cores[overlap.b]) > 0) shallow.insert({overlap.a, overlap.b});
             if (shallow.empty()) return;
             run_.check();
-            // All to the same depth, because distances that are clamped at different depths cannot be compared.
+            // All distances are computed up to the same depth, because distances that are clamped at different depths
+            // cannot be compared.
             for (FloatGridPtr& phi : phi_)
                 phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface",
                                          run_);
@@ -180,7 +182,8 @@ private:
         }
     }
 
-    /// Whether `at` lies between i and a structure at the distance m: moving towards one is moving away from the other.
+    /// Whether `at` lies between the surface of structure i and that of another structure at the signed distance m: the
+    /// two distances then increase in opposite directions.
     [[nodiscard]] bool is_between(std::size_t i, float m, const Coord& at, const std::vector<Accessor>& phi) const {
         const openvdb::Vec3d mine = gradient(phi[i], at);
         for (std::size_t j = 0; j < phi.size(); ++j)
@@ -227,7 +230,8 @@ private:
             const Coord at = leaf.origin().offsetBy(p >> 6, p >> 3 & 7, p & 7);
             if (!(between <= 0) && !is_between(i, other, at, phi)) continue;
             values[p] = (mine - other) / 2;
-            // Exact contact, and overlaps far from this surface, do not move it.
+            // The surface of structure i is unchanged if the structures touch exactly (between == 0), or if the voxel
+            // is farther than two voxels from it.
             moved = moved || (between != 0 && std::abs(mine) < 2 * h_);
         }
         return moved;

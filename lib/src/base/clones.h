@@ -4,7 +4,8 @@
 // Functions on eight floats that are compiled twice, without and with AVX2, and chosen at run time. Fused multiply-add
 // is not used, so both give bitwise equal results. The functions that they call have to be inlined.
 
-// Vectors are only passed to inlined functions, so their calling convention does not matter.
+// GCC warns that vectors are passed to functions differently with and without AVX. This does not matter here, because
+// vectors are only passed to functions that are inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 // With the thread sanitizer, only one version is compiled: the sanitizer would instrument the functions that choose a

@@ -20,7 +20,8 @@ public:
             const std::uint32_t parent = load(i);
             if (parent == i) return i;
             const std::uint32_t next = load(parent);
-            // A node that is no longer a root never becomes one again, so no unite() changes its parent.
+            // A node that is no longer a root never becomes one again, and unite() changes only the parents of roots. A
+            // plain store is therefore sufficient.
             if (next != parent) std::atomic_ref(parent_[i]).store(next, std::memory_order_relaxed);
             i = next;
         }

@@ -33,7 +33,8 @@ void require_extent(const char* where, const WorldBox& box) {
 }
 
 void require_voxel_size(const char* where, double voxel_size) {
-    // OpenVDB treats transforms whose determinant is below 3e-15 as singular.
+    // OpenVDB treats transforms whose determinant is below 3e-15 as singular; the determinant is the cube of the voxel
+    // size.
     constexpr double kMin = 1.5e-5;
     if (voxel_size >= kMin && std::isfinite(voxel_size)) return;
     std::ostringstream text;
@@ -84,7 +85,7 @@ Domain make_domain(const WorldBox& box, double voxel_size) {
     domain.voxel_size = voxel_size;
     for (int a = 0; a < 3; ++a) {
         const double length = box.max[a] - box.min[a];
-        // With a tolerance, so that rounding does not enlarge a box of exactly n voxels.
+        // Without the tolerance, rounding errors could enlarge a box of exactly n voxels to n + 1.
         const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
         if (cells > kMaxVoxelsPerAxis)
             throw Error(Errc::InvalidInput, to_text(box) + " has more than 2^30 voxels of size " +
@@ -100,7 +101,8 @@ Domain covering(const Domain& lattice, const WorldBox& box) {
     require_extent("covering", box);
     Domain domain = lattice;
     for (int a = 0; a < 3; ++a) {
-        // Faces that should coincide may differ by rounding errors.
+        // A face of the box that coincides with a face between voxels may differ from it by rounding errors. Without
+        // the tolerance `slack`, a further layer of voxels would then be added.
         const double length = (box.max[a] - box.min[a]) / lattice.voxel_size, slack = 1e-6 * std::max(1.0, length);
         const double first = std::floor((box.min[a] - lattice.origin[a]) / lattice.voxel_size + 0.5 + slack);
         const double last = std::ceil((box.max[a] - lattice.origin[a]) / lattice.voxel_size - 0.5 - slack);
@@ -165,7 +167,7 @@ Domain domain_of(const FloatGrid& grid) {
     const auto& transform = grid.transform();
     const openvdb::Vec3d h = transform.voxelSize();
     const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
-    // With a rotation or shear, a diagonal step differs from (h,h,h).
+    // The step from voxel (0,0,0) to (1,1,1) in the world: with a rotation or shear it differs from (h,h,h).
     const openvdb::Vec3d diagonal = transform.indexToWorld(openvdb::Vec3d(1, 1, 1)) - origin;
     const double tolerance = 1e-6 * h[0];
     if (!(h[0] > 0) || !std::isfinite(h[0]) || !origin.isFinite() || !transform.isLinear() ||
@@ -185,7 +187,8 @@ Domain domain_of(const FloatGrid& grid) {
     const int margin = stated ? 0 : 8;
     for (int a = 0; a < 3; ++a) {
         const double first = box.min()[a], last = box.max()[a];
-        if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {  // an empty domain is allowed
+        // an empty domain (last = first - 1) is allowed
+        if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {
             std::ostringstream text;
             text << "grid '" << grid.getName() << "': expected voxels within 2^23 of voxel 0, got " << box;
             throw Error(Errc::InvalidInput, text.str());

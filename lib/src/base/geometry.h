@@ -17,7 +17,7 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 inline double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
-/// The unit vector; 0 for 0.
+/// The unit vector in the direction of v; 0 if v is 0.
 inline Vec3 unit(const Vec3& v) {
     const double size = length(v);
     return size > 1e-30 ? times(1 / size, v) : Vec3{0, 0, 0};

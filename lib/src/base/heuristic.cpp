@@ -1,4 +1,5 @@
-// Only compiled in the sensitivity build.
+// Only compiled in the build that measures the effect of heuristic constants (-DCOVOL_SENSITIVITY=ON, see
+// heuristics.h).
 #include "base/heuristics.h"
 
 #include <cstdlib>

@@ -3,8 +3,9 @@
 // Each folder keeps its own in heuristics.h, with one struct for each step; docs/heuristics.md shows the effect of
 // halving and doubling each of them.
 //
-// In the build that measures this (-DCOVOL_SENSITIVITY=ON, never installed), each is multiplied at start-up by a factor
-// from the environment: COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
+// In the build that measures this effect (-DCOVOL_SENSITIVITY=ON, never installed), each constant is multiplied at
+// start-up by the factor for its name in the environment variable COVOL_SCALE, for example
+// COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
 #include <cstddef>
 
 #ifdef COVOL_SENSITIVITY
@@ -25,7 +26,7 @@ namespace covol {
 /// The factor that COVOL_SCALE gives for the name; 1 by default.
 [[nodiscard]] double heuristic_scale(const char* name);
 
-/// Counts are rounded, and at least 1.
+/// The constant, multiplied by the factor for its name. Integer constants are rounded, and remain at least 1.
 template <typename T>
 [[nodiscard]] T heuristic(const char* name, T value) {
     const double scaled = heuristic_scale(name) * double(value);
@@ -57,31 +58,33 @@ struct CommonHeuristics {
     std::size_t ring = heuristic("common.ring", 8);
     /// [points] Minimum number to which a plane or a quadric is fitted: twice the number of unknowns of a quadric.
     std::size_t quadric = heuristic("common.quadric", 12);
-    /// [standard errors] Deviation above which a measured value is not attributed to chance.
+    /// [standard errors] Deviation of a measured value above which it is not attributed to chance.
     double errors = heuristic("common.errors", 4.0);
     /// [rounds] Maximum number of repetitions of a step that is repeated until it changes nothing: a repair, a
     /// reweighted fit, the computation of a body from marks and image.
     int rounds = heuristic("common.rounds", 4);
-    /// [ratio] Of each length to the previous one in the search for a suitable scale: areas double.
+    /// [ratio] Factor between successive lengths in the search for a suitable scale: sqrt(2), so that areas double.
     double growth = heuristic("common.growth", 1.4142135623730951);
     /// [voxels] Distance by which a surface is continued beyond a cut, so that its band is correct up to the cut: twice
     /// the half width of a band.
     double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
-    /// [ratio] Of the margin around points, contours or a body to their longest side.
+    /// [ratio] Margin around points, contours or a body, relative to their longest side.
     double margin = heuristic("common.margin", 0.2);
     /// [voxels] Precision of a position that is given by voxels, and thus the smallest length that has to be resolved.
     double precision_voxels = heuristic("common.precision_voxels", 0.5);
-    /// [ratio] Of a distance to the relevant length; below it, two positions count as equal.
+    /// [ratio] Maximum distance between two positions that count as equal, relative to the voxel size or to another
+    /// length of the problem.
     double same_place = heuristic("common.same_place", 1e-3);
-    /// [ratio] Of one length or size to another; above it, the first counts as clearly larger.
+    /// [ratio] Minimum ratio between two lengths or sizes of which one counts as clearly larger than the other.
     double clear_ratio = heuristic("common.clear_ratio", 2.0);
-    /// [fraction] Of a whole; a smaller part is negligible.
+    /// [fraction] Part of a whole below which it is negligible.
     double negligible = heuristic("common.negligible", 0.02);
-    /// [fraction] Of a whole; a smaller part counts as an exception, and two quantities that differ by a smaller
-    /// fraction count as equal.
+    /// [fraction] Part of a whole below which it counts as an exception; two quantities also count as equal if they
+    /// differ by a smaller fraction.
     double minority = heuristic("common.minority", 0.1);
-    /// [cosine] Minimum between the normals of a triangle before and after a change, between the normals of
-    /// neighbouring sheets, and between a path that leaves a surface and the surface's normal: 60 degrees.
+    /// [cosine] Minimum cosine of an angle, which is at most 60 degrees: between the normals of a triangle before and
+    /// after a change, between the normals of neighbouring sheets, and between a path that leaves a surface and the
+    /// surface's normal.
     double turn = heuristic("common.turn", 0.5);
 };
 COVOL_HEURISTICS CommonHeuristics kCommon{};

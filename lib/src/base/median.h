@@ -5,7 +5,7 @@
 
 namespace covol::cloud {
 
-/// The median; the upper one if the number of values is even, 0 if there are none.
+/// The median: the upper of the two middle values if the number of values is even, 0 if there are none.
 template <typename T>
 T median(std::vector<T> values) {
     if (values.empty()) return T{};

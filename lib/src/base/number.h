@@ -13,7 +13,7 @@ inline int round_down(double x) {
     return i - (double(i) > x);
 }
 
-/// A number for messages, with six digits.
+/// A number for messages, with six significant digits.
 inline std::string number(double value) {
     std::ostringstream text;
     text << value;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kBeforeValue = " = ", kBetween = ", ";
 
-/// The text between two backquotes, as converted by `spell`; nothing if it does not consist of option names.
+/// Converts the text between two backquotes by `spell`; none if the text does not consist of option names.
 std::optional<std::string> spelled(std::string_view text, const SpellOption& spell) {
     std::string all;
     for (bool more = true; more;) {
@@ -38,7 +38,8 @@ std::string replace_names(const std::string& message, const SpellOption& spell) 
         result.append(message, at, begin - at);
         if (end == std::string::npos) return begin == end ? result : result.append(message, begin);
         const auto named = spelled(std::string_view(message).substr(begin + 1, end - begin - 1), spell);
-        // If the text does not consist of option names, its second backquote may be the first one of another pair.
+        // If the text does not consist of option names, the second backquote may begin another pair; it is therefore
+        // searched again.
         result += named ? *named : message.substr(begin, end - begin);
         at = named ? end + 1 : end;
     }

@@ -100,7 +100,8 @@ Character first_of(std::string_view text) {
     const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[n]); };
     if (byte(0) < 0x80) return {byte(0), 1};
     const std::size_t length = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-    constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};  // overlong encodings are rejected
+    // minimum code by length in bytes: longer encodings than necessary are invalid
+    constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};
     if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < length) return {};
     char32_t code = byte(0) & (0x7FU >> length);
     for (std::size_t n = 1; n < length; ++n) {
@@ -115,7 +116,7 @@ Character first_of(std::string_view text) {
 bool steers(char32_t code) {
     const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
     const bool line_end = code == 0x2028 || code == 0x2029;
-    // Unicode's Bidi_Control.
+    // The characters with Unicode's property Bidi_Control, which change the writing direction.
     const bool direction = code == 0x061C || code == 0x200E || code == 0x200F || (code >= 0x202A && code <= 0x202E) ||
                            (code >= 0x2066 && code <= 0x2069);
     return control || line_end || direction;

@@ -1,5 +1,5 @@
 #pragma once
-// Code that is common to the readers of text files.
+// Functions that are common to the readers of text files.
 #include <charconv>
 #include <optional>
 #include <string>
@@ -12,7 +12,7 @@ namespace covol::detail {
 [[nodiscard]] std::string_view trim(std::string_view text);
 /// Converts ASCII letters only.
 [[nodiscard]] std::string lower(std::string_view text);
-/// A quotation from a file for messages: shortened, and without control characters.
+/// A quoted part of a file for messages: at most 40 characters, with control characters replaced by question marks.
 [[nodiscard]] std::string quote(std::string_view text);
 
 template <typename T = double>
@@ -32,7 +32,7 @@ public:
     bool next(std::string_view& line);
     /// The same without removing blanks, because a leading tab means an empty first column.
     bool next_untrimmed(std::string_view& line);
-    /// The next line that holds more than a comment (from '#' on), without its comment.
+    /// The next line with content other than a comment, which begins with '#' and is removed.
     bool next_content(std::string_view& line);
     /// The same, split into words at blanks.
     bool next_words(std::string_view& line, std::vector<std::string_view>& words);
@@ -47,7 +47,7 @@ private:
     std::size_t number_ = 0;
 };
 
-/// Takes the first word off a line; empty at the line's end.
+/// Removes the first word from a line and returns it; empty if the line contains only blanks.
 [[nodiscard]] inline std::string_view next_word(std::string_view& line) {
     std::size_t begin = 0;
     while (begin < line.size() && is_blank(line[begin])) ++begin;

@@ -6,9 +6,9 @@
 namespace covol::detail {
 
 /// Holds one Switch while at least one object of this class exists. A Switch changes a global setting of another
-/// library, and restores it in its destructor; once the overlapping calls of several threads have ended, the setting is
-/// the same as before.
-/// Visible outside a shared library if its Switch is, so that several libraries can use a common count.
+/// library, and restores it in its destructor. Calls of several threads may overlap; once all of them have ended, the
+/// setting is the same as before.
+/// The class is visible outside a shared library if its Switch is, so that several libraries use the same count.
 template <typename Switch>
 class __attribute__((visibility("default"))) WhileAny {
 public:

@@ -26,11 +26,12 @@ namespace {
 
 using namespace pipeline;
 
-constexpr double kCoarseVoxels = 400;     // maximum length of the marks' or the image's box, in coarse voxels
-constexpr double kMinFactor = 2;          // minimum size of a coarse voxel, in voxels of the result
-constexpr int kStateLayers = 8;           // layers of voxels around a brick's core that its state includes
-constexpr int kSurfaceLayers = 8;         // layers around a core from which the distance to its surface is computed
-constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is sampled to fix the parameters of g
+constexpr double kCoarseVoxels = 400;  // maximum length of the marks' or the image's box, in coarse voxels
+constexpr double kMinFactor = 2;       // minimum size of a coarse voxel, in voxels of the result
+constexpr int kStateLayers = 8;        // layers of voxels around a brick's core that its state includes
+constexpr int kSurfaceLayers = 8;      // layers around a core from which the distance to its surface is computed
+// maximum number of leaves of the coarse band at which the image is sampled to choose the parameters of g
+constexpr std::size_t kEdgeSamples = 64;
 
 void require_supported(const Problem& problem, const Resolved& resolved) {
     const auto reject = [](const std::string& what) {
@@ -51,7 +52,8 @@ void require_supported(const Problem& problem, const Resolved& resolved) {
 Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domain& coarse) {
     const Domain own = problem.domain(resolved.choices.h, resolved.marks.attracting, 0);
     if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
-    // A body that the image cuts off is also solved beyond the image's end.
+    // If the domain of the coarse solve extends beyond the image, because the image cuts off the body, the fine domain
+    // is extended as well.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
     return beyond > 2 * coarse.voxel_size ? widened(own, int(kCommon.beyond_voxels)) : own;
 }
@@ -71,13 +73,14 @@ FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const Ru
         if (part.min[0] > part.max[0] || part.min[1] > part.max[1] || part.min[2] > part.max[2]) continue;
         try {
             band->topologyUnion(*start_from_grid(part, coarse, run));
-        } catch (const NoSurface&) {  // none in that leaf
+        } catch (const NoSurface&) {  // no surface passes through this leaf
         }
     }
     return band;
 }
 
-/// The facts of a flow in a brick: the surface is close to its steady state, and the band follows it.
+/// The start of the flow in a brick: its surface is close to the steady state, because it comes from the coarse solve
+/// or from an earlier sweep, and the band follows it.
 StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vector<Vec3> points) {
     StartFacts facts;
     facts.origin = StartOrigin::CoarseLevel;
@@ -113,8 +116,8 @@ std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
     return near;
 }
 
-/// A brick and its neighbours, in the plan's order. Overlapping states are summed in this order, because the last bits
-/// of sums of three numbers depend on it.
+/// The indices of a brick and its neighbours, ascending. Overlapping states are summed in this order: the last bits of
+/// a sum of three numbers depend on the order.
 std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
     std::vector<std::size_t> all = plan.bricks[brick].neighbours;
     all.push_back(brick);
@@ -122,7 +125,7 @@ std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t bric
     return all;
 }
 
-/// Bricks whose states reach into `part`, in the plan's order.
+/// The indices of the bricks whose states reach into `part`, ascending.
 std::vector<std::size_t> bricks_reaching(const BrickPlan& plan, const Domain& part) {
     std::vector<std::size_t> found;
     for (std::size_t n = 0; n < plan.bricks.size(); ++n) {
@@ -195,7 +198,7 @@ struct BrickJob::Parts {
                                                 "; make the plan again with this `voxel_size`");
     }
 
-    /// The joined field on the whole lattice.
+    /// The solution with the joined states of all bricks as its level set.
     [[nodiscard]] Solution join(const BrickPlan& plan, const BrickStates& states) const {
         Solution solution = solution_on(plan);
         StartFacts& facts = solution.start;
@@ -211,8 +214,8 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// Extracts the surface brick by brick. Only its level set is held in memory as a whole, unless fields are
-    /// requested.
+    /// Extracts the surface brick by brick, so that only its level set is in memory as a whole, and u only if fields
+    /// are requested.
     /// @param solution  receives the size of the band, and u if fields are requested
     [[nodiscard]] FloatGridPtr join_surfaces(const BrickPlan& plan, const BrickStates& states,
                                              Solution& solution) const {
@@ -250,7 +253,8 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// Size of a coarse voxel in fine ones at which the box is at most kCoarseVoxels long: a power of two.
+    /// Edge length of a coarse voxel in fine voxels: the smallest power of two, at least kMinFactor, for which the box
+    /// is at most kCoarseVoxels coarse voxels long.
     [[nodiscard]] double coarse_factor() const {
         const std::vector<Vec3>& attracting = resolved.marks.attracting;
         const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);
@@ -274,7 +278,8 @@ struct BrickJob::Parts {
         coarse_options.holes = {};
         coarse_options.extract = {};
         coarse_options.without_fields = false;
-        // If the structure is too fine for such a coarse lattice, a finer one may work.
+        // The solve may fail if the structure is too fine for the coarse lattice. It is then repeated on a lattice with
+        // half the voxel size.
         for (double factor = coarse_factor();; factor /= 2) {
             coarse_options.voxel_size = factor * h();
             try {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kLeaf = 8;
 
-/// The leaf of the fine lattice that contains a voxel of the coarse band; indices divided by 8.
+/// The index, divided by 8, of the leaf of the fine lattice that contains a voxel of the coarse band.
 using Place = std::array<std::int32_t, 3>;
 
 std::vector<Place> places_of(const Domain& domain, const FloatGrid& coarse) {
@@ -40,7 +40,8 @@ public:
             for (const int axis : longest_first(begin, end)) {
                 std::nth_element(begin, begin + (end - begin) / 2, end,
                                  [axis](const Place& p, const Place& q) { return p[axis] < q[axis]; });
-                const std::int32_t first = (begin + (end - begin) / 2)->at(axis);  // leaf of the upper part
+                // index of the first leaf of the upper part along the axis
+                const std::int32_t first = (begin + (end - begin) / 2)->at(axis);
                 const auto upper = std::partition(begin, end, [&](const Place& p) { return p[axis] < first; });
                 if (upper == begin || upper == end) continue;
                 VoxelBox lower_box = box, upper_box = box;
@@ -84,7 +85,8 @@ bool are_near(const VoxelBox& a, const VoxelBox& b, int voxels) {
 
 std::vector<Brick> split(const Domain& domain, const FloatGrid& coarse, const BrickOptions& options) {
     std::vector<Place> places = places_of(domain, coarse);
-    // A band has the same width in voxels on both lattices, so its number of voxels grows with the factor squared.
+    // The band is equally many voxels wide on both lattices, but its area in fine voxels is factor^2 times its area in
+    // coarse voxels. One coarse voxel of the band therefore stands for factor^2 fine ones.
     const double factor = coarse.voxelSize()[0] / domain.voxel_size;
     Splitter splitter(domain, factor * factor, options);
     splitter.split({domain.min, domain.max}, places.begin(), places.end());

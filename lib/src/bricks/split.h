@@ -5,8 +5,8 @@
 
 namespace covol::bricks {
 
-/// Splits the domain along leaves, at the median of the band along an axis, until no part has more voxels of the band
-/// than `options` allow, or a part cannot be split. The bricks cover the whole domain.
+/// Splits the domain into bricks that cover it. Parts are split recursively between leaves, at the median of the voxels
+/// of the band along an axis, until each has at most as many voxels of the band as `options` allow, or cannot be split.
 [[nodiscard]] std::vector<Brick> split(const Domain& domain, const FloatGrid& coarse, const BrickOptions& options);
 
 /// The core with `layers` more voxels on every side, limited by the domain.

@@ -14,9 +14,11 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr int kFrameLayers = 4;  // layers that are held fixed: the scheme reads two, redistancing one more; one spare
-constexpr int kBlend = 8;        // voxels by which states extend beyond their cores
-constexpr int kSeamLayers = 3;   // layers of a brick, next to another one, in which their surfaces are compared
+// outermost layers that are held fixed: the scheme reads two of them, redistancing a third; one more is spare
+constexpr int kFrameLayers = 4;
+// voxels by which the states of bricks extend beyond their cores, and over which they are blended
+constexpr int kBlend = 8;
+constexpr int kSeamLayers = 3;  // layers of a brick, next to another one, in which their surfaces are compared
 // [voxels] Where the level set may move, the bounds of a Frame are this far below and above 0, so that they have no
 // effect.
 constexpr double kUnboundedVoxels = 1e3;
@@ -81,7 +83,7 @@ public:
     }
 
 private:
-    /// A core's voxels that no other state reaches.
+    /// The voxels of a core that no state of another brick reaches.
     [[nodiscard]] CoordBBox inner(const VoxelBox& core) const {
         CoordBBox box = bounds(core);
         for (int a = 0; a < 3; ++a) {
@@ -174,7 +176,8 @@ double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box) 
                 if ((*value < 0) == (next < 0)) continue;
                 float first = 0, second = 0;
                 const bool known = b_at.probeValue(p, first) && b_at.probeValue(q, second);
-                // The value of b at the zero of a: differences of values would be wrong, because the slopes may differ.
+                // The distance between the surfaces is the interpolated value of b at the zero crossing of a. The
+                // difference between the values of a and b would depend on their slopes as well.
                 const double there = double(*value) / (double(*value) - next);
                 largest = std::max(largest, known ? std::abs(first + there * (second - first)) : kHalfWidthVoxels * h);
             }

@@ -4,13 +4,15 @@
 
 namespace covol::bricks {
 
-/// The leaves of `u` that meet the box, with their masks; nothing else. Keeps u's transform and name.
+/// A grid that consists of the leaves of `u` that intersect the box, with their active voxels. It has the transform and
+/// name of `u`, but not its tiles.
 [[nodiscard]] FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box);
 
-/// Adds the leaves of `from` that meet the box, with their masks. @pre `to` has none of them
+/// Copies the leaves of `from` that intersect the box, with their active voxels, to `to`. @pre `to` has none of these
+/// leaves
 void copy_leaves(const FloatGrid& from, const VoxelBox& box, FloatGrid& to);
 
-/// Adds the leaves that meet the box, and their active voxels, to the counts.
+/// Adds the number of leaves of `u` that intersect the box, and the number of their active voxels, to the counts.
 void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels, std::int64_t& leaves);
 
 /// The level set on `domain` that consists of the leaves of the listed bricks' cores. Near seams it is the mean of the
@@ -19,7 +21,8 @@ void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels,
 [[nodiscard]] FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
                                     const BrickStates& states);
 
-/// Lower and upper bounds that fix a level set in the layers at those faces of `part` beyond which `whole` continues.
+/// Lower and upper bounds of the level set in a brick. They fix it to the start in the outermost layers of `part`, at
+/// the faces beyond which `whole` continues, and do not limit it elsewhere.
 struct Frame {
     FloatGridPtr floor, obstacle;
 };

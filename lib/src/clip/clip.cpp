@@ -28,7 +28,8 @@ Clip make_clip(const WorldBox& box) {
 
 Clip make_clip(const ImageGeometry& geometry) {
     if (geometry.is_axis_aligned()) return make_clip(geometry.world_box());
-    // The face normals of sheared axes are not parallel to the axes.
+    // If the axes are sheared, the normals of the faces are not parallel to them; they are the rows of the inverse
+    // matrix.
     const Matrix3 normals = detail::inverse(geometry.direction);
     Clip clip;
     for (int a = 0; a < 3; ++a) {

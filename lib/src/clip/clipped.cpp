@@ -17,8 +17,8 @@ namespace {
 
 using Accessor = FloatGrid::ConstAccessor;
 
-constexpr double kMinCell = 0.1;        // voxels: layers that are closer to a face are moved onto it
-constexpr float kSameDistance = 1e-3F;  // voxels: a value closer to the distance to a face counts as that
+constexpr double kMinCell = 0.1;        // [voxels] a layer that is closer than this to a face is moved onto it
+constexpr float kSameDistance = 1e-3F;  // [voxels] tolerance within which a value is regarded as the distance to a face
 
 openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
@@ -107,7 +107,7 @@ public:
                 evaluate(origins[n], sample, accessor, results[n]);
         });
         for (std::size_t n = 0; n < origins.size(); ++n) {
-            // A tile that does not change needs no leaf.
+            // A block within a tile that the cut does not change needs no leaf.
             if (!any_on(results[n].active) && grid_.tree().probeConstLeaf(origins[n]) == nullptr &&
                 grid_.tree().getValue(origins[n]) == results[n].values[0])
                 continue;
@@ -130,7 +130,8 @@ private:
         return domain_.index_to_world({double(voxel[0]), double(voxel[1]), double(voxel[2])});
     }
 
-    /// Whether a box may contain voxels outside the clip, or voxels within the band's half width of its boundary.
+    /// Whether a box may contain voxels outside the clip, or voxels inside it that are closer to its boundary than the
+    /// half width of the band.
     [[nodiscard]] bool near_clip(const openvdb::CoordBBox& box) const {
         const Vec3 lo = world(box.min()), hi = world(box.max());
         double highest = -LatticeClip::kFar;
@@ -158,7 +159,8 @@ private:
         add_blocks(high, blocks);
     }
 
-    /// All blocks that the cut can change: near the clip, and in the solid or adjacent to it.
+    /// The origins of all blocks that the cut can change: those near the clip that intersect the solid or are adjacent
+    /// to such a block.
     [[nodiscard]] std::vector<Coord> blocks() const {
         std::vector<Coord> solid;
         for (auto leaf = grid_.tree().cbeginLeaf(); leaf; ++leaf)
@@ -203,8 +205,9 @@ private:
     double width_;  // half width of the band, world units
 };
 
-/// Undoes the cut face by face: each column that ends at the face is followed inward until the wall, the solid's own
-/// surface, is nearer than the face.
+/// Undoes the cut at one face after the other. The distance to the wall, the surface of the solid itself, is stored
+/// only in voxels that are closer to the wall than to the face; it is extrapolated from them, column by column, towards
+/// and beyond the face.
 class Restorer {
 public:
     Restorer(const FloatGrid& surface, const LatticeClip& clip, const Clip& planes, FaceLayer layer)
@@ -231,7 +234,9 @@ public:
     }
 
 private:
-    static constexpr int kDepth = 5;  ///< layers that are read: the face hides up to three, a slope needs two
+    /// Number of layers that are read. In up to three, the face may be nearer than the wall; two more are needed to
+    /// determine the slope.
+    static constexpr int kDepth = 5;
 
     /// @return whether the solid meets this face.
     bool restore(int axis, bool upper) {
@@ -271,7 +276,8 @@ private:
         return meets;
     }
 
-    /// The distance to the wall in the layers from `at` inward; extrapolated in layers with the distance to the face.
+    /// The distance to the wall in the layers from `at` inward. In layers that contain the distance to the face
+    /// instead, it is extrapolated from the layers farther inward.
     [[nodiscard]] std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at, int axis,
                                                    int inward) const {
         std::array<float, kDepth> wall;

@@ -31,7 +31,8 @@ namespace covol::detail {
     return x;
 }
 
-/// Two perpendicular directions in the plane; if it is parallel to two of the world's axes, these axes.
+/// Two unit vectors in the plane that are perpendicular to each other. If the plane is parallel to two of the world's
+/// axes, the vectors are these axes.
 [[nodiscard]] inline std::array<Vec3, 2> directions_in(const HalfSpace& plane) {
     const Vec3& n = plane.normal;
     int across = 0;

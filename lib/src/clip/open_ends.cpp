@@ -9,7 +9,7 @@ namespace covol::detail {
 double ImageFace::depth(const Vec3& x) const { return -along(plane, x); }
 
 std::vector<ImageFace> faces_of(const ImageGeometry& geometry) {
-    const Clip clip = make_clip(geometry);  // two for each axis
+    const Clip clip = make_clip(geometry);  // two half-spaces for each axis
     std::vector<ImageFace> faces;
     for (std::size_t n = 0; n < clip.size(); ++n) faces.push_back({clip[n], geometry.spacing[n / 2]});
     return faces;
@@ -31,7 +31,8 @@ std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<
 }
 
 std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces, double reach) {
-    // Images in earlier faces are mirrored, too: a body at an edge of the box has three images.
+    // Mirror images in earlier faces are also mirrored: a body at an edge of the box, between two faces, has three
+    // mirror images.
     std::vector<Vec3> all = points;
     for (const ImageFace& face : faces) {
         if (std::none_of(points.begin(), points.end(), [&](const Vec3& p) { return face.depth(p) < reach; })) continue;

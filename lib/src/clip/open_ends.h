@@ -1,5 +1,6 @@
 #pragma once
-// Additional points for tagging, which close bodies that the image cuts off: the flood fill comes from all sides.
+// Additional points for tagging. They close bodies that the image cuts off; otherwise the flood fill would enter them
+// through the cut.
 #include <vector>
 
 #include "covol/clip.h"
@@ -15,17 +16,19 @@ struct ImageFace {
 };
 [[nodiscard]] std::vector<ImageFace> faces_of(const ImageGeometry& geometry);
 
-/// Whether a position is on the last slice at a face: inside, and not deeper than the distance between slices.
+/// Whether a position is on the last slice in front of a face: inside the image, and not farther from the face than the
+/// distance between slices.
 [[nodiscard]] bool on_end_slice(const ImageFace& face, const Vec3& x);
 
 /// Copies of the points on each end slice, shifted beyond the face in steps of the slice distance up to `length`. They
-/// continue the section, and copies of marks inside the section close it beyond the face. The flood fill can therefore
-/// pass above a surface that leaves the image at a shallow angle, between it and the face.
+/// continue the section of the body, and copies of marks inside the section close it. Only the section is closed, so
+/// that the flood fill still reaches the space between the face and a surface that leaves the image at a shallow angle;
+/// this space is outside.
 [[nodiscard]] std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                            double length);
 
-/// The points' mirror images in each face that some points are nearer to than `reach`: an open body is closed by its
-/// own mirror image, and meets the face at a right angle.
+/// The mirror images of the points in each face to which at least one point is closer than `reach`. A body that is open
+/// at the face is closed by its own mirror image, and meets the face at a right angle.
 [[nodiscard]] std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces,
                                          double reach);
 

@@ -20,8 +20,8 @@ using detail::Vec2;
 
 namespace {
 
-/// The dome's profile: the distance of the body's wall from the last contour at the fraction t of the dome's height. A
-/// paraboloid, whose area decreases linearly.
+/// The dome's profile: the distance by which the body's wall lies inside the last contour at the fraction t of the
+/// dome's height. A paraboloid: the area of its sections decreases linearly with the height.
 double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
 
 /// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, or
@@ -32,7 +32,8 @@ double monotone_slope(double secant_left, double left, double secant_right, doub
     return (a + b) / (a / secant_left + b / secant_right);
 }
 
-/// Cubic Hermite interpolation from 0 to 1; slopes are multiplied by the interval's length.
+/// Cubic Hermite interpolation at t, 0 to 1, between the values v0 and v1 with the slopes m0 and m1, which are
+/// multiplied by the interval's length.
 double hermite(double v0, double v1, double m0, double m1, double t) {
     const double s = 1 - t;
     return s * s * ((1 + 2 * t) * v0 + t * m0) + t * t * ((1 + 2 * s) * v1 - s * m1);
@@ -76,13 +77,13 @@ public:
         while (at = w + dw * ++n, n < count && holds(at));
         return n;
     }
-    /// Bounds of the level within `radius` of a position of the plane, for all w. On domes the upper bound is not
-    /// needed and not computed.
+    /// Bounds of the level within `radius` of a position of the plane, for all w. Beyond an end slice there is no upper
+    /// bound, because the level increases without limit with the height.
     [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
         const SlicePlace p = place(x, y);
         const double here = at(slice(), p);
         if (kind_ != Kind::Between && slice().open) {
-            // The level of each section changes at most as fast as the position.
+            // The level of each section is a distance, so between two positions it differs by at most their distance.
             const double height = slice().end + radius, fraction = height / std::abs(slice().w - inner().w);
             return {std::min(here, carried_on(column(p), height)) - (1 + 2 * fraction) * radius,
                     std::numeric_limits<double>::max()};
@@ -103,7 +104,7 @@ private:
     /// The data of the level along w over a position of the plane, if the sections are not shifted.
     struct Column {
         double here, there;  ///< levels of this slice and the next one; for an open end, of the inner neighbour
-        double begin, end;   ///< slopes times the length between the two
+        double begin, end;   ///< slopes of the level along w at both slices, times their distance
     };
     [[nodiscard]] Column column(const SlicePlace& p) const {
         const double here = at(slice(), p);
@@ -119,14 +120,15 @@ private:
         const double height = std::abs(w - slice().w);
         return slice().open ? std::max(carried_on(c, height), height - slice().end) : c.here + beyond(height);
     }
-    /// Beyond an open end a wall that converges is continued linearly. One that diverges slows down like a paraboloid
-    /// whose pole is the wall of the previous slice, with a slope of at most 45 degrees: bodies are round, and a
-    /// section that grows fast does not grow indefinitely.
+    /// The level at a height beyond an open end. A wall that converges is continued linearly. A wall that diverges is
+    /// continued as a paraboloid, which becomes steeper with the height, with an outward slope of at most 45 degrees:
+    /// bodies are usually round, so that a section that grows fast does not grow indefinitely.
     [[nodiscard]] double carried_on(const Column& c, double height) const {
         const double t = height / std::abs(slice().w - inner().w), change = c.here - c.there;
         return c.here + (change > 0 ? t * change : std::max((std::sqrt(1 + t) - 1) * change, -height));
     }
-    /// Slopes of the level along w at the interval's two slices; beyond an end slice that of the dome.
+    /// Slopes of the level along w at the interval's two slices, from the secants on both sides of a slice. Beyond an
+    /// end slice, the mean slope of the dome is used instead of a secant.
     [[nodiscard]] double slope_below(const SlicePlace& p, double here, double secant, double length) const {
         if (n_ == 0 && slice().open) return secant;
         if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
@@ -145,7 +147,8 @@ private:
     [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
     [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
-    /// Whether an end slice's section does not overlap its neighbour's, which then gives no direction for it.
+    /// Whether an end slice's section does not overlap that of its neighbour. The direction of the wall does not follow
+    /// from the two sections then.
     [[nodiscard]] bool is_apart() const { return kind_ == Kind::Below ? slice().apart : inner().apart; }
     [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
@@ -208,7 +211,7 @@ void Interval::append_surface(double step, std::vector<Vec3>& points) const {
                     if (std::abs(slope[a]) > std::abs(slope[axis])) axis = a;
                 if ((next[axis] < 0) == (here < 0)) continue;
                 Vec3 p{x, y, w};
-                // Points on a slice itself are given by its contour.
+                // Points on a slice itself are left out, because they are known from its contour.
                 if (axis != 2 && layer == 0 && kind_ != Kind::Below) continue;
                 p[axis] -= here / slope[axis];
                 points.push_back(p);
@@ -316,7 +319,8 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    // Beyond an open end the wall slopes outward by at most 45 degrees: the body widens by at most its height there.
+    // Beyond an open end slice, the wall slopes outward by at most 45 degrees, so the body extends sideways beyond the
+    // grid by at most the height of its continuation.
     double wider = 0;
     for (const SolidSlice* end : {&slices.front(), &slices.back()})
         if (end->open) wider = std::max(wider, end->end);

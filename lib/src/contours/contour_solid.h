@@ -47,18 +47,20 @@ struct SolidSlice {
     double w = 0;              ///< position along the normal
     std::vector<float> level;  ///< signed distance within the plane, on the grid
     std::size_t polygons = 0;
-    double area = 0;     ///< of the inside
-    double depth = 0;    ///< of the deepest node inside
-    double cap = 0;      ///< height of the dome at the first and last slice, or of the continuation
-    bool open = false;   ///< no dome: the image ends here, and the body continues beyond it as its sections indicate
-    double end = 0;      ///< height of the continuation's flat end, beyond all that a band at the image's end reads
+    double area = 0;   ///< area of the inside
+    double depth = 0;  ///< maximum distance of a node inside from the contours
+    double cap = 0;    ///< first and last slice: height of the dome, or up to which an open end has surface points
+    /// First and last slice: there is no dome, because the image ends here. The body continues beyond the image with
+    /// the slope of the wall between the last two sections.
+    bool open = false;
+    double end = 0;      ///< height at which an open end is cut off, so far outside that no narrow band reaches it
     bool apart = false;  ///< this section and the next slice's do not overlap
-    Vec2 shift{0, 0};    ///< to the next slice's section, if this section is translated to that one
+    Vec2 shift{0, 0};    ///< translation of this section to the next slice's; 0: none
 
     [[nodiscard]] double at(const SliceGrid& grid, const SlicePlace& place) const {
         return sample_slice(level, grid, place);
     }
-    /// Height beyond an end slice above which nothing is inside.
+    /// Height beyond the first or last slice at which the body ends.
     [[nodiscard]] double highest() const { return open ? end : cap; }
 };
 
@@ -69,7 +71,7 @@ namespace covol {
 struct ContourSolid::Data {
     detail::SliceFrame frame;
     detail::SliceGrid grid;
-    std::vector<detail::SolidSlice> slices;  ///< by w, at least one
+    std::vector<detail::SolidSlice> slices;  ///< sorted by w; at least one
 };
 
 }  // namespace covol

@@ -23,17 +23,17 @@ using detail::SliceFrame;
 using detail::SolidSlice;
 using detail::Vec2;
 
-constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 256 MB; a coarser grid beyond
+constexpr std::size_t kMaxNodes = 64u << 20;  // nodes of all slices' grids, 256 MB; larger cells if more are needed
 
-constexpr int kMarginCells = 2;  // around the contours of a slice; the level continues beyond with the distance to them
+constexpr int kMarginCells = 2;  // around the contours of a slice; sample_slice() extrapolates beyond the grid
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
-/// Cells from the image's end to where a continued body ends: nothing that is computed depends on it, because it is a
-/// band's half width, and a cell, beyond the domain.
+/// Distance, in cells, from the image's end to the end of a body that is continued beyond it. No result depends on this
+/// end, because it lies farther outside the domain than the half width of the narrow band.
 double end_cells() { return kCommon.beyond_voxels + kHalfWidthVoxels + 1; }
 
 struct Line {
-    std::vector<Vec3> index;  ///< marks in voxels, or in a frame of the contours' own
+    std::vector<Vec3> index;  ///< marks in voxels of the image, or of the contours' own frame
     std::vector<Vec3> world;
     bool closed = true;
     std::string name;  ///< for messages: file, and the line's own name
@@ -81,7 +81,7 @@ public:
 private:
     void read(const PointCloud& cloud);
     void check_inside(const Line& line) const;
-    /// Maximum deviation of marks from their common slice: relative to the image's spacing, or else to a length.
+    /// Maximum deviation of marks from a common slice, relative to `spacing` with an image and to `length` without one.
     [[nodiscard]] double same_slice(double spacing, double length) const {
         return has_image_ ? kCommon.precision_voxels * spacing : kCommon.same_place * length;
     }
@@ -177,8 +177,8 @@ void Densifier::find_planes(Line& line) const {
     }
 }
 
-/// Whether each closed line lies across one of the image's axes; without an image, across the frame's, because no axis
-/// is preferred there.
+/// Whether each closed line lies in a plane perpendicular to an axis: with an image, to any of its axes; without an
+/// image, to the axis of choose_plane().
 bool Densifier::lies_in_slices() const {
     return std::all_of(lines_.begin(), lines_.end(), [&](const Line& line) {
         return !line.closed ||
@@ -186,8 +186,8 @@ bool Densifier::lies_in_slices() const {
     });
 }
 
-/// Chooses parallel planes that are tilted against the image, with a frame of their own, in which the image's end is
-/// not a plane. @returns whether closed lines lie in such planes
+/// Chooses the frame of parallel planes that are tilted against the image. The ends of the image are not parallel to
+/// them, so bodies are not continued beyond the image. @returns whether all closed lines lie in such planes
 bool Densifier::choose_tilted_plane() {
     const Line* longest = nullptr;
     for (const Line& line : lines_)
@@ -213,7 +213,7 @@ bool Densifier::choose_tilted_plane() {
     return true;
 }
 
-/// Chooses the plane with the largest number of marks; those of closed lines count twice, of lines in several planes 0.
+/// Chooses the axis across which most marks lie on lines; closed lines count twice, those across several axes 0.
 void Densifier::choose_plane() {
     std::array<std::size_t, 3> votes{0, 0, 0};
     for (const Line& line : lines_) {
@@ -228,8 +228,8 @@ void Densifier::choose_plane() {
     frame_ = SliceFrame(geometry_, best);
 }
 
-/// If a contour follows a side of the image, in its last row of voxels, the image cuts the section, which is continued
-/// beyond that side.
+/// If a contour follows a side of the image, within the last row of voxels, the structure is cut off by the image
+/// there, and the contour is continued beyond that side.
 std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const {
     for (int side = 0; side < 4; ++side) {
         const int a = side / 2, axis = a == 0 ? frame_.x_axis() : frame_.y_axis();
@@ -268,7 +268,7 @@ std::vector<Vec3> Densifier::curve_through(const Line& line, const std::vector<V
                                                   : marks;
 }
 
-/// Planes of several directions: marks along all lines, and positions whose side follows from the sections.
+/// For planes of several directions: computes points along all lines, and positions of which the sections fix the side.
 void Densifier::make_network() {
     std::vector<std::vector<Vec3>> open, closed;
     double length = 0;
@@ -387,7 +387,7 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
     run_.check();
 }
 
-/// If sections do not overlap: a single contour is translated to the next; several end, and new ones begin.
+/// If neighbouring sections do not overlap, single contours are joined by a translation; several end between slices.
 void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons) {
     std::vector<char> apart(data.slices.size(), 0);
     tbb::parallel_for(std::size_t(0), data.slices.size() - 1, [&](std::size_t n) {
@@ -435,8 +435,8 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         slices[end].cap =
             std::max(compute_cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
         if (!along_image_ || alone) return;
-        // Open on the image's last slice, or if the next marked slice would lie beyond the image and the sections,
-        // extrapolated, do not end before it.
+        // The end is open on the image's last slice, or if the next marked slice would lie beyond the image and the
+        // sections, extrapolated, do not end before the image does.
         const double left =
             first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis()] - 0.5) * spacing - slices[end].w;
         const double shrinks_by = slices[before].area - slices[end].area;

@@ -17,26 +17,26 @@ namespace {
 
 constexpr std::size_t kMaxFieldNodes = 6'000'000;
 constexpr std::size_t kMaxStops = 20'000'000;  // crossings of the lattice's edges with planes; 16 bytes each
-constexpr int kCoarsest = 16;                  // nodes along the longest side
+constexpr int kCoarsest = 16;                  // maximum cells of the first lattice along the longest side
 constexpr float kSettled = 1e-4F;              // maximum change of a value in a sweep
 constexpr int kMaxSweeps = 400;
 constexpr std::size_t kFolds = 6;
-constexpr float kClosest = 1e-3F;  // cells from a plane; a closer node has the plane's value
+constexpr float kClosest = 1e-3F;  // [cells] minimum distance of a node from a plane in its equation
 
 using Size = std::array<int, 3>;
 using Planes = std::vector<const SectionLevels*>;
 
-/// The crossing of an edge of the lattice with a plane.
+/// The crossing of an edge of the lattice with a plane, for one of the two nodes of the edge.
 struct PlaneCrossing {
     std::uint32_t node;
     std::uint8_t direction;  // 2 * axis, + 1 towards larger indices
-    float distance, value;   // distance in cells, and the value on the plane
+    float distance, value;   // distance from the node in cells, and the value on the plane
 };
 
-/// The equation of a node beside a plane.
+/// The equation of a node beside a plane: its value is `known` plus the sum of weight * value over its neighbours.
 struct NodeEquation {
     std::array<float, 6> weight{};  // of neighbours, by direction
-    float known = 0;                // contribution of the planes
+    float known = 0;                // contribution of the planes' values
 };
 
 struct Lattice {
@@ -253,7 +253,7 @@ Field solve_between(const Planes& planes, const WorldBox& box, double finest, do
     return field;
 }
 
-/// The level that best separates inside from outside in held-out planes.
+/// The level that best separates inside from outside in held-out planes; 0 if there are fewer than kFolds planes.
 float cross_validated_level(const Planes& planes, const WorldBox& box, double cell, double across,
                             const RunContext& run) {
     if (planes.size() < kFolds) return 0;
@@ -276,7 +276,8 @@ float cross_validated_level(const Planes& planes, const WorldBox& box, double ce
         }
     }
     std::sort(found.begin(), found.end());
-    // Number of errors: outside at or below the level, or inside above it.
+    // Number of errors for a level: positions outside with a value at or below it, and positions inside with a value
+    // above it. The level increases from below all values.
     auto wrong = std::ptrdiff_t(std::count_if(found.begin(), found.end(), [](const auto& f) { return f.second; }));
     std::ptrdiff_t fewest = wrong;
     float best = 0;
@@ -298,15 +299,16 @@ SectionField::SectionField(const std::vector<Section>& sections, double h, const
     for (int a = 0; a < 3; ++a) volume *= box.max[a] - box.min[a];
     for (const Section& section : sections) area += area_within(section.plane, box);
     plane_distance_ = area > 0 ? volume / area : longest_side(box);
-    // The box extends by the planes' distance beyond the sections, and its border is outside, so that the body ends
-    // halfway to the next plane, as between slices.
+    // The box extends beyond the sections by the planes' distance, and its border is outside. It thus has the effect of
+    // a further plane without contours, and the body ends about halfway before it.
     double nodes = 1;
     for (int a = 0; a < 3; ++a) {
         box.min[a] = origin[a] + h * std::floor((box.min[a] - plane_distance_ - origin[a]) / h);
         box.max[a] += plane_distance_;
         nodes *= (box.max[a] - box.min[a]) / h + 2;
     }
-    // A plane of any direction crosses up to sqrt(3) edges for each node of a layer, each with two ends.
+    // Estimated number of crossings: a plane crosses up to sqrt(3) edges for each node of a layer of the lattice, and
+    // each crossing is listed at both ends of its edge.
     const double stops = 2 * std::sqrt(3.0) * double(sections.size()) * std::pow(nodes, 2.0 / 3);
     cell_ =
         h * std::ceil(std::max({1.0, std::cbrt(nodes / double(kMaxFieldNodes)), std::sqrt(stops / double(kMaxStops))}));

@@ -13,10 +13,11 @@ namespace covol::detail {
 /// 28(11), 2006, with planes as seeds). By the maximum principle each part of the body, and of its outside, is
 /// connected to a section with that label.
 ///
-/// The surface is the level that best separates the sides in cross-validation on the planes: at level 0 thin parts
-/// vanish between their sections, where a random walk soon reaches the outside.
+/// The surface is not at level 0 but at the level that best separates inside from outside in cross-validation on the
+/// planes: at level 0, thin parts would vanish between their sections, where a random walk soon reaches the outside.
 ///
-/// Second order: beside a plane the Laplacian's differences end on it (Shortley and Weller, J. Appl. Phys. 9, 1938).
+/// The discretisation is of second order: at a node beside a plane, the differences of the Laplacian end on the plane
+/// instead of at the next node (Shortley and Weller, J. Appl. Phys. 9, 1938).
 class SectionField {
 public:
     /// @param sections  at least one, each with a polygon
@@ -28,7 +29,8 @@ public:
     /// Trilinear values, negative inside, at from + n * step, n < count.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
 
-    /// The box's volume over the area of the planes in it, which for parallel planes is their distance, world units.
+    /// The volume of the sections' bounding box over the area of the planes in it, which for parallel planes is their
+    /// mean distance, world units.
     [[nodiscard]] double plane_distance() const { return plane_distance_; }
 
 private:

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxSectionNodes = 1u << 20;  // of a plane's grid
 
-/// Greedy selection: the largest disc first, no centre within another disc.
+/// Selects discs greedily: the largest first, and none whose centre is within a selected disc.
 std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceGrid& grid, bool inside,
                                    double minimum) {
     std::vector<std::size_t> order;
@@ -39,7 +39,7 @@ std::vector<Vec2> centres_of_discs(const std::vector<float>& level, const SliceG
     return centres;
 }
 
-/// By the even-odd rule.
+/// Whether the position is inside the polygons, by the even-odd rule.
 bool is_inside(const std::vector<Polygon>& polygons, const Vec2& at) {
     bool inside = false;
     for (const Polygon& polygon : polygons)
@@ -111,7 +111,7 @@ double extent_of(const std::vector<Vec3>& points) {
 }
 
 std::vector<Section> sections_of(const std::vector<std::vector<Vec3>>& contours, double tolerance) {
-    // The plane is estimated best from long contours.
+    // Contours with many points come first, because they determine their common plane best.
     std::vector<std::size_t> order(contours.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(),
@@ -145,7 +145,7 @@ SectionMarks marks_along(const std::vector<Section>& sections, double step) {
                 const double length = std::hypot(out[0], out[1]);
                 if (!(length > 0)) continue;  // a contour of one or two positions
                 out = {out[0] / length, out[1] / length};
-                const double off = kCommon.same_place * step;  // the side is determined at this distance
+                const double off = kCommon.same_place * step;  // distance at which the side is tested
                 const Vec2 beside{at[0] + off * out[0], at[1] + off * out[1]};
                 if (is_inside(section.polygons, beside)) out = {-out[0], -out[1]};
                 const Vec3 tip = section.plane.world(out), zero = section.plane.origin;

@@ -10,7 +10,7 @@ namespace covol::detail {
 struct SectionPlane {
     Vec3 origin{0, 0, 0}, u{1, 0, 0}, v{0, 1, 0}, normal{0, 0, 1};  ///< u, v, normal: unit vectors, right-handed
 
-    [[nodiscard]] double height(const Vec3& p) const;  ///< along the normal
+    [[nodiscard]] double height(const Vec3& p) const;  ///< signed distance from the plane
     [[nodiscard]] Vec2 flat(const Vec3& p) const;
     [[nodiscard]] Vec3 world(const Vec2& p) const;
 };
@@ -21,7 +21,7 @@ struct SectionPlane {
 /// The extent of the points along a direction.
 [[nodiscard]] double thickness_along(const std::vector<Vec3>& points, const Vec3& direction);
 
-/// The longest side of their box.
+/// The longest side of the points' bounding box.
 [[nodiscard]] double extent_of(const std::vector<Vec3>& points);
 
 /// The closed contours of one plane.
@@ -37,7 +37,8 @@ struct SectionLevels {
     std::vector<float> level;
     [[nodiscard]] double at(const Vec2& p) const { return sample_slice(level, grid, place_in(grid, p[0], p[1])); }
 };
-/// @param cell  of the grid, which contains the polygons and a margin; larger if the grid would have too many nodes
+/// @param cell  cell size of the grid, which contains the polygons and a margin; increased if there would be too many
+/// nodes
 [[nodiscard]] SectionLevels levels_of(const Section& section, double cell);
 
 /// Contours by plane: those within `tolerance` of a common plane form one section.
@@ -55,7 +56,7 @@ struct Sides {
 };
 /// The centres of discs in the planes that intersect no contour, the largest first, none within another: few positions
 /// that represent the parts and holes of a section.
-/// @param cell  of the grid that is searched, and the minimum radius of a disc
+/// @param cell  cell size of the grid that is searched, and minimum radius of a disc
 [[nodiscard]] Sides sides_of(const std::vector<Section>& sections, double cell);
 
 }  // namespace covol::detail

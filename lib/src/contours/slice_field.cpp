@@ -8,7 +8,9 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kSeedPiece = 8;  // cells; a long edge is processed in pieces, because its box would be large
+// [cells] Edges are processed in pieces of at most this length, because the box around a long oblique edge would
+// contain many nodes that are far from the edge.
+constexpr double kSeedPiece = 8;
 
 struct Edge {
     float x, y, dx, dy, inverse;  // in cells; inverse of the squared length
@@ -106,7 +108,8 @@ std::vector<std::vector<double>> crossings_by_row(const std::vector<Polygon>& po
             Vec2 a = polygon[n], b = polygon[(n + 1) % polygon.size()];
             if (a[1] > b[1]) std::swap(a, b);
             const auto row_of = [&](double y) { return (y - grid.origin[1]) / grid.cell; };
-            // A row at a vertex belongs to the edge that begins there, so that parity is correct at vertices.
+            // If a row of nodes passes through a vertex, it crosses only those edges of which this is the lower end, so
+            // that the parity of the crossings is correct.
             const int first = std::max(int(std::ceil(row_of(a[1]))), 0);
             for (int j = first; j < grid.ny && j < row_of(b[1]); ++j) {
                 const double t = (j - row_of(a[1])) / (row_of(b[1]) - row_of(a[1]));
@@ -149,7 +152,7 @@ PolygonMoments moments(const Polygon& polygon) {
     PolygonMoments m;
     Vec2 mean{0, 0};
     double twice = 0;
-    // Relative to the first vertex: far from the origin the formula loses precision.
+    // Coordinates are relative to the first vertex, because the formula loses precision far from the origin.
     for (std::size_t n = 0; n < polygon.size(); ++n) {
         const Vec2 &o = polygon[0], &p = polygon[n], &q = polygon[(n + 1) % polygon.size()];
         const double ax = p[0] - o[0], ay = p[1] - o[1], bx = q[0] - o[0], by = q[1] - o[1];

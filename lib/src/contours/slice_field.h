@@ -26,18 +26,18 @@ struct SliceGrid {
 struct SlicePlace {
     std::size_t node = 0;  ///< the node with the lowest indices of the cell's four
     double s = 0, t = 0;   ///< position within the cell, 0 to 1
-    double beyond = 0;     ///< distance from the grid, in its units
+    double beyond = 0;     ///< distance from the grid, in units of x and y; 0 within it
 };
 [[nodiscard]] SlicePlace place_in(const SliceGrid& grid, double x, double y);
 
-/// Bilinear; beyond the grid the value at its border plus the distance to it.
+/// Bilinear interpolation within the grid; beyond it, the value at its border plus the distance from the grid.
 [[nodiscard]] inline double sample_slice(const std::vector<float>& values, const SliceGrid& grid, const SlicePlace& p) {
     const float *row = values.data() + p.node, *next = row + grid.nx;
     return (1 - p.t) * ((1 - p.s) * double(row[0]) + p.s * double(row[1])) +
            p.t * ((1 - p.s) * double(next[0]) + p.s * double(next[1])) + p.beyond;
 }
 
-/// Area by the shoelace formula, and the centroid; a polygon without area has its vertices' mean.
+/// Area by the shoelace formula, and the centroid, which is the mean of the vertices if the area is 0.
 struct PolygonMoments {
     double area = 0;
     Vec2 centroid{0, 0};

@@ -14,19 +14,19 @@
 namespace covol::detail {
 namespace {
 
-// Measured: peak memory divided by the number of voxels.
-constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
-constexpr double kBandBytes = 200;       ///< for each active voxel of a band on which a flow is solved
-constexpr double kCoarseVoxels = 1e6;    // of the grid on which volumes are measured
-constexpr double kBandVoxels = 10;       // width of a band that moves with the surface, with all leaves that it cuts
-constexpr double kLeafVoxels = 4;        // mean distance by which a tube's leaves extend beyond it
-constexpr double kGrowth = 1.02;         // of the voxel size, in the search for one that fits
-constexpr double kBaseBytes = 8e7;       // of a program before any computation
-constexpr double kOverestimate = 1.2;    // estimates were too high by up to this factor
-constexpr double kBudgetFraction = 0.8;  // fraction of the budget that the proposed voxel size takes
-constexpr int kMaxGrowths = 2000;
+constexpr double kTubeBytes = 12;        // [bytes] measured peak memory for each voxel of a distance tube
+constexpr double kBandBytes = 200;       // [bytes] the same for each active voxel of a band on which a flow is solved
+constexpr double kCoarseVoxels = 1e6;    // approximate number of voxels of the grid on which volumes are measured
+constexpr double kBandVoxels = 10;       // [voxels] width of a band that moves with the surface, in whole leaves
+constexpr double kLeafVoxels = 4;        // [voxels] mean distance by which a tube's leaves extend beyond the tube
+constexpr double kGrowth = 1.02;         // ratio of successive voxel sizes in the search for one that fits
+constexpr double kBaseBytes = 8e7;       // [bytes] memory of a program before any computation
+constexpr double kOverestimate = 1.2;    // estimates of the memory were too high by up to this factor
+constexpr double kBudgetFraction = 0.8;  // fraction of the budget that the proposed voxel size needs
+constexpr int kMaxGrowths = 2000;        // maximum number of voxel sizes that are tried
 
-/// Volume of {d <= r} as a function of r, on a grid that is coarse enough for any domain.
+/// Volume of {d <= r} as a function of r, where d is the distance to the points. It is measured on a grid so coarse
+/// that its own memory is small for any domain.
 class CloudVolume {
 public:
     CloudVolume(const std::vector<Vec3>& points, const Domain& domain, const RunContext& run)

@@ -154,7 +154,8 @@ std::int32_t Sweeper::touch(const Coord& origin) {
     return id;
 }
 
-/// Each voxel takes the nearest of the points in the 3^3 voxels around it, which is exact up to 1.5 voxels.
+/// Each voxel takes the nearest of the points in the 3^3 voxels around it. Up to a distance of 1.5 voxels, this is the
+/// nearest of all points.
 void Sweeper::seed_leaf(NearestLeaf& leaf) const {
     std::array<float, kLeafSize> squared;
     squared.fill(NearestBlock::kFar);
@@ -191,7 +192,7 @@ void Sweeper::seed_leaf(NearestLeaf& leaf) const {
 }
 
 void Sweeper::seed() {
-    // Leaves in the order of the points, so that their numbers do not depend on hashing.
+    // Leaves are created in the order of the points, so that their numbers do not depend on hashing.
     for (std::size_t n = 0; n < field.points.size();) {
         const Coord o = leaf_origin(voxel_of(field.points[n]));
         const Bin bin = bins_.at(key(o));
@@ -247,7 +248,8 @@ void load_interior(const NearestField& field, const NearestLeaf& leaf, NearestBl
 void Sweeper::load(const NearestLeaf& leaf, NearestBlock& block) const {
     load_interior(field, leaf, block);
     PointReader reader(field, leaf.origin);
-    // First and last voxel, in indices of this leaf, that it reads from a neighbour at -1, 0, 1.
+    // Along an axis, indices of the first and the last voxel that are read from a neighbour at step -1, 0 or 1,
+    // relative to this leaf.
     constexpr int kFirst[3] = {-1, 0, 8}, kLast[3] = {-1, 7, 8};
     for (int slot = 0; slot < 27; ++slot) {
         if (slot == 13) continue;
@@ -270,12 +272,13 @@ void Sweeper::visit(NearestLeaf& leaf) {
     store_points(block, reach, !leaf.visited, leaf.nearest.data(), changed.data());
     leaf.visited = true;
     leaf.affected = 0;
-    // Neighbours may round a tie differently: only a leaf that has changed notifies its neighbours, so that this ends.
+    // If two points are equally distant, rounding may make each of two leaves prefer a different one. Only a leaf that
+    // has changed notifies its neighbours, so that they do not continue to notify each other.
     if (!any_on(changed)) return;
     const unsigned faces = improved_faces(block, reach);
     for (int face = 0; face < 6; ++face) leaf.affected |= (faces >> face & 1) << kFaceSlots[face];
-    // Existing neighbours are notified of a change through the faces. Changes at edges and corners matter only for
-    // leaves that have to be created.
+    // Existing neighbours are notified across faces only. Changes at edges and corners matter for neighbours that do
+    // not exist yet and have to be created.
     for (int slot = 0; slot < 27; ++slot) {
         std::uint64_t any = 0;
         if (leaf.neighbours[slot] < 0)

@@ -13,7 +13,7 @@ struct NearestLeaf {
     Coord origin;
     std::array<std::int32_t, 27> neighbours;  // -1: no such leaf
     std::array<std::int32_t, kLeafSize> nearest;
-    std::uint32_t affected = 0;  // neighbours that this leaf's last change affects, by neighbour_slot
+    std::uint32_t affected = 0;  // neighbours that this leaf's last change affects: bits by neighbour_slot()
     bool queued = false;
     bool visited = false;
 };
@@ -26,11 +26,12 @@ struct NearestField {
     int rounds = 0;
 };
 
-/// Sweeps point indices through the tube of `radius` voxels around the points, within `box`.
+/// Finds the nearest point of each voxel within `radius` voxels of the points and within `box`, by sweeps in which a
+/// voxel takes the point of a neighbour if that is nearer than its own.
 ///
 /// Every leaf that the tube meets is included; voxels farther away than `radius` may have a point that is not the
-/// nearest. Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is
-/// visited again if a neighbour has changed the voxels next to it.
+/// nearest. Leaves whose indices have equal parities along all three axes are swept in parallel, since none of them
+/// reads another. A leaf is swept again if a neighbour has changed the voxels next to it.
 /// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it if necessary.
 /// @param where   the caller's name, for messages.
 /// @param enters  whether a leaf, given by its origin, is included; null: all are

@@ -55,8 +55,8 @@ struct Row {
     }
 };
 
-// Lanes shifted up or down by N; the lanes that become free take the halo's point. Any point may be offered to any
-// voxel.
+// The points of a row, moved by N voxels to higher or lower k. The N voxels at the end get the halo's point, although
+// it is not N voxels away from all of them: any point may be offered to any voxel, because offer() compares distances.
 template <int N>
 COVOL_INLINE Points8 moved_up(const Points8& p, const Points8& halo) {
     const auto shift = [](const auto& v, const auto& h) __attribute__((always_inline)) {
@@ -118,7 +118,7 @@ COVOL_INLINE void sweep_slice(NearestBlock& b, int i, int from) {
     }
 }
 
-/// Eight voxels of a layer, `stride` apart.
+/// The points of eight voxels whose offsets in the block differ by `stride`.
 COVOL_INLINE Points8 load_points(const NearestBlock& b, int at, int stride) {
     Points8 p;
     for (int n = 0; n < 8; ++n) {

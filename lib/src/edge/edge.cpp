@@ -28,11 +28,12 @@ using detail::LeafBand;
 using detail::LeafBounds;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kHeatTolerance = 1e-4;  // of the brightness range
-// Sigmas beyond which the weights of a Gaussian are too small to change a value: half and twice as many give the same
-// result.
+constexpr double kHeatTolerance = 1e-4;  // maximum error, as a fraction of the brightness range
+// [standard deviations] Distance beyond which the weights of the Gaussian are negligible: half and twice this distance
+// give the same result.
 constexpr double kHaloSigmas = 3.0;
-// Maximum time step, h^2: shorter ones make the kernel more similar to a Gaussian, which changes no result visibly.
+// [h^2] Maximum time step of the diffusion. Shorter steps make the kernel more similar to a Gaussian, but change no
+// result visibly.
 constexpr double kLargestHeatStep = 0.5;
 
 // The band's leaves with a sufficient margin, and the normalised image on them.
@@ -41,8 +42,9 @@ struct Window {
     HaloField image;  // missing neighbours are filled in when loaded: homogeneous Neumann
 };
 
-// Which of a leaf's neighbours are missing, as bounds for mirror_outside. A neighbour that exists on a diagonal but not
-// on the face is ignored as well; this is far from where the result is used.
+// Bounds for mirror_outside(), which exclude the neighbours that are missing across faces. A neighbour across an edge
+// or corner is ignored, too, if one across a face is missing; this occurs only far from the voxels at which the result
+// is used.
 LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t leaf) {
     LeafBounds bounds(domain, band.origin(leaf));
     const auto& n = band.neighbours(leaf);
@@ -165,9 +167,9 @@ private:
     alignas(64) float layers_[6][kLeafSize];  // only the layer that touches the leaf is set
 };
 
-// `steps` implicit steps of t h² divide a wave by (1 + 6t (1 - m))^steps, where m in [-1,1] is the factor by which the
-// mean of the six neighbours scales it: a Chebyshev series in that mean, truncated when the remainder is below the
-// tolerance.
+// The coefficients of `steps` implicit steps of t h² as a Chebyshev series. These steps divide a plane wave by
+// (1 + 6t (1 - m))^steps; m in [-1, 1] is the factor by which the mean over the six neighbours multiplies the wave. The
+// series is in m, and is truncated when the remainder is below the tolerance.
 std::vector<double> heat_series(double t, int steps) {
     const int nodes = 64 + 16 * int(std::ceil(std::sqrt(6 * t * steps)));
     std::vector<double> values(nodes);
@@ -185,8 +187,8 @@ std::vector<double> heat_series(double t, int steps) {
     return series;
 }
 
-// I_t = ΔI over time σ²/2 by implicit steps, all at once by Clenshaw's recurrence (C. W. Clenshaw, Math. Comp. 9,
-// 1955).
+// Solves I_t = ΔI over the time σ²/2. The implicit steps are not performed one by one: Clenshaw's recurrence (Math.
+// Comp. 9, 1955) evaluates the series of all of them.
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
     const int steps = int(std::ceil(time / kLargestHeatStep - 1e-9));
@@ -236,7 +238,7 @@ double contrast_of(FloatGrid& slopes, double percentile) {
     });
     const float at = detail::nth_value(values, std::size_t(percentile * double(values.size() - 1)));
     if (at > 0.0F) return at;
-    // Edges are rarer than the percentile: half of the steepest slope is used.
+    // The value is 0 if edges are too rare to reach the percentile. Half of the maximum is then used.
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 

@@ -6,13 +6,14 @@ namespace covol {
 
 /// The edge detector: edge.cpp.
 struct EdgeHeuristics {
-    /// [percentile] Of the slopes, from which the contrast K is chosen.
+    /// [percentile] Percentile of the slopes from which K is chosen.
     double slope_percentile = heuristic("edge.slope_percentile", 0.9);
     /// [of the median brightness] Brightness of lines from which K is chosen, so that weaker lines still count.
     double line_fraction = heuristic("edge.line_fraction", 1.0 / 3.0);
     /// [standard errors] Minimum strength of a line; a weaker one may be noise.
     double standard_errors = heuristic("edge.standard_errors", 3.0);
-    /// [of the voxels] Fraction of the brightest ones, which become 1, and of the darkest ones, which become 0.
+    /// [of the voxels] Fraction of the voxels whose brightness becomes 1 because they are the brightest ones, and
+    /// fraction of those whose brightness becomes 0 because they are the darkest ones.
     double clipped = heuristic("edge.clipped", 0.005);
 };
 COVOL_HEURISTICS EdgeHeuristics kEdge{};

@@ -10,8 +10,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kBits = 12;
-constexpr std::size_t kBlock = 1 << 16;  // number of values
+constexpr int kBits = 12;                // a histogram has 2^kBits bins
+constexpr std::size_t kBlock = 1 << 16;  // number of values that are counted by one task
 using Histogram = std::array<std::uint32_t, std::size_t(1) << kBits>;
 
 /// The upper bits of an integer that has the same order as the values.
@@ -32,7 +32,7 @@ float nth_value(const std::vector<float>& values, std::size_t n) {
     });
     std::uint32_t bin = 0;
     std::size_t before = 0;
-    std::vector<std::size_t> first(blocks + 1);  // index of each block's first value in the bin
+    std::vector<std::size_t> first(blocks + 1);  // for each block, index in `among` of its first value
     for (;; ++bin) {
         for (std::size_t block = 0; block < blocks; ++block) first[block + 1] = first[block] + counts[block][bin];
         if (n < before + first.back()) break;

@@ -22,19 +22,19 @@ namespace {
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
+constexpr double kRounding = 5e-7;  // voxels; a residual below this results from the rounding of single precision
 
 // How the system is solved. None of these is decisive: they change the number of visits, while the solution is the same
 // up to `solver_tolerance`.
-constexpr int kInnerSweeps = 2;     // of a leaf per visit: the second costs a fifth and saves a third of the visits
-constexpr double kMaxOmega = 1.9;   // over-relaxation
+constexpr int kInnerSweeps = 2;     // sweeps in each visit of a leaf; the second saves a third of the visits
+constexpr double kMaxOmega = 1.9;   // maximum factor of over-relaxation
 constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is abandoned
-constexpr double kLocalGoal = 0.5;  // fraction of the residual aimed at; a leaf with a smaller one is not visited
+constexpr double kLocalGoal = 0.5;  // of the goal; a leaf with a smaller residual is not visited
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// A weight, 1 up to range/2 and decreasing to 0 at range, and its integral from 0: the points attract by
-// -taper(d) ∇d = -∇potential(d).
+// The weight of the points' attraction at the distance d: 1 up to range/2, decreasing to 0 at range. Its integral from
+// 0 is the potential, so that the points attract by -taper(d) ∇d = -∇potential(d).
 struct Taper {
     double range;  // world units; 0: no limit
     [[nodiscard]] double ramp(double d) const { return std::clamp(2.0 * d / range - 1.0, 0.0, 1.0); }
@@ -50,7 +50,7 @@ struct Taper {
     }
 };
 
-// Values of active voxels through `convert`, kUnknown elsewhere; of the halo only the faces are needed.
+// Copies convert(value) of active voxels, and kUnknown for the others. Only the faces of the halo are needed.
 template <typename Convert>
 HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert convert) {
     return gather(band, grid, false, [&](const LeafNode* leaf, float, float* block) {
@@ -60,8 +60,8 @@ HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert conv
     });
 }
 
-// The points' potential in voxels, reduced where no trusted mark is near. The weight applies to the potential, not to
-// its slope: near the points, where d is small, both are equivalent.
+// The points' potential in voxels, multiplied by guess_weight far from all trusted marks. The potential is weighted,
+// not its slope; near the points, where d is small, both are equivalent.
 HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight,
                            double h) {
     const FloatGrid* trusted = guess_weight < 1.0 ? fields.trusted : nullptr;
@@ -231,14 +231,14 @@ void BandSolver::hold_to_bounds() {
     });
 }
 
-// @param first  residual at u^{n-1}
+// @param first  root mean square residual at u^{n-1}, voxels
 void BandSolver::solve(double omega, double first, Counts& counts) {
     const double goal = std::max(options_.solved_to() * first, kRounding);
     double start = first;
     bool visit_all = true;
     for (int visit = 0; visit * kInnerSweeps < options_.max_sweeps; ++visit) {
         const double residual = sweep(static_cast<float>(omega), visit_all ? 0.0 : goal, counts);
-        if (visit == 0) start = std::max(first, residual);  // an initial value worse than u^{n-1} is not divergence
+        if (visit == 0) start = std::max(first, residual);  // the extrapolated initial value may be worse than u^{n-1}
         visit_all = omega > 1.0 && !(residual <= kDiverged * start);
         if (visit_all) {
             // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
@@ -261,7 +261,7 @@ void BandSolver::update_active_leaves(const std::vector<float>& motion, double t
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         unsigned char is_active = moved[leaf];
         for (const std::int32_t next : band_.neighbours(leaf)) is_active |= moved[next];
-        // In inactive leaves u^{n-1} = u^n.
+        // An inactive leaf is not changed by further steps, and u^{n-1} = u^n in it.
         if (!is_active) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         leaf_active_[leaf] = is_active && active_counts_[leaf] > 0;
     });
@@ -290,7 +290,8 @@ void BandSolver::redistance(double clamp) {
     hold_to_bounds();
 }
 
-// Consecutive steps are similar: the initial value of the solve extrapolates the last step.
+// Computes the rows of all active leaves. The initial value of the solve extrapolates the last step, because
+// consecutive steps are similar.
 BandSolver::Rows BandSolver::assemble(const SchemeConstants& constants) {
     const SchemeKernels& kernel = kernels();
     std::vector<float> largest(band_.size(), 0.0F);
@@ -331,7 +332,8 @@ double BandSolver::root_mean_square() const {
     return std::sqrt(sum / static_cast<double>(active_count_));
 }
 
-// Whether the residual of the leaf, or of one across a face, is above the goal; goal = 0: all leaves are visited.
+// Whether the residual of the leaf, or of a leaf across one of its faces, is above kLocalGoal * goal. With goal = 0,
+// this is so for all leaves.
 bool BandSolver::is_unconverged(std::size_t leaf, double goal) const {
     if (goal == 0.0) return true;
     const double per_voxel = kLocalGoal * goal * kLocalGoal * goal;

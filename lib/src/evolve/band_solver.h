@@ -24,21 +24,21 @@ namespace covol::detail {
 class BandSolver {
 public:
     struct Counts {
-        std::int64_t passes = 0;        ///< over the leaves
-        std::int64_t visits = 0;        ///< of leaves
-        std::int64_t visits_saved = 0;  ///< skipped, compared with passes over all leaves
+        std::int64_t passes = 0;        ///< number of passes over the leaves
+        std::int64_t visits = 0;        ///< number of visits of a leaf
+        std::int64_t visits_saved = 0;  ///< visits fewer than if each pass visited all leaves
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 
-    /// Gathers u, the fields whose weight is not 0, and the bounds that are given.
+    /// Copies u, the fields whose weight is not 0, and the given bounds into leaf arrays.
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
-    /// The active leaves, and what the next step needs from the steps before.
+    /// The band's leaves, which of them are active, and the motion that the next step needs from the steps before.
     struct LeafStates {
         LeafBand band;
         std::vector<unsigned char> active;
-        std::vector<float> pending_motion;  ///< since the leaf last activated its neighbours, voxels
+        std::vector<float> pending_motion;  ///< motion since the leaf last activated its neighbours, voxels
         std::vector<LeafMotion> motions;
     };
     /// Moves the states out of the solver, which cannot be used afterwards.
@@ -47,7 +47,8 @@ public:
     /// @param changed  sorted origins of leaves whose values differ from those of the previous band
     void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
-    /// Writes or reads everything that steps have changed. The band has to be the same.
+    /// Writes or reads everything that steps have changed. When it is read, the band has to be that of the solver that
+    /// wrote it.
     void exchange(StateFile& file);
 
     /// One time step of length τ = tau * h on the active leaves.
@@ -57,14 +58,15 @@ public:
     ///     threshold
     /// @param threshold  voxels
     void update_active_leaves(const std::vector<float>& motion, double threshold);
-    /// max |u^n - u^{n-1}| of each leaf in the last step, voxels
+    /// The maximum of |u^n - u^{n-1}| in each leaf in the last step, voxels.
     [[nodiscard]] std::vector<float> largest_changes() const;
     [[nodiscard]] bool is_leaf_active(std::size_t leaf) const { return leaf_active_[leaf] != 0; }
     /// Redistances u on the active leaves, clamped to `clamp` voxels; see LocalDistance.
     void redistance(double clamp);
     /// Undoes the last step.
     void restore_previous();
-    /// Writes active voxels to the grid that u came from; inactive ones keep their bits.
+    /// Writes the values of active voxels to the grid from which this solver was made; inactive voxels remain
+    /// unchanged.
     void store(FloatGrid& u) const;
 
     [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
@@ -99,7 +101,7 @@ private:
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_, obstacle_, floor_;
     LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
-    bool has_previous_ = false;  // previous_ is u of the step before
+    bool has_previous_ = false;  // previous_ is u^{n-1}, and not scratch
     static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Fraction);
     std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // coefficients of each leaf; scratch between steps
     // One for each leaf:
@@ -107,7 +109,7 @@ private:
     std::vector<unsigned char> leaf_active_;
     std::vector<float> pending_motion_;
     std::vector<LeafMotion> motions_;
-    std::vector<double> residuals_;  // sums of squares, from the last visit
+    std::vector<double> residuals_;  // sum of squared residuals at the last visit
 };
 
 }  // namespace covol::detail

@@ -8,7 +8,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kLanes = 8, kValues = 512;  // of a leaf
+constexpr int kLanes = 8, kValues = 512;  // values computed at a time, values of a leaf
 
 COVOL_INLINE Float8 size_of(const Float8& x) { return x < 0.0F ? -x : x; }
 

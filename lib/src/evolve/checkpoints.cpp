@@ -67,7 +67,7 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     const fs::path job_file = fs::path(folder) / kJobFile;
     state_->had_states = fs::exists(job_file, status);
     if (!state_->had_states) {
-        remove_flows(folder);  // left by a run that was killed while it removed them
+        remove_flows(folder);  // states of a run that was killed while it removed them
         detail::write_atomically(job_file.string(), [&](const std::string& temporary) {
             std::ofstream file(temporary, std::ios::binary);
             file << job;
@@ -96,9 +96,9 @@ bool Checkpoints::had_states() const noexcept { return state_->had_states; }
 
 void Checkpoints::remove() noexcept {
     std::error_code status;
-    fs::remove(fs::path(state_->folder) / kJobFile, status);  // first: without it the others are ignored
+    fs::remove(fs::path(state_->folder) / kJobFile, status);  // first, because without it the states are ignored
     remove_flows(state_->folder);
-    fs::remove(state_->folder, status);  // fails if something else is in it
+    fs::remove(state_->folder, status);  // fails if it contains other files, which are kept
 }
 
 int Checkpoints::begin_flow() {

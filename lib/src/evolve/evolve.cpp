@@ -39,8 +39,10 @@ bool has_active(const FloatGrid& u) {
     return false;
 }
 
-// The fractions of a row are accurate to half of 1/65535. With the smallest step, the motion is wrong by at most 1.5 %;
-// with the largest step, the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction.
+// Limits of the step of check_step(): tau times the strongest weight. The coefficients of a row are stored as
+// fractions, accurate to half of 1/65535. With the smallest step, the motion is wrong by at most 1.5 %; with the
+// largest step, the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction that can be
+// stored.
 constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
 
 // Steps between two examinations of a tracked band. A step moves the front by less than a voxel, so that it stays
@@ -159,7 +161,8 @@ private:
                     options_.tau ? "tau" : "delta");
     }
 
-    // A state lies between two steps: u from which the band was made, and what the steps since then have changed.
+    // A saved state lies between two steps. It consists of u from which the band was made and of what the steps since
+    // then have changed; this function writes or reads the latter.
     void exchange(detail::StateFile& file) {
         file.value(is_finished_);
         file.value(tau_);
@@ -221,7 +224,7 @@ private:
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
     }
 
-    // Points and edges hold the surface: only its steady state matters, not the path to it.
+    // Whether points or edges of the image hold the surface. Then only its steady state matters, not the path to it.
     [[nodiscard]] bool is_held() const { return options_.theta > 0 || options_.rho > 0; }
 
     // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice. Therefore u is
@@ -243,8 +246,8 @@ private:
     }
 
     struct Front {
-        double moved;      // its mean displacement since the last call, voxels
-        bool is_distance;  // |grad u| on it is neither too small nor too large in any leaf
+        double moved;      // mean displacement of the front since the last call, voxels
+        bool is_distance;  // |grad u| on the front is neither too small nor too large in any leaf
     };
     // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
     Front measure_front(std::vector<float>& largest) {
@@ -269,7 +272,8 @@ private:
                 *flattest >= detail::kFlattest && *steepest <= detail::kSteepest};
     }
 
-    // solver_ is null if no surface remains. @param largest  in: for each previous leaf; out: for each new leaf
+    // Rebuilds the band around the moved surface; solver_ is null afterwards if no surface remains. @param left  leaves
+    // that the front has left, or is about to. @param largest  in: for each previous leaf; out: for each new leaf
     void rebuild_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
@@ -311,7 +315,8 @@ private:
         if (motion > aim * margin) tau_ = std::max(tau_ / kCommon.growth, 1.0);
     }
 
-    // Estimated from the number of steps and from the decrease of the change; the larger value is returned.
+    // The fraction of the evolution that is done: the larger one of two estimates, from the number of steps and from
+    // the decrease of the change.
     [[nodiscard]] double progress() const {
         const double by_steps = double(report_.steps) / options_.max_steps;
         if (!(report_.last_change > 0) || !(options_.tolerance > 0)) return by_steps;
@@ -325,8 +330,8 @@ private:
     const RunContext& run_;
     const Domain domain_;
     detail::FlowStates states_;
-    bool is_finished_ = false, is_band_new_ = true;  // is_band_new_: since the last saved state
-    double tau_ = 1.0;                               // in h
+    bool is_finished_ = false, is_band_new_ = true;  // is_band_new_: not saved yet
+    double tau_ = 1.0;                               // time step / h
     std::unique_ptr<detail::BandSolver> solver_;
     detail::BandSolver::Counts counts_;
     detail::NetMotion net_motion_;

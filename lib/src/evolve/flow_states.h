@@ -13,7 +13,7 @@ class FlowStates {
 public:
     using Exchange = std::function<void(StateFile& file)>;
     struct Grids {
-        FloatGridPtr u, edge;  ///< null edge: the one with which the evolution began
+        FloatGridPtr u, edge;  ///< null edge: it is still the one with which the evolution began
     };
 
     /// @param all  null: no states are kept

@@ -24,8 +24,9 @@ constexpr std::size_t kFewJumps = 8;
 // leaf's face has voxels.
 constexpr int kFewCrossings = kLeafDim * kLeafDim / 2;
 
-// [voxels] Voxels that were closer to the front than this are more than a voxel from the end of its clamped distance.
-// If the front has passed a voxel that was farther away, in any leaf, the band is rebuilt at once.
+// [voxels] Distance from the front, when the band was built, from which on a voxel counts as deep: it is at most a
+// voxel from the depth at which u is clamped. If the front has passed a deep voxel in any leaf, the band is rebuilt at
+// once.
 constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
@@ -138,7 +139,8 @@ CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* 
         squared_counts += (double(now.size()) - first) * (double(now.size()) - first);
     }
     // The number of edges along an axis that a plane crosses is proportional to its normal's component along that axis,
-    // and so are the jumps of u on these edges.
+    // and so are the jumps of u on these edges. Thus the sum of the jumps over the root of the sum of squared numbers
+    // is |grad u|.
     const double slope = now.size() >= kFewJumps ? jumps / std::sqrt(squared_counts) : 1.0;
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
@@ -211,7 +213,8 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
             flips += __builtin_popcountll(flipped);
         }
         const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
-        // A leaf that is halfway is rebuilt with the others; otherwise the band would have to be rebuilt again soon.
+        // A leaf in which the front has moved half of that distance is rebuilt with the others; otherwise the band
+        // would have to be rebuilt again soon.
         states[leaf] = deep                           ? kDeepDown
                        : moved >= kMotion.left_by     ? kLeft
                        : moved >= kMotion.left_by / 2 ? kLeaving

@@ -10,13 +10,13 @@ class StateFile;
 
 /// The effect of one step on the level set in a leaf. Edges are those between voxels of the leaf.
 struct LeafMotion {
-    double displacement = 0.0;  ///< of the zero crossings along voxel edges, voxels, summed over the edges
+    double displacement = 0.0;  ///< sum over edges of the motion of the zero crossing along the edge, voxels
     int edges = 0;              ///< number of edges that are crossed before or after the step
     float largest = 0.0F;       ///< max |u^n - u^{n-1}|, voxels
-    bool negative = false, positive = false;  ///< signs that occur
+    bool negative = false, positive = false;  ///< signs of u in the leaf
     bool finite = true;
 
-    /// The same signs, and no displacement.
+    /// The motion of a leaf with the same signs that no longer moves.
     [[nodiscard]] LeafMotion without_motion() const {
         LeafMotion still = *this;
         still.displacement = 0.0;
@@ -25,14 +25,14 @@ struct LeafMotion {
     }
 };
 
-/// An edge that is crossed before and after contributes the distance between the two crossings, one that is crossed
-/// only once contributes half an edge. Unlike the change of u, this is 0 for a profile that becomes steeper without
-/// moving.
+/// Compares the zero crossings of u on the edges of a leaf before and after a step. An edge that is crossed before and
+/// after contributes the distance between the two crossings, and one that is crossed only before or only after
+/// contributes half an edge. Unlike the change of u, the sum is 0 for a profile that becomes steeper without moving.
 [[nodiscard]] LeafMotion motion_of(const float* now, const float* before, bool is_active);
 
 /// The whole band's motion in a step.
 struct Motion {
-    double mean = 0.0;  ///< displacement of the zero crossings, voxels
+    double mean = 0.0;  ///< mean displacement of the zero crossings, voxels
     bool crosses = false;
     bool finite = true;
 };
@@ -46,14 +46,14 @@ inline constexpr double kCrossingsPerVoxel = 1.5;
 /// above the tolerance, but the net motion falls below it.
 class NetMotion {
 public:
-    static constexpr int kWindow = 10;  ///< steps
-    /// Called once per step. @return mean motion per step over the last window, voxels; infinity until a window is
-    /// complete
+    static constexpr int kWindow = 10;  ///< number of steps in a window
+    /// To be called once in each step. @return mean motion per step over the window of steps that this step completes,
+    /// voxels; infinity if it completes none
     double per_step(const LeafArray<float>& u, std::size_t leaves);
     void exchange(StateFile& file);
 
 private:
-    std::vector<LeafMask> signs_;  // at the beginning of the window
+    std::vector<LeafMask> signs_;  // signs of u at the beginning of the window
     int age_ = 0;
 };
 
@@ -61,7 +61,7 @@ private:
 class CrossingMarks {
 public:
     struct Displacement {
-        double mean = 0.0, largest = 0.0;  ///< of the crossings of one leaf, voxels
+        double mean = 0.0, largest = 0.0;  ///< displacement of the crossings of one leaf, voxels
         double slope = 1.0;                ///< |grad u| on the front, mean over the leaf; 1 if there are few crossings
     };
     /// Stores the current crossings. @return their displacement since those stored before; infinity the first time

@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31304554415453ULL << 8 | 'c';  // includes the version
+constexpr std::uint64_t kMagic = 0x31304554415453ULL << 8 | 'c';  // the bytes "cSTATE01", with the format's version
 
 std::uint32_t add_to(std::uint32_t checksum, const void* data, std::size_t count) {
     return std::uint32_t(::crc32_z(checksum, static_cast<const Bytef*>(data), count));

@@ -51,7 +51,7 @@ void write_folder_atomically(const std::string& path, bool may_replace,
     const std::string temporary = (scratch.path() / target.filename()).string();
     if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
     write(temporary);
-    // All its files are flushed to the disk before the folder is renamed.
+    // All files of the new folder are flushed to the disk before it is renamed.
     const int folder = ::open(temporary.c_str(), O_RDONLY | O_DIRECTORY);
     const bool flushed = folder >= 0 && ::syncfs(folder) == 0;
     const int why = errno;
@@ -69,7 +69,7 @@ void write_atomically(const std::string& path, const std::function<void(const st
     if (fs::is_directory(target, status)) throw Error(Errc::Io, path + ": cannot write: it is a folder");
     if (exists && !fs::is_regular_file(target, status))
         throw Error(Errc::Io, path + ": cannot write: it is not a regular file");
-    // Only this user may read the temporary file, because the old file may have been protected.
+    // Until keep_attributes(), only this user may read the temporary file, because the old file may be protected.
     const std::string temporary = new_file_beside(target, exists ? 0600 : 0666);
     struct Remover {
         const std::string& name;

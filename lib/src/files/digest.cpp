@@ -58,9 +58,9 @@ void add_file(const fs::path& path, Digest& hash) {
 
 void add_metadata(const fs::path& folder, Digest& hash) {
     const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json",
-                                      "journal.jsonl"};  // of a Zarr store, or of a study
+                                      "journal.jsonl"};  // files of a Zarr store, or of a study
     std::set<fs::path> found;
-    // Does not read the chunks, which are in deeper folders or next to these files: there may be any number of them.
+    // The chunks, which are in deeper folders or next to these files, are not read, because their number is unlimited.
     std::vector<fs::path> level{folder};
     for (int depth = 0; depth < 3; ++depth) {
         std::vector<fs::path> next;

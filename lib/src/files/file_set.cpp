@@ -41,7 +41,8 @@ struct FileSet::State {
         std::string path;  ///< path as given by the caller
         fs::path target, temporary;
     };
-    /// By their identities, so that all processes lock them in the same order.
+    /// Sorted by their identities, so that all processes lock folders in the same order and none waits for another that
+    /// waits for it.
     std::map<detail::FileId, Folder> folders;
     std::vector<File> files;
     File writing;
@@ -74,7 +75,8 @@ struct FileSet::State {
         try {
             detail::write_commit(folders.begin()->second.scratch.path(), set, detail::SetOutcome::PutBack);
         } catch (const std::exception&) {
-            // Without the commit, the set is only completed instead of undone if the process is killed from here on.
+            // The old commit then remains. It only matters if the process is killed from here on: the next run would
+            // then complete the set instead of undoing it.
         }
         while (count-- > 0) static_cast<void>(detail::exchange_back(files[count].temporary, files[count].target));
     }
@@ -124,7 +126,8 @@ void FileSet::publish(const RunContext& run) {
     const auto one_at_a_time = state_->lock_folders(run);
     for (const State::File& file : files) detail::keep_attributes(file.target, file.temporary);
     const std::string set = state_->write_manifests();
-    // If another thread ends the process, the next run has to complete the publication.
+    // From here on, another thread that ends the process must not remove the scratch folders, because the next run
+    // needs them to complete the publication.
     for (auto& [id, folder] : state_->folders) folder.scratch.keep_for_next_run();
     if (state_->folders.size() > 1)
         detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::SetOutcome::Complete);
@@ -136,7 +139,7 @@ void FileSet::publish(const RunContext& run) {
             throw Error(Errc::Io, files[n].path + ": cannot write: " + std::strerror(why));
         }
     for (const auto& [id, folder] : state_->folders) detail::flush_folder(folder.path);
-    // The replaced files are deleted with the scratch folders, and must not be restored.
+    // Without manifests, the next run does not restore the replaced files, which are deleted with the scratch folders.
     state_->remove_manifests();
     files.clear();
     state_->folders.clear();

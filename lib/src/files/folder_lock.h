@@ -17,7 +17,7 @@ public:
     /// folder; locked for longer than `patience`), Cancelled.
     explicit FolderLock(const std::filesystem::path& folder, const RunContext& run = {},
                         std::chrono::milliseconds patience = kLockPatience);
-    /// False if the file system does not support such locks.
+    /// Whether the folder is locked: false if the file system does not support such locks.
     [[nodiscard]] bool is_locked() const noexcept { return locked_; }
     [[nodiscard]] FileId id() const { return id_of(file_.get()); }
 

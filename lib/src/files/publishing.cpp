@@ -139,7 +139,8 @@ private:
         known = id_of(first.path.parent_path()).inode == first.folder;
         if (known) {
             if (id_of(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
-            // The commit is removed after all files are in place, or was never written.
+            // Without the folder of the commit, either the commit was never written, and no file is in place, or it was
+            // removed after all files of the other folders had been put in place.
             if (!any_in_place()) return std::nullopt;
         }
         known = any_in_place();
@@ -157,7 +158,8 @@ private:
             if (fate == SetOutcome::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
                 done = exchange(temporary, target) && done;
             if (fate == SetOutcome::PutBack && there == file.made) done = exchange_back(temporary, target) && done;
-            // On file systems without atomic exchange, the exchange may have been interrupted half way.
+            // On file systems without atomic exchange, the process may have been killed in exchange_back(), after it
+            // had moved the new file away and before the old one was in place.
             if (fate == SetOutcome::PutBack && there == Stamp{} && here == file.replaced && here != Stamp{})
                 done = ::rename(temporary.c_str(), target.c_str()) == 0 && done;
         }
@@ -165,7 +167,9 @@ private:
         return done;
     }
 
-    /// The same in another folder of the set, unless it is locked. @returns whether that succeeded
+    /// Calls put() for another scratch folder of the set, unless its parent stays locked. @returns whether that
+    /// succeeded
+    /// @param may_remove  whether that scratch folder is then removed
     [[nodiscard]] bool finish_other(const ScratchPlace& place, SetOutcome fate, bool may_remove) const {
         const fs::path folder = place.path.parent_path();
         if (id_of(folder).inode != place.folder) return false;

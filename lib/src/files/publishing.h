@@ -21,8 +21,9 @@ namespace covol::detail {
 
 struct ScratchPlace {
     std::filesystem::path path;
-    ino_t inode = 0,
-          folder = 0;  ///< of the folder and of its parent; no device numbers, which may change after a reboot
+    /// Inodes of the scratch folder and of its parent. Device numbers are not stored, because they may change after a
+    /// reboot.
+    ino_t inode = 0, folder = 0;
 };
 
 /// The current state of a file. 0, 0: there is none.
@@ -38,8 +39,9 @@ struct Manifest {
     std::string set;                      ///< a random number
     std::vector<ScratchPlace> scratches;  ///< the first contains the commit
     struct File {
-        Stamp made, replaced;  ///< the new file, and the one that it replaces. If the file with its name in the parent
-                               ///< folder is `made`, it is in place; if it is neither, others put it there since
+        /// The new file, and the one that it replaces. If the file of this name in the parent folder is `made`, the new
+        /// file is in place; if it is neither of the two, another process has put it there since.
+        Stamp made, replaced;
         std::string name;
     };
     std::vector<File> files;

@@ -68,8 +68,8 @@ AbandonedScratch::State AbandonedScratch::read_state() {
     std::error_code status;
     // The process ended before it created the lock.
     if (lock_.get() < 0) return fs::is_empty(folder_, status) && !status ? State::Unstarted : State::Foreign;
-    // A file that belongs to this user was created by this user. With a second link, it would also be in another
-    // folder.
+    // A file that belongs to this user was created by this user. One with a second link is not accepted, because it may
+    // have been created in another folder.
     if (::fstat(lock_.get(), &lock) != 0 || !S_ISREG(lock.st_mode) || lock.st_uid != ::geteuid() || lock.st_nlink != 1)
         return State::Foreign;
     if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0) return State::Alive;

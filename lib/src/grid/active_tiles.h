@@ -8,7 +8,8 @@
 
 namespace covol::detail {
 
-/// Checks the memory that active tiles need as leaves: a tile of a few bytes represents up to 4096^3 voxels.
+/// Checks the memory that the active tiles of a grid need after their conversion to leaves: a tile of a few bytes
+/// represents up to 4096^3 voxels.
 /// @param where  the caller's name @throws Error InvalidOptions
 inline void require_memory_of_tiles(const FloatGrid& grid, const char* where, const RunContext& run) {
     const double voxels = double(grid.activeVoxelCount()) - double(grid.tree().activeLeafVoxelCount());

@@ -44,7 +44,7 @@ void fill_tiles(Node& node, const openvdb::CoordBBox& domain, float background) 
     for (auto on = children.beginOn(); on; ++on) {
         if (!meets(on.pos())) continue;
         spread(on.pos(), [&](int face) {
-            // The middle of that face, limited to the domain.
+            // The value at the middle of the child's face towards the tile, limited to the domain.
             Coord voxel = node.offsetToGlobalCoord(on.pos()).offsetBy(kChild / 2);
             voxel[face / 2] += face % 2 == 0 ? -kChild / 2 : kChild / 2 - 1;
             voxel = Coord::minComponent(Coord::maxComponent(voxel, domain.min()), domain.max());

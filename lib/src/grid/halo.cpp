@@ -37,7 +37,7 @@ HaloField gather(const LeafBand& band, const FloatGrid& grid, bool corners, cons
     std::sort(missing.begin(), missing.end());
     missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
 
-    // Tiles of one value share a block.
+    // Tiles with the same value are represented by one block.
     struct Source {
         const FloatGrid::TreeType::LeafNodeType* leaf;
         float tile;

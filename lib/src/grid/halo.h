@@ -24,11 +24,11 @@ using ConvertBlock = std::function<void(const FloatGrid::TreeType::LeafNodeType*
 
 /// A padded buffer (see scheme.h) with edges and corners.
 void load_padded(const HaloField& field, std::size_t leaf, float* out);
-/// The same without edges and corners, which are not written.
+/// Loads the buffer of load_padded() except its edges and corners, which are not written.
 void load_star(const HaloField& field, std::size_t leaf, float* out);
-/// The same from seven blocks of 512: the leaf's own and those across its faces, by Face.
+/// Does what load_star() does, from the leaf's own block of 512 values and the six blocks across its faces, by Face.
 void load_star_from(const float* inner, const float* const across[6], float* out);
-/// The blocks that load_star reads, in place.
+/// Pointers to the blocks that load_star() reads; nothing is copied.
 [[nodiscard]] LeafStar star_of(HaloField& field, std::size_t leaf);
 /// Prefetches the values of a star that a sweep reads.
 void prefetch(const LeafStar& star);

@@ -12,14 +12,14 @@
 namespace covol::detail {
 namespace {
 
-// 21 bits for each axis of the leaf lattice hold every index of a 2^24-voxel axis.
+// A key with 21 bits for each axis, which hold every index of a leaf along an axis of 2^24 voxels.
 std::uint64_t pack(const Coord& origin) {
     constexpr std::int64_t kBias = 1 << 20;
     const auto field = [](std::int32_t v) { return std::uint64_t(std::int64_t(v >> 3) + kBias) & 0x1fffff; };
     return field(origin.x()) << 42 | field(origin.y()) << 21 | field(origin.z());
 }
 
-/// Leaves that are farther apart could have the same key.
+/// Rejects bands of about 2^24 voxels or more along an axis: leaves that are so far apart could have the same key.
 void require_packable(const std::vector<Coord>& origins) {
     constexpr std::int64_t kMax = 1 << 24;
     for (int a = 0; a < 3 && !origins.empty(); ++a) {
@@ -84,7 +84,8 @@ void LeafBand::index() {
     });
 }
 
-// @param place  in, out: position of the first entry whose key is not below `key`; the search begins there
+// The leaf with this key, or none().
+// @param place  out: position in lookup_ of the first entry whose key is not below `key`; in: where the search begins
 std::int32_t LeafBand::find_from(std::size_t& place, std::uint64_t key) const {
     const auto is_below = [](const auto& entry, std::uint64_t k) { return entry.first < k; };
     const std::size_t end = lookup_.size(), last = std::min(place + kNextKeys, end);
@@ -136,7 +137,8 @@ std::vector<Coord> dilate_leaves(const std::vector<Coord>& origins, int rings, c
             if (o[a] > domain.max[a] || o[a] + kLeafDim - 1 < domain.min[a]) return false;
         return true;
     };
-    // One axis after the other: 3 * (2 rings + 1) copies instead of (2 rings + 1)^3.
+    // One axis after the other: duplicates are removed after each, so that for connected leaves far fewer than (2 rings
+    // + 1)^3 copies of each leaf are made.
     std::vector<Coord> result = origins;
     for (int axis = 0; axis < 3; ++axis) {
         std::vector<Coord> grown;

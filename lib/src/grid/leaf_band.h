@@ -78,7 +78,7 @@ private:
     std::vector<Coord> origins_;
     std::vector<std::array<std::int32_t, 27>> neighbours_;
     std::vector<LeafMask> active_;
-    std::vector<std::pair<std::uint64_t, std::int32_t>> lookup_;  // sorted packed origin -> leaf
+    std::vector<std::pair<std::uint64_t, std::int32_t>> lookup_;  // packed origin and leaf, sorted
     std::size_t odd_begin_ = 0;
 };
 

@@ -51,7 +51,8 @@ void spread(LeafMask& mask, const LeafMask& open) {
         std::uint64_t m = mask[i];
         if (i > 0) m |= mask[i - 1];
         if (i < 7) m |= mask[i + 1];
-        m &= open[i];  // before spreading within the slice: otherwise it would spread across edges
+        // Closed voxels are removed before the mask spreads within the slice; it would otherwise spread through them.
+        m &= open[i];
         for (std::uint64_t before = 0; before != m;) {
             before = m;
             m |= (m << 1 & ~kFirstInRow) | (m >> 1 & ~kLastInRow) | m << 8 | m >> 8;

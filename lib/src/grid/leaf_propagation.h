@@ -44,7 +44,7 @@ inline LeafMask beside_marked(const LeafMask& mask, const LeafMask& halo, int ax
 template <typename Relax>
 int propagate(const LeafBand& band, std::vector<LeafMask>& changed, const RunContext& run, const Relax& relax) {
     constexpr LeafMask kNone{};
-    std::vector<LeafMask> start = changed;  // of each leaf's own voxels, used by the leaf itself in its first visit
+    std::vector<LeafMask> start = changed;  // from which each leaf propagates within itself in its first visit
 
     const auto visit = [&](std::size_t leaf, const LeafMask& own) {
         LeafMask front = own, all = own;

@@ -22,7 +22,8 @@
 namespace covol {
 namespace {
 
-/// The options, and the faces at which the body is cut, which need not be parallel to the world's axes.
+/// The options, with the half-spaces that cut the body. They replace GuessOptions::end, which is a box along the
+/// world's axes and cannot describe a rotated image.
 struct InImage : GuessOptions {
     InImage(const GuessOptions& options, Clip clip) : GuessOptions(options), faces(std::move(clip)) {}
     Clip faces;
@@ -34,17 +35,19 @@ double longest(const std::array<Vec3, 3>& axes) {
     return maximum;
 }
 
-/// The standard deviation of a mark's position along a direction.
+/// The standard deviation of a mark's position along a unit vector, world units.
 double deviation_along(const InImage& options, const Vec3& direction) {
     double sd = 0;
     for (const Vec3& a : options.deviation) sd = std::hypot(sd, dot(a, direction));
     return sd;
 }
 
-/// The face that is so close to a mark that the mark may lie in the cut, or null.
+/// A face to which the mark is so close that it may have been set on the cut surface instead of the body's own surface;
+/// null if there is none.
 const HalfSpace* end_beside(const Vec3& mark, const InImage& options) {
     for (const HalfSpace& face : options.faces) {
-        // Covers the error of marking, and the half voxel between the centre of the last slice and the image's end.
+        // `near` covers the error of the mark, and the half voxel between the centre of the last slice and the image's
+        // end.
         const double near = kCommon.errors * deviation_along(options, face.normal);
         if (detail::along(face, mark) > -near) return &face;
     }
@@ -58,12 +61,13 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& o
     if (const double stated = longest(options.deviation); options.max_deviation > stated && stated > 0)
         result.max_factor = options.max_deviation * options.max_deviation / (stated * stated);
     result.world = options.faces;
-    if (options.normals.size() == marks.size()) result.normals = options.normals;  // only if no mark was left out
+    if (options.normals.size() == marks.size()) result.normals = options.normals;  // unusable if marks were left out
     return result;
 }
 
-/// Adds constraints at those seeds that do not lie on their side of the surface: slightly inside, or outside.
-/// @return whether there were any
+/// For each seed on the wrong side of the surface, adds the constraint that the value there is that of a position
+/// slightly inside (or outside) of the surface.
+/// @return whether constraints were added
 bool add_seed_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const double beyond = longest(options.deviation) / kUniformDeviation;
     bool any = false;
@@ -80,17 +84,17 @@ bool add_seed_constraints(const guess::MarksSurface& surface, const InImage& opt
     return any;
 }
 
-/// Positions around the marks, without those beyond the faces.
+/// The positions of guess::points_around(), without those that the faces cut off.
 std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const InImage& options) {
     std::vector<Vec3> places = guess::points_around(marks, times);
     std::erase_if(places, [&](const Vec3& place) { return detail::depth_in(options.faces, place) > 0; });
     return places;
 }
 
-/// If the surface extends far beyond its marks, adds constraints that positions around them are outside, with their
-/// distance to the marks as the value: for few or rough marks there are surfaces of less energy that extend through the
-/// whole space and never close.
-/// @return whether the surface extends that far
+/// If the surface extends far beyond its marks, adds the constraint that positions around the marks are outside; the
+/// value there is the distance to the nearest mark. Without these constraints, the surface of minimum energy through
+/// few or rough marks may extend through the whole space and never close.
+/// @return whether constraints were added
 bool add_outside_constraints(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const std::vector<Vec3> far = places_around(known.marks, 2 * kGuess.held_at, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
@@ -109,17 +113,18 @@ std::size_t count_wrong(const guess::MarksSurface& surface, const InImage& optio
     return wrong;
 }
 
-/// The marks beside each face, and under null those beside none, in their order.
+/// The marks, grouped by the face that end_beside() finds for them (null: no face), each group in the order of `marks`.
 std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& marks, const InImage& options) {
     std::map<const HalfSpace*, std::vector<Vec3>> found;
     for (const Vec3& mark : marks) found[end_beside(mark, options)].push_back(mark);
     return found;
 }
 
-/// Whether the directions to the nearest marks around this one, within the face's plane, leave no wide gap.
+/// Whether the nearest marks lie on all sides of `mark`: the angle between the directions to two successive ones, in
+/// the plane of the face, is always less than kGuess.way_out pi.
 bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
     const auto [u, v] = detail::directions_in(face);
-    std::vector<std::array<double, 2>> around;  // squared distance, angle
+    std::vector<std::array<double, 2>> around;  // of each other mark: squared distance, angle of the direction to it
     for (const Vec3& other : others) {
         const Vec3 to = minus(other, mark);
         const double x = dot(to, u), y = dot(to, v);
@@ -136,17 +141,19 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
     return gap < kGuess.way_out * std::numbers::pi;
 }
 
-/// Whether marks beside a face lie on a line around an area and not all over it: then they are the outline of the cut,
-/// regardless of the other marks.
+/// Whether the marks beside a face lie along a closed line instead of all over an area. They are then the outline of
+/// the cut, which belongs to the surface of the body, and are kept regardless of the other marks.
 bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     if (marks.size() < kCommon.ring) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
-    // Of twelve or more marks all over the cut, at least a sixth have others all around them.
+    // If twelve or more marks are distributed over an area, at least a sixth of them are surrounded, which exceeds
+    // kCommon.minority.
     return double(surrounded) < kCommon.minority * double(marks.size());
 }
 
-/// Depth of a mark in the body's section, measured within the plane of the cut: negative inside, positive outside.
+/// Distance of a mark from the outline of the body's section, within the plane of the cut, world units; negative
+/// inside. It is estimated as the body's value divided by its slope in that plane.
 double within_section(const guess::MarksSurface& body, const Vec3& mark, const HalfSpace& cut, const InImage& options) {
     double slope = 0;
     for (const Vec3& direction : detail::directions_in(cut)) {
@@ -157,7 +164,8 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, const H
     return body.value(mark) / std::max(slope, kCommon.negligible);
 }
 
-/// Removes marks in the cut, inside the section of the body given by the other marks: the surface need not pass them.
+/// Removes the marks on a cut that lie inside the section of the body, because these are not on the surface of the
+/// body. The body is computed from the other marks.
 std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImage& options, const RunContext& run) {
     if (options.faces.empty()) return marks;
     std::vector<Vec3> sure, doubtful;
@@ -168,7 +176,7 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
     if (doubtful.empty() || sure.size() < kCommon.ring || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kCommon.rounds && held != before;
-         ++round) {  // with marks on its outline the section's border is known better
+         ++round) {  // each round adds marks near the section's outline, which makes it more accurate
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {

@@ -26,10 +26,11 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kSolved = 1e-6;        // relative to the right-hand side
-constexpr double kSteepestBump = 2.11;  // maximum slope of Wendland's function, in heights over radii
+constexpr double kSolved = 1e-6;        // maximum residual of the equations, relative to the right-hand side
+constexpr double kSteepestBump = 2.11;  // maximum slope of a bump, times radius / height
 constexpr int kMaxIterations = 1000;
-// Voxels from a seed to the end of its voxel, beyond which the surface is placed.
+// [voxels] Distance from a seed, the centre of its voxel, to the end of the voxel. The corrected surface passes at this
+// distance from the seed.
 constexpr double kVoxelEnd = 0.5;
 
 struct Bump {
@@ -37,7 +38,7 @@ struct Bump {
     double radius, height;
 };
 
-/// The signed distance to the guess, also beyond the band.
+/// The signed distance to the guess's surface, also beyond the narrow band.
 class FarDistance {
 public:
     FarDistance(const FloatGridPtr& guess, const std::vector<Vec3>& crossings)
@@ -49,11 +50,11 @@ public:
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
 
-    /// By how much the distances of two positions may differ beyond the distance between them: near the surface they
-    /// are interpolated, elsewhere they are distances to crossings.
+    /// Maximum difference between at() at two positions minus the distance between them. It is not 0, because at()
+    /// interpolates the level set near the surface and computes the distance to the nearest crossing elsewhere.
     [[nodiscard]] double slack() const { return exact_; }
 
-    /// The radius of the largest ball inside, accurate to the width of a leaf (8 voxels).
+    /// The radius of the largest ball inside the guess, world units, accurate to the width of a leaf (8 voxels).
     [[nodiscard]] double depth() const {
         double lowest = 0;
         const auto visit = [&](const openvdb::Coord& c) {
@@ -82,11 +83,11 @@ public:
 
 private:
     FloatGridPtr guess_;
-    double exact_;  ///< up to this distance, hardly any voxel used by the interpolation is clamped
+    double exact_;  ///< distance up to which the level set is interpolated, because hardly any voxel is clamped there
     detail::KdTree surface_;
 };
 
-/// The crossings of the lattice's edges with the surface, world units.
+/// The positions at which the surface crosses edges between neighbouring voxels of the grid, world units.
 std::vector<Vec3> find_crossings(const FloatGrid& guess) {
     std::vector<Vec3> points;
     const auto accessor = guess.getConstAccessor();
@@ -114,16 +115,17 @@ struct Target {
     double shift;
 };
 
-/// Facets of a convex hull.
+/// The facets of a convex hull as half-spaces, whose intersection is the hull.
 using Facets = std::vector<HalfSpace>;
 
-/// The hull of a guess and of the targets: `marks` marks, followed by the seeds.
+/// The convex hull of the guess's surface points and of the targets. @param marks  number of targets that are marks;
+/// the others are seeds
 Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, std::size_t marks, double h) {
     for (std::size_t n = 0; n < targets.size(); ++n) {
         surface.push_back(targets[n].at);
         if (n < marks) continue;
-        // The surface is placed kVoxelEnd beyond a seed, in any direction. The hull therefore contains positions around
-        // the seed at twice that distance.
+        // The corrected surface passes kVoxelEnd voxels beyond a seed, in an unknown direction. The hull therefore
+        // includes six positions at twice that distance, whose octahedron contains the ball of radius kVoxelEnd.
         for (int a = 0; a < 3; ++a)
             for (const int side : {-1, 1}) {
                 surface.push_back(targets[n].at);
@@ -133,7 +135,8 @@ Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, st
     return detail::convex_hull(surface);
 }
 
-/// The facets for which some position within `radius` lies outside, or less than `depth` inside.
+/// The facets for which some position within `radius` of `center` lies outside of the facet, or less than `depth`
+/// inside.
 Facets find_near(const Facets& hull, const Vec3& center, double radius, double depth) {
     Facets near;
     std::copy_if(hull.begin(), hull.end(), std::back_inserter(near),
@@ -141,15 +144,16 @@ Facets find_near(const Facets& hull, const Vec3& center, double radius, double d
     return near;
 }
 
-/// The level after the bumps have moved the guess outward by `move`. If it extends beyond the hull of guess and marks,
-/// it is halfway between the level of the bumps and that of the hull: bumps alone inflate the correct surface beside a
-/// missing part, the hull alone has flat facets between the marks.
+/// The value of the level set after the bumps have moved the guess outward by `move`. If the moved surface extends
+/// beyond the convex hull of guess and marks, the value is the mean of that after the bumps and that of the hull: bumps
+/// alone inflate the correct surface beside a missing part, and the hull alone has flat facets between the marks.
 double corrected_level(double guess, double move, const Facets& hull, const Vec3& world) {
     const double level = guess - move;
     return move > 0 ? std::max(level, 0.5 * (level + detail::depth_in(hull, world))) : level;
 }
 
-/// Whether that level is negative, without evaluating the hull if the guess or the bumps alone decide.
+/// Whether corrected_level() is negative. The hull is evaluated only if the bumps bring a position inside that is
+/// outside of the guess.
 bool comes_inside(double guess, double move, const Facets& hull, const Vec3& world) {
     const double level = guess - move;
     if (!(level < 0) || guess < 0) return level < 0;
@@ -172,7 +176,8 @@ double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     return sum;
 }
 
-/// Heights of bumps of equal radius at the targets that give the shifts, up to noise: (K + noise I) heights = shifts.
+/// Heights of bumps of equal radius at the targets whose sum at each target is its shift, up to noise: the solution of
+/// (K + noise I) heights = shifts, where K contains the values at each target of bumps of height 1.
 std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
     struct Entry {
         std::size_t column;
@@ -215,7 +220,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
     return x;
 }
 
-/// Adds bumps until the targets have their shifts, starting with the largest shifts.
+/// Adds bumps until their sum at each target is its shift, starting with the targets with the largest shifts.
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
     const auto radius_of = [&](double shift) {
@@ -229,7 +234,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
             radius = std::max(radius, radius_of(left.back()));
         }
         std::vector<Target> group = met, later;
-        double square = 0, fourth = 0;  // of residuals
+        double square = 0, fourth = 0;  // sums of powers of the residuals
         std::size_t now = 0;
         for (std::size_t n = 0; n < open.size(); ++n) {
             if (radius_of(left[n]) * kCommon.growth < radius) {
@@ -243,8 +248,9 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
             ++now;
         }
         for (std::size_t n = 0; n + now < group.size(); ++n) group[n].shift -= sum_of(bumps, group[n].at);
-        // The noise is relative to the size of the shifts, estimated by the ratio of moments so that many marks with
-        // small residuals do not make a large shift look like noise.
+        // `noise` is the squared precision divided by the squared size of the shifts. That size is estimated by fourth
+        // / square, which large shifts dominate: with the mean square, many marks with small residuals would make a
+        // large shift look like noise.
         const double noise = fourth > 0 ? precision * precision * square / fourth : 1.0;
         const std::vector<double> heights = solve(group, radius, noise);
         for (std::size_t n = 0; n < group.size(); ++n)
@@ -253,7 +259,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
     }
 }
 
-/// The bumps that affect the row of voxels (0..., j, k).
+/// The bumps that reach the row of voxels (i, j, k) with any i.
 std::vector<Bump> beside(const std::vector<Bump>& bumps, const ImageGeometry& geometry, int j, int k) {
     const Vec3 origin = geometry.index_to_world({0, double(j), double(k)});
     std::vector<Bump> near;
@@ -287,13 +293,13 @@ struct GuessCorrection::Data {
     FloatGridPtr grid;
     FarDistance distance;
     FloatGridPtr given;  ///< the guess before it was redrawn; null if it was not
-    WorldBox redrawn{};  ///< outside of it `given` and `grid` are equal
+    WorldBox redrawn{};  ///< the part that was redrawn; outside of it `given` and `grid` are equal
     Facets hull;         ///< of the guess, the marks and the active seeds; empty if no bump exceeds the minimum radius
     std::vector<Bump> bumps;
     CorrectionReport report;
 
-    /// The leaf after the correction; null if it does not change.
-    /// @param tree  of the guess, a signed distance that is clamped
+    /// The leaf at `origin` after the correction; null if the correction does not change it.
+    /// @param tree  of the guess: a signed distance that is clamped to plus or minus `clamp`
     [[nodiscard]] std::unique_ptr<Leaf> corrected_leaf(const FloatGrid::TreeType& tree, const openvdb::Coord& origin,
                                                        const Domain& domain, double clamp) const;
 };
@@ -311,7 +317,8 @@ std::unique_ptr<Leaf> GuessCorrection::Data::corrected_leaf(const FloatGrid::Tre
         near.push_back(b);
         slope += kSteepestBump * std::abs(b.height) / b.radius;
     }
-    // Bounds for the whole leaf from its middle, without computing the distances of all its voxels.
+    // If, by bounds from distance and move at the leaf's middle, the corrected surface stays farther than `clamp` from
+    // all voxels, they keep their clamped values. This avoids computing the distance of every voxel.
     const double far = distance.at(middle), move = sum_of(near, middle);
     if (std::abs(far) - std::abs(move) > clamp + (1 + slope) * reach + distance.slack()) return nullptr;
     const Leaf* const before = tree.probeConstLeaf(origin);
@@ -385,7 +392,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
         std::vector<Target> targets = on_surface;
         std::vector<char> used(inside.size() + outside.size(), 0);
-        // Seeds become active once they are on the wrong side.
+        // A seed becomes a target as soon as it is on the wrong side of the corrected surface.
         for (int round = 0; round < kCommon.rounds; ++round) {
             run.check();
             data->bumps.clear();
@@ -430,7 +437,7 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
             std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
             for (int j = 0; j < nj; ++j) {
                 const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
-                double at_least = 0;  // lower bound of the distance to the guess, from that of previous voxels
+                double at_least = 0;  // lower bound of the distance to the guess, from that of the voxels before
                 for (int i = 0; i < ni; ++i, ++value, at_least -= geometry.spacing[0]) {
                     const double old = mask.at(i, j, k);
                     if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
@@ -438,7 +445,7 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const Vec3 world = geometry.index_to_world({double(i), double(j), double(k)});
                     const double move = sum_of(bumps, world);
                     const bool is_redrawn = data_->given && holds(data_->redrawn, world);
-                    const bool is_unchanged = move == 0 || std::abs(move) < at_least;  // the bumps change no side here
+                    const bool is_unchanged = move == 0 || std::abs(move) < at_least;  // by the bumps
                     near += move != 0;
                     if (is_unchanged && !is_redrawn) continue;
                     bool was = false, in = false;

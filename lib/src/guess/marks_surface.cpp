@@ -17,19 +17,22 @@
 namespace covol::guess {
 namespace {
 
-// Fraction of the stated variance below which marks count as exact: the deviation is 1/30 of the stated one.
+// Fraction of the stated variance below which marks count as exact, so that no smaller variance is tried: the standard
+// deviation is then about 1/30 of the stated one.
 constexpr double kExact = 1e-3;
-// Weight of the whole relative to that of a part at its centre: it only has to continue the parts at their ends.
+// Weight of the whole, relative to that of a patch at the patch's centre. It is small, because the whole only has to
+// continue the patches where their weights decrease to 0.
 constexpr double kWholeWeight = 1e-3;
 
-/// Number of marks whose normals are optimised first. The time grows with the cube of the number, so that several
-/// attempts with a third of the marks take less time than one with all marks of the whole.
+/// Number of marks whose normals are optimised first, from several initial directions. The time grows with the cube of
+/// the number, so that several attempts with a third of the marks take less time than one with all marks of the whole.
 std::size_t oriented_marks() { return kMarks.whole / 3; }
 
-/// Number of marks in a part: its core, a fourth of them, lies within half of its radius and is described by a quadric.
+/// Number of marks in a patch. Its core, a fourth of the marks and as many as a quadric is fitted to, lies within half
+/// of its radius; the patches are chosen such that each mark is in the core of one.
 std::size_t part_marks() { return 4 * kCommon.quadric; }
 
-/// Ratio between the variances that are compared: the deviation doubles.
+/// Ratio between successive variances that are compared: 4, so that the standard deviation doubles.
 double variance_step() { return std::pow(kCommon.growth, 4); }
 
 Vec3 unit_or_x(const Vec3& v) {
@@ -73,7 +76,8 @@ double mean_value(const VariationalSurface& surface, const Constraints& part) {
     return weights > 0 ? sum / weights : 0.0;
 }
 
-/// Indices of the points nearest to one of them, sorted by distance, beginning with this point.
+/// Indices of the `count` points nearest to the point with the index `to`, sorted by distance; the first is `to`
+/// itself.
 std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to, std::size_t count) {
     std::vector<std::pair<double, std::size_t>> by_distance(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
@@ -88,7 +92,7 @@ std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to
 /// The most probable fraction of the stated variance, for marks that fit each other better than stated.
 struct LikeliestVariance {
     double factor = 1;
-    std::unique_ptr<VariationalSurface> surface;  ///< with that variance
+    std::unique_ptr<VariationalSurface> surface;  ///< computed with that variance
 };
 
 /// The gain in log likelihood that is required to change the variance. For exact marks, a variance that is
@@ -116,10 +120,11 @@ LikeliestVariance likeliest_variance(const VariationalSurface& stated, const Imp
     return best;
 }
 
-/// The factor of the stated variance, at least 1, for marks that fit each other worse than stated. Computed on
-/// neighbourhoods, which are dense enough to distinguish imprecise marks from a rough surface.
+/// The most probable factor of the stated variance, at least 1, for marks that fit each other worse than stated. It is
+/// computed on neighbourhoods, in which the marks are dense enough to distinguish imprecise marks from a rough surface.
 double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& normals, const RunContext& run) {
-    // With about kMarks.whole marks in all neighbourhoods, the standard error of a variance is below a tenth.
+    // All neighbourhoods together have about kMarks.whole marks, so that the relative standard error of the variance is
+    // below a tenth.
     const std::vector<std::size_t> centers = spread_out(marks.marks, 1 + kMarks.whole / part_marks());
     std::vector<std::vector<std::size_t>> near;
     for (const std::size_t center : centers) near.push_back(nearest(marks.marks, center, part_marks()));
@@ -283,7 +288,8 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
     std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count), w(count);
-    // The patches of all cells that the row crosses, in order, so that the sum does not depend on how rows are split.
+    // The patches of all cells that the row crosses, sorted by number, so that the rounding of the sum does not depend
+    // on how rows are split.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();
     for (int n = 0; n < count; ++n) {

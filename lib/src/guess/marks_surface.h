@@ -8,13 +8,13 @@
 
 namespace covol::guess {
 
-/// Positions of marks, and their standard deviation along three directions, as world vectors.
+/// Positions of marks, and the standard deviation of a position along three directions as vectors in world units.
 struct ImpreciseMarks {
     std::vector<Vec3> marks;
     std::array<Vec3, 3> deviation{};
-    /// Maximum factor of the squared deviation, for marks that fit each other worse than the deviation implies.
+    /// Maximum factor by which the squared deviation is increased if the marks fit each other worse than it implies.
     double max_factor = 1;
-    std::vector<Vec3> seeds;  ///< positions that are inside (value < 0) or outside
+    std::vector<Vec3> seeds;  ///< positions that are inside (seed_value < 0) or outside
     std::vector<double> seed_value;
 
     Clip world;  ///< the region in which the surface is known; beyond it the body may continue
@@ -26,20 +26,20 @@ struct ImpreciseMarks {
 
 /// Indices of `count` of the points, each as far as possible from the previous ones; fewer if the others are
 /// duplicates.
-/// @pre there are points
+/// @pre `points` is not empty
 [[nodiscard]] std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count,
                                                   std::size_t first = 0);
 
-/// The surface of minimum energy through any number of marks: one VariationalSurface through all of them if they are
-/// few; else one through a spread-out subset, and around each position another one through its neighbours, blended by
-/// weights that sum to one (partition of unity). The whole determines the sides of the parts; far from all marks it is
-/// used alone.
+/// The surface of minimum energy through any number of marks. If the marks are few, it is one VariationalSurface
+/// through all of them. Otherwise a VariationalSurface through a spread-out subset, the whole, is corrected by patches:
+/// surfaces through neighbouring marks, blended by weights that sum to one (partition of unity). The whole determines
+/// which side of each patch is inside, and is used alone far from all marks.
 class MarksSurface {
 public:
     /// @throws Error as VariationalSurface.
     MarksSurface(const ImpreciseMarks& marks, const RunContext& run);
 
-    /// Values at from + n * step, n < count; close to the marks about a distance, negative inside.
+    /// Values at from + n * step for n < count: close to the marks approximately the signed distance, negative inside.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
     [[nodiscard]] double value(const Vec3& at) const;
     [[nodiscard]] std::size_t patches() const { return patches_.size(); }
@@ -47,8 +47,8 @@ public:
 private:
     struct Patch {
         Vec3 center;
-        double radius;             ///< support of the weight
-        VariationalSurface added;  ///< the difference from the surface as a whole
+        double radius;             ///< of the ball in which the patch's weight is above 0
+        VariationalSurface added;  ///< surface through the patch's marks minus the whole
     };
     void make_patches(const ImpreciseMarks& marks, const RunContext& run);
     void sort_patches();
@@ -56,10 +56,9 @@ private:
 
     std::unique_ptr<VariationalSurface> whole_;
     double offset_ = 0;
-    double variance_factor_ =
-        1;  // estimated over stated variance; less than 1 if the marks fit much better than stated
+    double variance_factor_ = 1;  // estimated variance of the marks divided by the stated one
     std::vector<Patch> patches_;
-    // A lattice of cells, each with the patches that overlap it.
+    // A lattice of cells, each with the numbers of the patches that overlap it, for finding the patches at a position.
     Vec3 low_{0, 0, 0};
     double cell_ = 0;
     std::array<int, 3> cells_{0, 0, 0};

@@ -3,7 +3,8 @@
 
 namespace covol::guess {
 
-/// sum_j a_j r_j^3 - 3 r_j (b_j . d_j), d_j = x - x_j, r_j = |d_j|: nodes as a structure of arrays.
+/// The terms of sum_j (a_j r_j^3 - 3 r_j b_j . d_j) with d_j = x - x_j and r_j = |d_j|: the nodes x_j and their weights
+/// a_j and b_j, as a structure of arrays.
 struct TriharmonicSum {
     const double *x, *y, *z, *a, *bx, *by, *bz;
     std::size_t count;
@@ -11,7 +12,7 @@ struct TriharmonicSum {
 
 inline constexpr int kTriharmonicLanes = 8;
 
-/// At kTriharmonicLanes positions. The result is bitwise the same for all instruction sets.
+/// Computes the sum at kTriharmonicLanes positions. The result is bitwise the same for all instruction sets.
 void triharmonic_sum(const TriharmonicSum& sum, const double* x, const double* y, const double* z, double* out);
 
 }  // namespace covol::guess

@@ -23,20 +23,20 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 using Point = Eigen::Vector3d;
 
-constexpr int kPolynomial = 4;  // 1, x, y, z: the null space of the energy
+constexpr int kPolynomial = 4;  // number of the polynomials 1, x, y, z, whose energy is 0
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
-constexpr int kMaxSteps = 500;       // of L-BFGS, which converges before
-constexpr int kAmplitudeRounds = 3;  // after which the amplitude, to which the precision is relative, has converged
-constexpr int kDirections = 64;      // around the marks; half and twice as many give the same surfaces
-constexpr double kMinLambda = 1e-9;  // of the amplitude; keeps the matrix regular if marks coincide
-constexpr double kAround[] = {1.15, 1.5};  // relative to the farthest mark
+constexpr int kMaxSteps = 500;       // maximum number of L-BFGS iterations; it converges earlier
+constexpr int kAmplitudeRounds = 3;  // number of estimates of the amplitude, which has then converged
+constexpr int kDirections = 64;      // number of points on an ellipsoid; half and twice as many give the same surfaces
+constexpr double kMinLambda = 1e-9;  // minimum lambda, which keeps the matrix regular if marks coincide
+constexpr double kAround[] = {1.15, 1.5};  // sizes of the ellipsoids on which the sign of f is tested
 
-/// Minimum-energy interpolation at fixed nodes: the energy of values v and gradients g is that of g^T H g + 2 c^T g +
-/// constant.
+/// Minimum-energy interpolation at fixed nodes: for given values, the energy as a function of the gradients g is g^T H
+/// g + 2 c^T g + constant. energy() returns H, and linear() returns c and the constant.
 class HermiteSystem {
 public:
     /// @param nodes   in the unit ball; the first `marks` of them also have a gradient
-    /// @param lambda  added to each node's diagonal: see VariationalSurface
+    /// @param lambda  for each node, added to its element of the diagonal: see VariationalSurface
     HermiteSystem(const std::vector<Point>& nodes, Index marks, const Vector& lambda)
         : values_(Index(nodes.size())), gradients_(3 * marks), size_(values_ + gradients_), matrix_(size_, size_) {
         Matrix polynomials = Matrix::Zero(size_, kPolynomial);
@@ -62,7 +62,7 @@ public:
     }
 
     [[nodiscard]] const Matrix& energy() const { return energy_; }
-    /// c of the energy, and its constant.
+    /// The vector c of the energy for given values; `constant` receives the energy's constant.
     [[nodiscard]] Vector linear(const Vector& values, double& constant) const {
         Vector y = Vector::Zero(size_);
         y.head(values_) = values;
@@ -72,7 +72,8 @@ public:
         return inverse_.triangularView<Eigen::Lower>().transpose() * w.tail(gradients_) -
                projection_.transpose() * (reflected_.transpose() * w);
     }
-    /// Weights of the basis functions and of the polynomial.
+    /// Computes the weights of the basis functions and the coefficients of the polynomial that interpolate values and
+    /// gradients.
     void weights(const Vector& values, const Vector& gradients, Vector& basis, Eigen::Vector4d& polynomial) const {
         Vector y(size_);
         y << values, gradients;
@@ -177,20 +178,21 @@ Vector unit_vectors(const Vector& y) {
     return unit;
 }
 
-/// Unit gradients of minimum energy near an initial value.
+/// The unit gradients to which the minimisation of the energy has converged from one initial value.
 struct Gradients {
     Vector unit;
     double energy = std::numeric_limits<double>::infinity();
-    bool closed = false;  ///< whether the sign is the same all around the marks
+    bool closed = false;  ///< whether f has the same sign all around the marks, which thus bound a body
 };
 
-/// g^T H g + 2 c^T g, with g the unit gradients.
+/// The problem of minimising g^T H g + 2 c^T g over the unit gradients g.
 struct EnergyProblem {
     const Matrix& H;
     const Vector& c;
 };
 
-/// The energy of the unit vectors along y, and its derivative with respect to y.
+/// Callback of lbfgs(): returns the energy of the unit vectors along y; `derivative` receives its derivative with
+/// respect to y.
 double energy_of(void* instance, const double* y_values, double* derivative, int size, double /*step*/) {
     const auto& problem = *static_cast<const EnergyProblem*>(instance);
     const Eigen::Map<const Vector> y(y_values, size);
@@ -227,7 +229,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     return found;
 }
 
-/// Reduces the energy of gradients along the axes.
+/// The matrix of an energy that is lower for gradients along the axes: see Constraints::axes.
 Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
     Matrix result = energy;
     const double mean = energy.trace() / double(energy.rows());
@@ -259,9 +261,10 @@ Expansion expansion(const HermiteSystem& system, const Vector& values, const Vec
 
 using Inside = std::function<bool(const Point& in_unit_ball)>;
 
-/// Points on an ellipsoid about 0 around the first `marks` nodes, scaled by `times`.
+/// Points on an ellipsoid with centre 0; if `times` is 1, it contains the first `marks` nodes.
 std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks, double times) {
-    // After scaling to a variance of 1 along each axis the marks lie in a ball.
+    // Scaled to a variance of 1 along each principal axis, the marks lie in a ball of radius `reach`, which is scaled
+    // back to the ellipsoid.
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (Index n = 0; n < marks; ++n)
         spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
@@ -270,7 +273,7 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     double reach = 0;
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
     std::vector<Point> points;
-    for (int n = 0; n < kDirections; ++n) {  // Fibonacci lattice
+    for (int n = 0; n < kDirections; ++n) {  // directions of a Fibonacci lattice on the sphere
         const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
         points.emplace_back(times * reach * (from_ball * direction));
@@ -278,7 +281,7 @@ std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks
     return points;
 }
 
-/// Whether f has the same sign on ellipsoids around all marks, except at positions outside the world.
+/// Whether f has the same sign at all points of the ellipsoids around the marks; points outside the world are ignored.
 bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
     constexpr double kNoStep[3] = {0, 0, 0};
     int positive = 0, count = 0;
@@ -293,8 +296,8 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
     return positive == 0 || positive == count;
 }
 
-/// From the centroid of each mark's nearest neighbours to the mark: the direction of the normal if these neighbours
-/// surround a tube or a sheet.
+/// For each mark the vector from the centroid of its nearest neighbours, a `fraction` of all marks, to the mark. It is
+/// along the normal if these neighbours are all around a tube or on both sides of a sheet.
 Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double fraction) {
     const auto count = std::size_t(fraction * double(marks));
     Vector directions(3 * marks);
@@ -352,7 +355,7 @@ bool span_space(const std::vector<Vec3>& marks) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    constexpr double kRounding = 1e-8;  // relative; thin clouds, such as two balls far apart, are not flat
+    constexpr double kRounding = 1e-8;  // below this ratio of their variances, marks are coplanar
     return axes[0] > kRounding * axes[2];
 }
 
@@ -387,7 +390,7 @@ void Expansion::row(const double* from, const double* step, int count, double* v
 
 VariationalSurface::VariationalSurface(const Constraints& given, const Normals& normals, Search search,
                                        double amplitude) {
-    if (search == Search::Wide) check_spread(given.marks);  // a part of a surface may be flat
+    if (search == Search::Wide) check_spread(given.marks);  // the marks of a part of a surface may lie in a plane
     const auto marks = Index(given.marks.size()), count = marks + Index(given.seeds.size());
     for (const Vec3& m : given.marks)
         for (int a = 0; a < 3; ++a) center_[a] += m[a] / double(marks);
@@ -401,7 +404,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     Vector values = Vector::Zero(count), variance = Vector::Zero(count);
     for (Index n = 0; n < marks; ++n) variance[n] = given.variance[std::size_t(n)] / (radius_ * radius_);
     for (Index n = marks; n < count; ++n) values[n] = given.seed_value[std::size_t(n - marks)] / radius_;
-    Vector before = Vector::Zero(3 * marks);  // the known gradients
+    Vector before = Vector::Zero(3 * marks);  // the gradients of the function that is known beforehand
     for (Index n = 0; n < Index(given.known_value.size()); ++n) {
         values[n] = -given.known_value[std::size_t(n)] / radius_;
         before.segment<3>(3 * n) = to_point(given.known_gradient[std::size_t(n)]);

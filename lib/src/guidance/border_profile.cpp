@@ -14,7 +14,7 @@
 namespace covol::guidance {
 namespace {
 
-// steps beyond the border's profile that contribute to the distributions of inside and outside
+// Number of steps beyond kBorderSteps, on each side, that contribute to the distributions of inside and outside.
 constexpr int kFarSteps = 4 * kStepsPerVoxel;
 
 /// Gaussian blur of `count` values with the given stride; the kernel is normalised so that their sum is preserved.
@@ -103,17 +103,18 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 }
 
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
-    constexpr double kIgnoredWeight = 1e-8;  // weight difference that is ignored
+    constexpr double kIgnoredWeight = 1e-8;  // differences of weights up to this are ignored
+    // If most weights are 1, the sum starts from all_, so that only the places with other weights have to be added.
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
-    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // 1 if most weights are 1
+    const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;
     Counts total = maximum > 0 ? all_ : Counts();
     for (std::size_t n = 0; n < counts_.size(); ++n)
         if (std::abs(weights[n] - maximum) > kIgnoredWeight) total.add(counts_[n], weights[n] - maximum);
     return total;
 }
 
-/// Converts counts to probabilities, shrunk towards `base`. Without `base`, inside and outside are shrunk towards a
-/// uniform distribution, and each depth of the border towards a mixture of inside and outside.
+/// Converts counts to probabilities, shrunk towards those of `base`. Without `base`, inside and outside are shrunk
+/// towards a uniform distribution, and each depth of the border towards a mixture of inside and outside.
 void BorderProfile::normalise(Counts& c, const Counts* base) {
     const auto mix = [](double* values, const double* prior, double belief) {
         double total = 0;

@@ -8,7 +8,7 @@
 namespace covol::guidance {
 namespace {
 
-constexpr std::size_t kBlock = 1024;  // rows of a partial sum: the result does not depend on the number of threads
+constexpr std::size_t kBlock = 1024;  // rows of a partial sum; fixed, so that results do not depend on the threads
 
 /// Calls visit(row) for each row, and sums the return values.
 template <typename Visit>

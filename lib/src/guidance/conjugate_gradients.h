@@ -15,7 +15,7 @@ public:
     [[nodiscard]] const std::vector<double>& diagonal() const { return diagonal_; }
     /// Computes weight * half * x on all threads. @param between  the result
     void multiply_half(const std::vector<double>& x, std::vector<double>& between) const;
-    /// The entry of half * between at `row`.
+    /// The entry at `row` of half * between, which is the product of the whole matrix and x.
     [[nodiscard]] double finish(std::size_t row, const std::vector<double>& between) const;
     /// The whole product, on all threads.
     [[nodiscard]] std::vector<double> operator*(const std::vector<double>& x) const;

@@ -32,7 +32,7 @@ namespace {
 
 using namespace guidance;
 
-constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
+constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels, of the image's smoothing
 
 double squared(double x) { return x * x; }
 
@@ -82,7 +82,7 @@ private:
 
     struct ValidationResult {
         double prior2, error2, response, slope2;
-        std::vector<double> off2;  // by mark
+        std::vector<double> off2;  // squared difference between offset and mark, by mark
     };
     [[nodiscard]] ValidationResult cross_validate(const OffsetField& field, double prior) const;
     [[nodiscard]] std::vector<double> local_error2(const ValidationResult& validation) const;
@@ -100,11 +100,11 @@ private:
     Domain domain_;
     double h_;
     FloatGridPtr surface_;
-    FloatGridPtr start_;                    // the distance to the guess
-    std::optional<WideDistance> distance_;  // the distance to the current surface
+    FloatGridPtr start_;                    // the signed distance to the guess in a wide band
+    std::optional<WideDistance> distance_;  // the same for the current surface
 
     // about the guess:
-    double guess2_ = 0;  // variance of the guess at the marks
+    double guess2_ = 0;  // squared error of the guess at the marks, world units
     double misfit_ = 0;  // 0: the errors of the marks explain their distances from the guess; 1: they do not
     double prior_ = 0;   // prior standard deviation of the offsets, chosen in the first iteration
     double sigma_ = 0;
@@ -118,8 +118,8 @@ private:
     std::vector<OffsetEvidence> evidence_, held_out_;
     std::vector<std::size_t> nearest_;
 
-    std::vector<PatchMark> on_;  // the marks on the surface
-    double mark2_ = 0;           // mean variance of on_
+    std::vector<PatchMark> on_;  // the marks near the surface, combined by patch
+    double mark2_ = 0;           // mean variance of the positions in on_
     std::optional<SmoothImage> smooth_;
     std::optional<LearntProfile> learnt_;
 };
@@ -141,7 +141,8 @@ void Guide::cut_surface() {
         to_mark_.resize(patches_.size());
         tbb::parallel_for(std::size_t(0), patches_.size(),
                           [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
-        // If points are spread randomly, one in an area of s^2, the mean distance to the nearest one is s / 2.
+        // If points are spread randomly with a mean density of one in an area of s^2, the mean distance to the nearest
+        // is s / 2.
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
     cut(kGuide.patch_width * h_);
@@ -163,7 +164,8 @@ bool Guide::place_marks(bool first) {
         }
         residual[m] = GridSampler(*distance_->grid(), domain_)(marks_[m]);
     });
-    // The marks of one patch are combined; marks far away belong to another surface.
+    // The marks of one patch are combined. Marks farther than kGuide.farthest voxels from the surface belong to another
+    // one, and are ignored.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
     for (std::size_t m = 0; m < marks_.size(); ++m)
         if (std::abs(residual[m]) < kGuide.farthest * h_) by_patch[patch[m]].push_back(m);
@@ -180,7 +182,7 @@ bool Guide::place_marks(bool first) {
             for (int a = 0; a < 3; ++a) mark.at[a] += fraction * marks_[m][a];
         }
         const double width = options_.mark_precision ? *options_.mark_precision / kUniformDeviation : patches_.voxel[i];
-        mark.deviation = width * std::sqrt(fraction / 12);  // standard deviation of a uniform error
+        mark.deviation = width * std::sqrt(fraction / 12);  // of the mean of uniform errors
         on_.push_back(mark);
     }
     if (on_.size() < kCommon.ring) {
@@ -197,7 +199,8 @@ bool Guide::place_marks(bool first) {
     }
     mark2_ = std::max(mark2_, squared(0.05 * h_));
     if (first) {
-        // A guess that reproduces a part of the marks' errors leaves only the other part as residuals.
+        // If the guess follows the errors of the marks in part, the residuals are smaller than these errors, and the
+        // difference is negative.
         guess2_ = std::max(std::abs(residual2 - mark2_), 0.1 * mark2_);
         misfit_ = std::clamp((residual2 - mark2_) / mark2_, 0.0, 1.0);
     }
@@ -288,10 +291,11 @@ void Guide::query(const Scene& scene) {
     });
 }
 
-/// Cross-validates the image: the offsets at each mark are learnt without it, for a guess with a deviation of `prior`
-/// everywhere. Returns the error at the marks; the fraction that the image removes of a wave in the guess, with a
-/// wavelength of two spacings; and how fast the offsets grow with the distance from the marks. The error is increased
-/// by a standard error, and the growth is reduced by a standard error.
+/// Cross-validates the image: computes the offsets at each mark from a profile that was learnt without this mark, for a
+/// guess whose standard deviation is `prior` everywhere. Returns the squared error at the marks, increased by a
+/// standard error; as `response` the fraction of a wave in the guess, with a wavelength of two spacings, that the image
+/// removes; and as `slope2` the square of the offsets' growth with the distance from the marks, reduced by a standard
+/// error.
 Guide::ValidationResult Guide::cross_validate(const OffsetField& field, double prior) const {
     const std::size_t count = patches_.size();
     const std::vector<double> none(count, 0.0), deviation(count, prior);
@@ -347,7 +351,7 @@ std::vector<double> Guide::local_error2(const ValidationResult& validation) cons
     return result;
 }
 
-/// Combines guess and image into offsets, weighted by their errors.
+/// Computes offset_ of each patch as a mean of guess and image, weighted by the inverse of their squared errors.
 void Guide::weigh(bool first) {
     const std::size_t count = patches_.size();
     const OffsetField field(patches_, std::max(spacing_, 4 * h_));
@@ -360,7 +364,7 @@ void Guide::weigh(bool first) {
     }
     std::vector<ValidationResult> validations;
     if (first) {
-        constexpr int kPriors = 4;  // each half as wide as the one before
+        constexpr int kPriors = 4;  // number of prior deviations that are tried; each is half of the one before
         for (int n = 0; n < kPriors; ++n) validations.push_back(cross_validate(field, broad_ * std::pow(0.5, n)));
     } else {
         validations.push_back(cross_validate(field, prior_));

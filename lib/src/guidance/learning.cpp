@@ -43,7 +43,8 @@ OffsetEvidence density(const std::vector<double>& log_likelihood, double first, 
     return e;
 }
 
-/// Log-likelihoods of the offsets, and the first offset in steps; empty if the profile is too short.
+/// Log-likelihoods of successive offsets that are a step apart, from `first` steps on; no values if the profile is too
+/// short.
 struct Likelihood {
     int first = 0;
     std::vector<double> values;
@@ -161,7 +162,8 @@ LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& m
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
-    // A profile that varies with the position is learnt from about as many marks as a quadric is fitted to.
+    // For a profile that varies with the position, the profile at each mark is learnt from about kCommon.quadric nearby
+    // marks.
     if (marks.size() > kCommon.quadric) {
         radius_ = std::max(neighbourhood(profile_, int(kCommon.quadric)), apart);
         test(scene, marks, prior_deviation, apart, true);

@@ -22,14 +22,14 @@ struct Scene {
 /// The marks in one patch.
 struct PatchMark {
     std::size_t patch = 0;
-    Vec3 at{};             ///< mean position
+    Vec3 at{};             ///< mean position of the marks
     double residual = 0;   ///< their mean distance from the surface, positive outside
     double deviation = 0;  ///< standard deviation of their mean position along the normal
 };
 
 /// Reliability of the image.
 struct Trust {
-    double sharpness = 0;  ///< exponent of the likelihood, because neighbouring samples are not independent
+    double sharpness = 0;  ///< exponent of the likelihood, at most 1, because neighbouring samples are not independent
     double stray = 1;      ///< fraction of places at which the image does not follow the profile
 };
 
@@ -37,7 +37,8 @@ struct Trust {
 class LearntProfile {
 public:
     /// @param guess_deviation  standard deviation of the surface at the marks
-    /// @param prior_deviation  standard deviation of the surface elsewhere; it is also assumed to predict marks
+    /// @param prior_deviation  standard deviation of the surface elsewhere, which is also assumed when a held-out mark
+    /// is predicted
     /// @param apart            marks closer together than this are left out together
     LearntProfile(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
                   double guess_deviation, double prior_deviation, double apart);
@@ -63,7 +64,7 @@ private:
               bool local);
 
     BorderProfile profile_;
-    std::vector<BorderTable> tables_, held_out_;  // tables_: by place, or one for all; held_out_: by place
+    std::vector<BorderTable> tables_, held_out_;  // tables_: by place, or one if not local_; held_out_: by place
     // Standard deviation of the Gaussian by which marks are weighted with their distance, if the profile varies with
     // the position.
     double radius_ = 0;

@@ -31,12 +31,13 @@ constexpr int kStepsOfSample = kStepsPerVoxel / 2;
 constexpr int kParts = 8;  // offsets are compared at multiples of 1 / kParts of a step
 // [voxels] The smallest difference between offsets.
 constexpr double kFinest = 1.0 / (kStepsPerVoxel * kParts);
-constexpr double kMinNoise = 1e-6;  // minimum, as a fraction of the variance of intensity: equal images have no noise
+constexpr double kMinNoise = 1e-6;  // of the variance of intensity; the noise, a divisor, is 0 between equal images
 
-/// [voxels] Maximum movement of a part of the surface in addition to that of the whole, which accounts for most of it.
+/// [voxels] Maximum movement of a part of the surface relative to the whole. It is smaller than that of the whole,
+/// which accounts for most of the movement of each part.
 double part_range() { return 0.5 * kGuide.farthest; }
 
-/// Mean intensity of a patch by steps outward of it.
+/// The mean intensity over the vertices of a patch at each step along their normals, outward from the patch.
 class Template {
 public:
     Template() = default;
@@ -94,16 +95,16 @@ private:
 
 }  // namespace
 
-/// Precomputed data of a surface.
+/// The data of a surface that are computed once for all images to which it is transferred.
 struct SurfaceTemplate::Data {
     FloatGridPtr given;
     double h = 1;
-    Domain domain;         ///< with a margin for the movement
+    Domain domain;         ///< that of `given`, with a margin for the movement
     FloatGridPtr surface;  ///< the surface as a start in this domain
     Patches patches;
     std::optional<WideDistance> distance;
-    std::vector<int> window, range;   ///< by patch, steps: range that is compared, and range of the movement
-    std::vector<Template> templates;  ///< by patch, over both ranges
+    std::vector<int> window, range;   ///< by patch, steps: maximum depth that is compared, maximum movement
+    std::vector<Template> templates;  ///< by patch, over window + range steps to either side
 
     Data(FloatGridPtr level_set, const Image& image, const RunContext& run);
     [[nodiscard]] WorldBox box(double around) const { return bounding_box(patches.places, around); }
@@ -134,7 +135,7 @@ SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const Ru
 
 namespace {
 
-/// A level set in a wide band, moved by a fraction of a voxel along each axis.
+/// A level set in a wide band, moved by `part` voxels (at most half a voxel) along each axis.
 FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
     FloatGridPtr result = level.deepCopy();
     if (part == Vec3{0, 0, 0}) return result;
@@ -167,9 +168,9 @@ public:
 private:
     /// Mean squared differences between a patch's template and the new image, by offset.
     struct Mismatch {
-        int first = 0;  ///< offset, steps
+        int first = 0;  ///< offset to which squares[0] belongs, steps
         std::vector<double> squares;
-        double minimum = std::numeric_limits<double>::infinity();  ///< over all positions of for_each_offset()
+        double minimum = std::numeric_limits<double>::infinity();  ///< over all offsets that for_each_offset() visits
         /// Calls visit(offset, square) at fractions of a step, with parabolic interpolation between steps.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
@@ -188,7 +189,7 @@ private:
 
     /// The offset of one patch, estimated without the others.
     struct Estimate {
-        double offset = 0, variance = 0;  ///< variance 0: unknown
+        double offset = 0, variance = 0;  ///< world units; variance 0: the offset is unknown
     };
 
     void translate();
@@ -209,7 +210,7 @@ private:
     const RunContext& run_;
     SmoothImage image_;
     Vec3 translation_{0, 0, 0};
-    std::vector<double> offset_;  // by patch
+    std::vector<double> offset_;  // of each patch along its normal, world units
     Moments both_;                // intensities in the previous and the new image, along the whole surface
 };
 
@@ -268,7 +269,7 @@ void Motion::translate() {
             translation_ = to;
             run_.check();
         }
-    // A small gain may result from noise alone.
+    // A small gain may result from noise alone; the translation is then not used.
     if (!(best < (1 - kCommon.minority) * standing)) translation_ = {0, 0, 0};
 }
 
@@ -342,7 +343,7 @@ bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, con
 }
 
 /// Reads the templates of the new image along the normals of the surface, moved by the present translation and offsets.
-/// Their intensities are mapped linearly to those of the previous image; both_ receives the statistics of both.
+/// Their intensities are mapped linearly to those of the previous image; both_ receives the statistics of both images.
 std::vector<Template> Motion::read_now() {
     std::vector<Template> now(patches_.size());
     std::vector<Moments> best(now.size());
@@ -375,7 +376,7 @@ std::vector<Motion::Mismatch> Motion::compare(const std::vector<Template>& later
                 sum += (is - was) * (is - was);
                 ++count;
             });
-            if (!enough) continue;  // too few samples, at the ends of the range
+            if (!enough) continue;  // too few samples, as at the ends of the range
             if (result[i].squares.empty()) result[i].first = offset;
             result[i].squares.push_back(sum / count);
         }
@@ -392,7 +393,7 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
         if (m.squares.empty()) return;
         int seen = 0;
         for (int s = -known_.window[i]; s <= known_.window[i]; ++s) seen += known_.templates[i].has(s);
-        const double samples = double(seen) / kStepsPerVoxel;  // samples closer than a voxel count as one
+        const double samples = double(seen) / kStepsPerVoxel;  // the samples within a voxel count as one
         double mass = 0, first = 0, second = 0;
         m.for_each_offset([&](double offset, double square) {
             const double weight = std::exp(-0.5 * samples * (square - m.minimum) / noise);

@@ -12,13 +12,13 @@ class SquaredMatrix;
 /// without information.
 struct OffsetEvidence {
     double first = 0, step = 1;  ///< offsets first + n * step, world units
-    std::vector<float> density;  ///< mean 1; empty: unknown
+    std::vector<float> density;  ///< at these offsets, with a mean of 1; empty: unknown
 };
 
 /// A Gaussian random field of offsets on the patches, smooth along the surface.
 class OffsetField {
 public:
-    /// @param range  correlation length of the offsets
+    /// @param range  correlation length of the offsets along the surface, world units
     OffsetField(const Patches& patches, double range);
     ~OffsetField();
 

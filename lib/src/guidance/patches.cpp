@@ -103,7 +103,7 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, double smooth) {
         }
     }
     // A round averages over a vertex and its neighbours, about six at a distance of about 0.9 voxels: the mean squared
-    // distance of the vertices that are averaged grows by 2/3.
+    // distance of the vertices that are averaged grows by 2/3, and reaches smooth^2 after 1.5 smooth^2 rounds.
     smooth_normals(surface, int(std::lround(1.5 * smooth * smooth)));
     return surface;
 }
@@ -116,7 +116,7 @@ Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, doub
     for (int a = 0; a < 3; ++a) cell[a] = std::max(width / g.spacing[a], 1.0);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
         const Vec3 at = g.world_to_index(surface.places[v]);
-        std::array<std::uint64_t, 3> number;  // offset so that unsigned order is signed order
+        std::array<std::uint64_t, 3> number;  // sign bit inverted: sorts like the signed number
         for (int a = 0; a < 3; ++a)
             number[a] = std::uint32_t(std::int32_t(std::floor(at[a] / cell[a]))) ^ (std::uint32_t(1) << 31);
         int axis = 0;

@@ -25,7 +25,7 @@ struct Patches {
     std::vector<std::uint32_t> patch;
     // by patch:
     std::vector<std::uint32_t> first, members;  ///< patch p has the vertices members[first[p] .. first[p+1])
-    std::vector<Vec3> centers, directions;      ///< mean position, mean normal
+    std::vector<Vec3> centers, directions;      ///< mean position and mean normal of its vertices
     std::vector<double> area;
     std::vector<double> voxel;  ///< voxel_along() the patch's normal, world units
     struct Border {
@@ -39,10 +39,11 @@ struct Patches {
 };
 
 /// Cuts a surface into patches without computing borders, so that it may be cut more than once before find_borders().
-/// @param width   of the patches; along each axis of the image at least one voxel is used
+/// @param width   of the patches, world units; along each axis of the image at least one voxel is used
 [[nodiscard]] Patches cut_patches(const SurfaceVertices& vertices, const ImageGeometry& geometry, double width);
 
-/// Fills in borders, neighbours, places and normals. @param vertices  those that were passed to cut_patches()
+/// Sets the borders, neighbours, places and normals of patches. @param vertices  those from which cut_patches() made
+/// them
 void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
 /// Interpolates values of patches to a smooth function on the vertices.
@@ -50,8 +51,8 @@ void find_borders(SurfaceVertices&& vertices, Patches& patches);
 [[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
                                               const std::vector<double>& by_patch);
 
-/// The root mean square of the edges of the image's voxels, weighted by the squared components of a unit vector along
-/// them.
+/// The size of the image's voxels along a unit vector, world units: the root mean square of their edges, weighted by
+/// the squared components of the vector along the edges.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);
 
 }  // namespace covol::guidance

@@ -4,7 +4,7 @@
 
 namespace covol::guidance {
 
-/// Σ a b. @param count  a multiple of 8
+/// Sum of a[n] b[n] over n < count. @param count  a multiple of 8
 [[nodiscard]] float sum_of_products(const float* a, const float* b, std::size_t count);
 
 /// sums += weight * values

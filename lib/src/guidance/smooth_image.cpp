@@ -14,7 +14,7 @@ namespace covol::guidance {
 namespace {
 
 constexpr double kKernelSigmas = 3.0;
-constexpr double kMinSigma = 0.3;  // voxels; below it a sampled Gaussian is the identity
+constexpr double kMinSigma = 0.3;  // voxels; below it, the Gaussian's weights beside the centre are below 0.5 %
 
 }  // namespace
 

@@ -15,7 +15,7 @@ public:
     /// @throws Error InvalidOptions if it takes more than run.memory_budget
     SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run = {});
 
-    /// Equidistant positions on a line.
+    /// Equidistant positions on a line, at which the smoothed image is interpolated.
     class Line {
     public:
         /// Returns false outside the image, which ends half a voxel beyond its last voxel centres.
@@ -27,7 +27,7 @@ public:
     private:
         friend SmoothImage;
         const SmoothImage* image_ = nullptr;
-        Vec3 first_{}, step_{};  // as indices of the part
+        Vec3 first_{}, step_{};  // in voxels of the part
     };
     /// @param step  world units
     [[nodiscard]] Line along(const Vec3& first, const Vec3& step) const;
@@ -39,9 +39,9 @@ private:
 
     Matrix3 to_index_{};
     Vec3 offset_{};
-    Index3 size_{0, 0, 0};       // of the part
-    Vec3 low_{}, high_{};        // ends of the image, as indices of the part
-    std::vector<float> values_;  // i fastest
+    Index3 size_{0, 0, 0};       // number of voxels of the part along each axis
+    Vec3 low_{}, high_{};        // ends of the image, in voxels of the part, whose first voxel is 0
+    std::vector<float> values_;  // of the part's voxels, i fastest
 };
 
 }  // namespace covol::guidance

@@ -18,7 +18,7 @@ std::vector<Vec3> to_index(const Domain& domain, const std::vector<Vec3>& world)
     return index;
 }
 
-/// The grid's leaves at the places of the field's leaves, in the same order; missing ones are created.
+/// The leaves of `grid` at the positions of the leaves of `nearest`, in the same order; missing ones are created.
 std::vector<Leaf*> touched(FloatGrid& grid, const detail::NearestField& nearest) {
     std::vector<Leaf*> leaves;
     for (const detail::NearestLeaf& leaf : nearest.leaves) leaves.push_back(grid.tree().touchLeaf(leaf.origin));
@@ -32,7 +32,7 @@ WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vert
     : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)),
       grid_(start.deepCopy()) {
     const double h = domain.voxel_size;
-    // In the outermost voxel of its band the start's distance is affected by the clamping.
+    // In the outermost voxel of the start's band, the distance is affected by the clamping, and is therefore not used.
     const auto own = float((kHalfWidthVoxels - 1) * h), far = float(width * h);
     openvdb::tools::changeLevelSetBackground(grid_->tree(), far);
     const std::vector<Leaf*> leaves = touched(*grid_, nearest_);

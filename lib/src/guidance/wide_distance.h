@@ -12,8 +12,8 @@ namespace covol::guidance {
 class WideDistance {
 public:
     /// @param start     a signed distance in a band of kHalfWidthVoxels, negative inside
-    /// @param vertices  of its mesh, world units, about a voxel apart
-    /// @param width     of the band to either side, voxels
+    /// @param vertices  of the mesh that was extracted from `start`, world units, about a voxel apart
+    /// @param width     of the wide band on each side of the surface, voxels
     WideDistance(const FloatGrid& start, const std::vector<Vec3>& vertices, const Domain& domain, double width,
                  const RunContext& run);
 

@@ -29,7 +29,8 @@ double squared_length(const Point& a, const Point& b) {
 
 bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCommon.turn * std::sqrt(dot(a, a) * dot(b, b)); }
 
-/// Moves vertices close to the line onto it. Their values become 0 even if the move is undone because triangles turn.
+/// Moves vertices close to the line of value 0 onto it. A move is undone if a triangle would turn by too much (see
+/// turns()); the value of the vertex becomes 0 even then, so that the cut passes through the vertex.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
     std::vector<float> closest(values.size(), kCut.close);
     std::vector<Point> moved = vertices;
@@ -50,7 +51,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
         values[v] = 0;
         tried[v] = moved[v];
     }
-    for (bool undone = true; undone;) {  // ends, because each round undoes moves
+    for (bool undone = true; undone;) {  // ends, because each round undoes at least one move
         undone = false;
         for (const Triangle& t : mesh.triangles) {
             if (!moves[t[0]] && !moves[t[1]] && !moves[t[2]]) continue;
@@ -65,7 +66,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
     vertices = std::move(tried);
 }
 
-/// Divides triangles along the line on which the value is 0.
+/// Divides the triangles of a mesh along the line on which the value is 0.
 class Splitter {
 public:
     Splitter(const TriangleMesh& mesh, std::vector<float> values) : values_(std::move(values)) {
@@ -84,7 +85,7 @@ private:
         cut_.kept.push_back(kept);
     }
 
-    /// The crossing of the line with an edge.
+    /// The vertex at the crossing of the line with the edge from a to b, which is added once.
     std::uint32_t crossing(std::uint32_t a, std::uint32_t b) {
         if (a > b) std::swap(a, b);
         const auto [at, is_new] = crossings_.try_emplace({a, b}, std::uint32_t(cut_.mesh.vertices.size()));
@@ -128,7 +129,7 @@ private:
 
 /// Gives each fan of triangles around a vertex its own copy of the vertex.
 void separate_fans(TriangleMesh& mesh) {
-    std::vector<std::vector<std::uint32_t>> around(mesh.vertices.size());  // corners, 3 t + k
+    std::vector<std::vector<std::uint32_t>> around(mesh.vertices.size());  // by vertex: corners, 3 t + k in triangle t
     for (std::uint32_t c = 0; c < 3 * mesh.triangles.size(); ++c) around[mesh.triangles[c / 3][c % 3]].push_back(c);
     const auto next = [&](std::uint32_t c, std::uint32_t by) { return mesh.triangles[c / 3][(c % 3 + by) % 3]; };
     const std::size_t count = around.size();

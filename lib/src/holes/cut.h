@@ -6,13 +6,14 @@
 
 namespace covol::holes {
 
-/// A mesh whose triangles each lie on one side of a cut.
+/// A mesh that was cut: each of its triangles lies on one side of the cut.
 struct CutMesh {
     TriangleMesh mesh;
     std::vector<char> kept;  ///< for each triangle, whether the value on it is above 0
 };
-/// Cuts along the line at which a value, linear on each triangle, is 0. Vertices close to it are moved onto it along an
-/// edge to avoid slivers; the others keep their positions and numbers.
+/// Cuts a mesh along the line on which a value, interpolated linearly on each triangle, is 0. Vertices close to the
+/// line are moved onto it along an edge, because cutting beside them would create slivers. The other vertices keep
+/// their positions and numbers.
 /// @param values  one for each vertex
 [[nodiscard]] CutMesh cut_along(const TriangleMesh& mesh, std::vector<float> values);
 

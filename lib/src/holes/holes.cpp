@@ -27,8 +27,9 @@ double area_of(const TriangleMesh& mesh, const Triangle& t) {
     return meshing::area(mesh.place(t[0]), mesh.place(t[1]), mesh.place(t[2]));
 }
 
-/// Step of a diffusion, as a fraction of the way to the neighbours' mean: the largest one that reverses no component,
-/// even if the mean reverses it. It hardly changes the result, because the number of steps follows from it.
+/// Step of the diffusion in smooth(), as a fraction of the way from a vertex's value to the mean of its neighbours.
+/// With at most 0.5, a component of the values that alternates between neighbours is damped without changing its sign.
+/// The value hardly changes the result, because the number of steps is computed from it.
 constexpr float kStep = 0.5F;
 
 /// Diffusion over the mesh: approximately a Gaussian of standard deviation `width` if the triangles are even.
@@ -40,7 +41,8 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
             count[t[k]] += 2;
             squares += detail::squared_distance(mesh.place(t[k]), mesh.place(t[(k + 1) % 3]));
         }
-    // Each step adds half the mean squared edge, times kStep, to the variance along each axis.
+    // The variance, along each axis, of the Gaussian to which one step corresponds: half the mean squared edge, times
+    // kStep.
     const double variance = 0.5 * kStep * squares / double(3 * mesh.triangles.size());
     const auto steps = int(std::ceil(width * width / variance));
     std::vector<float> sums(values.size());
@@ -53,7 +55,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
     }
 }
 
-/// The sets of vertices that are connected by kept triangles, or by the others.
+/// The sets of vertices that are connected by kept triangles, or by removed ones if `kept` is false.
 detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     detail::DisjointSets parts(cut.mesh.vertices.size());
     for (std::size_t t = 0; t < cut.kept.size(); ++t) {
@@ -64,8 +66,8 @@ detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
     return parts;
 }
 
-/// Finds the triangles to be removed and those to be kept: those that no ball of radius `distance` - `slack` around a
-/// bare position reaches are kept, except small pieces.
+/// Divides a mesh into holes, which are removed, and a kept part: a triangle is kept if no ball of radius `distance` -
+/// `slack` around a bare position reaches it, and if it is not in a small piece.
 class HoleFinder {
 public:
     HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)
@@ -108,8 +110,8 @@ private:
         return places;
     }
 
-    /// For each vertex the distance to the bare positions minus the reach, limited to plus or minus the reach, and
-    /// smoothed.
+    /// For each vertex the distance to the nearest bare position minus reach_, at most reach_, and smoothed: positive
+    /// on the kept part.
     [[nodiscard]] std::vector<float> from(const std::vector<Vec3>& bare) const {
         std::vector<float> values(to_points_.size(), float(reach_));
         if (bare.empty()) return values;
@@ -123,8 +125,8 @@ private:
         return values;
     }
 
-    /// Removes kept pieces that border a hole and are smaller than a disc whose radius is the distance.
-    /// @return how many
+    /// Removes kept pieces that border a hole and whose area is less than that of a disc of radius distance_.
+    /// @return number of pieces removed
     std::size_t drop_small(holes::CutMesh& cut) const {
         detail::DisjointSets parts = parts_of(cut, true);
         std::vector<char> ends(cut.mesh.vertices.size(), 0);
@@ -206,7 +208,7 @@ double measure_fraction_beyond(const TriangleMesh& mesh, const std::vector<float
 }
 
 std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
-    // A side is on the boundary if no triangle has it in the other direction.
+    // A side of a triangle is on the boundary if no other triangle has it in the opposite direction.
     std::vector<std::pair<std::uint32_t, std::uint32_t>> sides;
     for (const Triangle& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) sides.emplace_back(t[k], t[(k + 1) % 3]);
@@ -251,7 +253,7 @@ TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
         for (std::size_t t = 0; t < cut.kept.size(); ++t)
             if (cut.kept[t])
                 for (const std::uint32_t v : cut.mesh.triangles[t]) fixed[v] = 1;
-        // A patch without a border to kept triangles cannot be spanned: it is removed.
+        // A patch over a hole that borders no kept triangle has no rim to which it could be attached, and is removed.
         detail::DisjointSets patches = parts_of(cut, false);
         for (std::uint32_t v = 0; v < fixed.size(); ++v)
             if (fixed[v]) spans[patches.root(v)] = 1;

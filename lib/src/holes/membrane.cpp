@@ -18,7 +18,7 @@ using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 // minimal surfaces, Exp. Math. 2(1), 1993. The iteration usually converges in fewer rounds.
 constexpr int kMaxRounds = 20;
 // Weights are limited to between this cotangent and its inverse, because triangles without area have no cotangents. The
-// limit hardly matters, because such triangles contribute no area.
+// limits hardly affect the result, because such triangles contribute no area.
 constexpr double kMinWeight = 1e-3;
 
 /// Cotangent of the angle between two sides; 0 if they are parallel.
@@ -50,8 +50,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                 if (fixed[a] && fixed[b]) continue;
                 const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
                                       v = at.row(b).transpose() - tip;
-                // In the first round, all edges have the same weight: the patch may bulge, and this distributes its
-                // vertices evenly before cotangents are used.
+                // In the first round, all edges have the same weight. This distributes the vertices of the patch, which
+                // may bulge at first, evenly before cotangents are used.
                 const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kMinWeight, 1 / kMinWeight);
                 edges += (u - v).norm();
                 ++edge_count;

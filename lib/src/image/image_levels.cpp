@@ -24,7 +24,8 @@ std::int32_t factor_along(const ImageGeometry& finest, const ImageGeometry& coar
     };
     const double factor = std::round(by_spacing);
     if (std::abs(by_spacing - factor) < kSame * factor && fits(factor)) return std::int32_t(factor);
-    // In files that do not state the spacings of coarser levels, these equal that of the finest level.
+    // If a file does not state the spacing of coarser levels, it equals that of the finest level, and the factor
+    // follows from the sizes.
     const double factor_by_size = std::exp2(std::round(std::log2(by_size)));
     return coarse.spacing[a] == finest.spacing[a] && fits(factor_by_size) ? std::int32_t(factor_by_size) : 0;
 }
@@ -98,7 +99,7 @@ void ImageLevels::copy(std::size_t level, const VoxelBox& box, float* out, const
     run.check();
 }
 
-/// A sample of the image's values: all of its coarsest level, or blocks of it.
+/// A sample of the image's values: all of its coarsest level, or 27 evenly spaced blocks of it if it is large.
 std::vector<float> ImageLevels::overview(const RunContext& run) const {
     constexpr std::uint64_t kMaxVoxels = std::uint64_t(16) << 20;
     constexpr int kPlaces = 3, kBlock = 64;  // number of blocks along each axis, and their size in voxels

@@ -16,7 +16,7 @@ namespace {
 struct LatticeMap {
     Matrix3 matrix{};
     Vec3 offset{};
-    std::array<int, 3> image_axis{-1, -1, -1};  ///< if separable, the image axis along each frame axis
+    std::array<int, 3> image_axis{-1, -1, -1};  ///< if separable, the image axis parallel to each frame axis
     bool separable = true;
 };
 
@@ -41,11 +41,12 @@ LatticeMap map_lattice(const ImageGeometry& geometry, const Domain& frame) {
 /// Linear interpolation along one axis: (1-weight) * data[offset] + weight * data[offset + step].
 struct Tap {
     std::int64_t offset = 0;
-    std::int64_t step = 0;  ///< 0 if the position is a voxel's centre, or outside
+    std::int64_t step = 0;  ///< 0 if the position is a voxel's centre or outside of the image
     double weight = 0;
 };
 
-/// An axis of the image: number of voxels, index of the first voxel in memory, and distance of voxels in memory.
+/// An axis of the image: number of voxels, index of the first voxel in memory, and distance between neighbouring voxels
+/// in memory, counted in values.
 struct Axis {
     std::int32_t size = 0;
     std::int32_t first = 0;
@@ -53,7 +54,8 @@ struct Axis {
 };
 using Lattice = std::array<Axis, 3>;
 
-// Lattices that should coincide may differ by the rounding of a file's spacing.
+// [voxels] Positions that are closer than this to a voxel's centre count as the centre, because two lattices that
+// should coincide may differ by the rounding of the spacing in a file.
 constexpr double kSame = 1e-4;
 
 Tap make_tap(double position, const Axis& axis) {
@@ -83,7 +85,8 @@ Work<T> interpolate(const T* data, const Tap& x, const Tap& y, const Tap& z) {
     return z.step == 0 ? first : first + W(z.weight) * (along_xy(p + z.step) - first);
 }
 
-/// If every frame axis changes only one image axis, taps are computed once per axis.
+/// Samples at the indices min to max of the frame, if each of its axes is parallel to one of the image's: taps are then
+/// computed once for each index along an axis instead of for each sample.
 template <typename T>
 void sample_separable(const T* data, const Lattice& image, const LatticeMap& map, const Index3& min, const Index3& max,
                       float* out) {
@@ -124,7 +127,8 @@ void sample_affine(const T* data, const Lattice& image, const LatticeMap& map, c
         }
 }
 
-/// The voxels that samples at the frame indices min to max need; the extremes of an affine map are at corners.
+/// The voxels that are needed for samples at the indices min to max of the frame. An affine map has its extremes at the
+/// corners of this box.
 VoxelBox needed_voxels(const LatticeMap& map, const Index3& size, const Index3& min, const Index3& max) {
     VoxelBox box;
     for (int a = 0; a < 3; ++a) {
@@ -148,7 +152,7 @@ void Image::load(const Domain& frame, const std::vector<VoxelBox>& boxes, const 
     std::vector<VoxelBox> needed;
     for (const VoxelBox& box : boxes) {
         const VoxelBox part = needed_voxels(map, geometry_.size, box.min, box.max);
-        // sample() throws if voxels are needed that are not held
+        // A part that is not held entirely is not loaded, because sample() throws an error for it.
         if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
     }
     with_threads(run, [&] { chunks_->load(needed, run); });

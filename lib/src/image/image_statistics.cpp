@@ -40,7 +40,7 @@ MinMax scan_row(const T* row, std::int32_t count, std::int64_t stride) {
     return {double(lo), double(hi), finite};
 }
 
-/// Combines the results of visit(k) for `count` evenly spaced slices, in parallel.
+/// Calls visit(k) for `count` evenly spaced slices in parallel, and combines the results.
 template <typename Visit>
 MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     std::vector<MinMax> slices(std::size_t(std::max(count, 0)));
@@ -53,8 +53,8 @@ MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     return all;
 }
 
-constexpr double kSamples = 4e6;         ///< number of values from which percentiles are computed
-constexpr double kQuickBytes = 1 << 28;  ///< amount that can be read in a second or two
+constexpr double kSamples = 4e6;         ///< maximum number of values from which percentiles are computed
+constexpr double kQuickBytes = 1 << 28;  ///< amount that range() reads from a mapped file: a second or two
 
 }  // namespace
 
@@ -89,7 +89,7 @@ std::vector<T> Image::values_of_chunks(double maximum) const {
     for (const VoxelBox& box : boxes) voxels += double(detail::voxel_count(box.size()));
     const auto step = static_cast<std::size_t>(std::max(1.0, std::ceil(voxels / maximum)));
     std::vector<T> values, part;
-    std::size_t next = 0;  // running index through all boxes
+    std::size_t next = 0;  // index of the next sample in the current box; continues through all boxes
     for (const VoxelBox& box : boxes) {
         part.resize(detail::voxel_count(box.size()));
         chunks_->copy(box, part.data());
@@ -105,7 +105,7 @@ const T* Image::row(int j, int k) const {
 }
 
 std::uint64_t Image::slice_bytes() const {
-    // from the first held pixel of a slice to the last one
+    // The bytes from the first held pixel of a slice to the last one.
     const Index3 n = held_.size();
     return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) +
             1) *

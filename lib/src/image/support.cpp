@@ -10,7 +10,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kWindow = 4, kBeside = 10;  // half steps
+constexpr int kWindow = 4, kBeside = 10;  // half steps: window around a position, and distance of the windows beside it
 constexpr int kReach = 10, kPlaces = 2 * kReach + 1;
 
 /// Voxels and values of the image at multiples of half a step along the normal at a place. Negative positions are
@@ -99,7 +99,8 @@ std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& pl
 
 using Strengths = std::array<std::optional<double>, kPlaces>;
 
-/// Mean over the lines with a value at this position; 0 if fewer than half of the lines have one.
+/// Mean strength at the position with index `at`, over the lines with a value there; 0 if fewer than half of the lines
+/// have one.
 double mean_strength(const std::vector<Strengths>& lines, int at) {
     double sum = 0;
     std::size_t count = 0;

@@ -6,7 +6,7 @@
 
 namespace covol::detail {
 
-/// Whether an image varies more at certain places than beside them, be it at a step or a line of intensity.
+/// Whether an image varies more at certain places, due to a step or a line of intensity, than beside them.
 struct ImageSupport {
     std::size_t places = 0;  ///< number of places whose window and at least one window beside it lie in the image
     double fraction = 0;     ///< probability that the range at a place exceeds a range beside one; ties count half
@@ -32,9 +32,9 @@ enum class BorderKind { Slope, Line };
 struct StrongestBorder {
     std::size_t lines =
         0;  ///< number of lines used: those on which both the surface and the strongest border are in the image
-    double fraction = 1;  ///< maximum within a step of the surface, relative to the strongest; signs are ignored
+    double fraction = 1;  ///< maximum absolute strength within a step of the surface, divided by the strongest
     int at = 0;           ///< position in steps from the surface, along the normals
-    double errors = 0;    ///< mean difference of these two strengths, in its standard errors
+    double errors = 0;    ///< mean over the lines of the difference of these two strengths, in standard errors
 };
 
 /// Computes the mean strength of a border at whole steps up to ten before and behind each place along its normal, from

@@ -17,16 +17,16 @@ class ImageFeatures {
 public:
     ImageFeatures(const Lattice& lattice, Field image);
     [[nodiscard]] const Field& operator[](int n) const { return fields_[std::size_t(n)]; }
-    /// At a node; the features of the guess stay 0.
+    /// The features of a node; those of the guess are 0.
     [[nodiscard]] Features at(std::size_t node) const {
         Features all{};
         for (int f = 0; f < kOfImage; ++f) all[std::size_t(f)] = (*this)[f][node];
         return all;
     }
-    /// The cost of surface at each node, in (0,1]. It decreases with the slope, and is one half if the slope equals its
-    /// median at the given positions, which lie on the surface.
+    /// The cost per area of a surface through each node, in (0,1]. It decreases with the slope of the image, and is one
+    /// half if the slope equals its median over `places`, which lie on the surface.
     [[nodiscard]] Field edge(const Lattice& lattice, const std::vector<Vec3>& places) const;
-    /// The slope at the scale that determines the weight of edges.
+    /// The slope at the middle scale, from which edge() is computed.
     [[nodiscard]] const Field& slope() const { return fields_[4]; }
     [[nodiscard]] const Field& image() const { return image_; }
 
@@ -60,7 +60,7 @@ private:
 };
 
 /// Information in bits per sample that a regression gives about the side of samples in folds on which it was not
-/// trained: 1 for a perfect prediction, 0 for none.
+/// trained: 1 for a perfect prediction, 0 for one that is no better than chance.
 [[nodiscard]] double held_out_bits(const std::vector<Sample>& samples, int folds);
 
 }  // namespace covol::inference

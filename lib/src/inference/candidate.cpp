@@ -26,11 +26,11 @@ using guess::VariationalSurface;
 constexpr double kOffsets[] = {0.75, 1.5, 2.5, 3.5};  // distance from a mark, cells
 constexpr int kAllFolds = -1;                         // fold of a sample that is never left out
 constexpr std::size_t kElsewhere = 300;               // maximum number of samples for each call of add_nodes()
-// Maximum number of training marks in addition to the spread ones: the 78 terms are fitted equally well with these, in
-// a fraction of the time.
+// Maximum number of training marks in addition to Marks::spread: the 78 terms of the regression are fitted as well with
+// these as with all marks, in a fraction of the time.
 constexpr std::size_t kMarksBesideSpread = 300;
 constexpr std::size_t kFewestSamples = 40;
-constexpr int kIterations = 150;  // maximum for minimize_surface(), which usually converges earlier
+constexpr int kIterations = 150;  // maximum number in minimize_surface(), which usually converges earlier
 
 template <typename Visit>
 void for_each_row(const Lattice& lattice, const Visit& visit) {
@@ -70,7 +70,7 @@ public:
                                    middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
         side_ = far < 0 ? -1 : 1;
     }
-    /// Through some of the marks of another surface, with normals near those of that surface.
+    /// A surface through the `chosen` marks, with normals near those of `whole`, a surface through more marks.
     GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal,
                    const GuessedSurface& whole, const std::vector<Vec3>& normals)
         : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
@@ -118,7 +118,7 @@ public:
             try {
                 held[std::size_t(fold)].emplace(GuessedSurface(marks, rest, proposal, whole_, normals),
                                                 detail::KdTree(at(marks.places, rest)));
-            } catch (const Error&) {  // no surface through the other folds: no samples at this one
+            } catch (const Error&) {  // without a surface through the other folds, this one gets no samples
             }
         });
         const detail::KdTree tree(at(marks.places, marks.spread));
@@ -134,7 +134,7 @@ public:
                 for (const double direction : {-1.0, 1.0}) {
                     const Vec3 place = plus(marks.places[n], direction * offset * step, normals[n]);
                     const double guess = whole_.value(place);
-                    if (guess * direction < 0) continue;  // beyond the opposite wall of a thin body
+                    if (guess * direction < 0) continue;  // `place` is beyond the opposite wall of a thin body
                     Sample s = sample(place);
                     if (one != nullptr)
                         add_guess((*one)->guess.value(place), std::sqrt((*one)->tree.nearest(place)), cell_, s.at);
@@ -237,7 +237,8 @@ Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
     return solve_body(lattice, weight, cost, std::move(u), run);
 }
 
-/// Drops parts near few marks. The solid becomes empty if no node or every node is inside.
+/// Drops each part of the solid with less than the fraction kInference.wrong of those of the solid's nodes that are
+/// near marks. The solid becomes empty if no node, or every node, is inside.
 void keep_marked_parts(const Scene& scene, Solid& solid) {
     const Parts parts = label_parts(solid.lattice, solid.inside);
     std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
@@ -255,7 +256,7 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
 }
 
-/// Area of the smooth surface, estimated from the faces between inside and outside.
+/// Area of the smooth surface of a solid, world units^2, estimated from the faces between cells inside and outside.
 double area_of(const Solid& solid) {
     constexpr double kStairs = 1.5;  // mean ratio of the area of cell faces to that of a smooth surface
     const Lattice& lattice = solid.lattice;
@@ -277,9 +278,9 @@ double area_of(const Solid& solid) {
     return area / kStairs;
 }
 
-/// Log likelihood of a mark. Marks are assumed to be uniformly distributed on the surface, so that the likelihood
-/// decreases with its area and with their distances from it. The bits that the image gives about both sides of
-/// held-out marks are added.
+/// The score of a solid: the log likelihood of a mark, plus the bits that the image gives about the two sides of
+/// held-out marks. Marks are assumed to be uniformly distributed on the surface, so that the likelihood decreases with
+/// the surface's area and with the distances of the marks from it.
 double score_of(const Scene& scene, const Solid& solid, double bits) {
     const double cell = solid.lattice.finest();
     const Field distance = signed_distance(solid.lattice, solid.inside);
@@ -329,7 +330,7 @@ Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost,
 }
 
 Field Solid::level() const {
-    constexpr double kCells = 0.7;  // enough to smooth the steps between cells
+    constexpr double kCells = 0.7;  // standard deviation that smooths the steps between cells
     return smooth(lattice, signed_distance(lattice, inside), kCells * lattice.finest());
 }
 
@@ -350,7 +351,7 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
         guess.emplace(scene.marks, scene.marks.spread, proposal);
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return candidate;  // no surface with these normals
+        return candidate;  // there is no surface with these normals, and thus no body
     }
     candidate.amplitude = guess->amplitude();
     Samples samples(scene, *guess);

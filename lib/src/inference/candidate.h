@@ -17,17 +17,17 @@
 
 namespace covol::inference {
 
-/// [cells] Distances from marks to a surface are limited to this.
+/// [cells] Maximum that is used for the distance of a mark from a surface when surfaces are compared.
 constexpr double kFarthestMiss = 4;
 
-/// What is known at a lattice's nodes before any candidate is computed.
+/// Data of a lattice's nodes that do not depend on a candidate, and are computed before the candidates.
 struct Scene {
     const Marks& marks;
     Lattice lattice;
     std::shared_ptr<const ImageFeatures> image;
-    Field to_mark;                                         ///< distance to the nearest mark
-    Field edge;                                            ///< in (0,1]: cost of surface by the image's slope alone
-    Field above_hull;                                      ///< height above the marks' convex hull
+    Field to_mark;                                         ///< distance to the nearest mark, world units
+    Field edge;                                            ///< cost by the image alone: ImageFeatures::edge()
+    Field above_hull;                                      ///< height above the marks' convex hull, world units
     std::vector<std::size_t> known_inside, known_outside;  ///< nodes around positions whose side is known
 
     Scene(const Image& image, const Lattice& lattice, const Marks& marks, const RunContext& run);
@@ -41,14 +41,14 @@ private:
 /// A body on a lattice.
 struct Solid {
     Lattice lattice;
-    std::vector<char> inside;  ///< by node; empty if there is no body
+    std::vector<char> inside;  ///< for each node, whether it is inside; empty if there is no body
 
     [[nodiscard]] bool empty() const { return inside.empty(); }
     /// Approximate signed distance to its surface, smoothed by less than a cell.
     [[nodiscard]] Field level() const;
 };
 
-/// The body of minimum surface and cost: minimize_surface(). @param u  the initial value
+/// The body that minimize_surface() finds: the nodes at which u > 1/2. @param u  the initial value
 [[nodiscard]] Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u,
                                const RunContext& run);
 
@@ -61,14 +61,14 @@ struct Proposal {
     /// unknown
     std::vector<Vec3> axes;
     guess::Search search = guess::Search::Wide;
-    double amplitude = 0;           ///< of VariationalSurface; 0: estimated, which takes three times as long
-    const Solid* refine = nullptr;  ///< restricts the body to a band around the surface of this one
+    double amplitude = 0;           ///< of VariationalSurface; 0: it is estimated, which takes three times as long
+    const Solid* refine = nullptr;  ///< if given, the new body may differ only in a band around this body's surface
     bool is_compared = true;        ///< false: bits and score are not computed
 };
 
 struct Candidate {
     Solid solid;
-    double bits = 0;   ///< of appearance.h's held_out_bits()
+    double bits = 0;   ///< result of held_out_bits() of appearance.h
     double score = 0;  ///< log likelihood of a mark up to a constant: higher is better
     double amplitude = 0;
     bool was_continued = false;
@@ -76,8 +76,8 @@ struct Candidate {
 
 [[nodiscard]] Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run);
 
-/// The neighbourhood of a position that is known to be inside or outside, with the same side: up to half the distance
-/// to the nearest mark, and at least one cell.
+/// The ball around a position that is known to be inside or outside; all of the ball is assumed to be on that side. Its
+/// radius is half the distance to the nearest mark, and at least one cell.
 struct KnownBall {
     Vec3 middle;
     double radius;

@@ -80,15 +80,15 @@ private:
     const Image& image_;
     Marks marks_;
     const RunContext& run_;
-    WorldBox box_;  // around the marks, in the frame
+    WorldBox box_;  // box around the marks, in the image's frame
     std::optional<Scene> coarse_;
     Solid coarse_body_;
     std::vector<Vec3> wrong_;  // marks that are left out; positions in the frame
-    double amplitude_ = 0;     // of the guess of coarse_body_
+    double amplitude_ = 0;     // of the variational surface of coarse_body_'s candidate
 };
 
 Candidate Inference::best_candidate() const {
-    std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // from the marks alone
+    std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // with normals from the marks alone
     const double amplitude = found.front().amplitude;
     const auto propose_all = [&](const std::vector<Proposal>& proposals) {
         const std::size_t before = found.size();
@@ -147,12 +147,12 @@ Solid Inference::refined() const {
 }
 
 bool Inference::leave_out_wrong(const HeldOut& held) {
-    // A single suspect may also lie on a part that the body lacks, so at least two wrong marks have to be expected.
+    // At least two wrong marks have to be expected, because a single suspect may lie on a part that the body lacks.
     if (kInference.wrong * double(held.marks.size()) < 2) return false;
     const Field level = coarse_body_.level();
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
-    // The smaller one of the distances from the bodies that were computed with and without the mark.
+    // For each mark, the smaller one of its distances from the bodies that were computed with it and without it.
     std::vector<double> off;
     for (std::size_t i = 0; i < held.marks.size(); ++i)
         off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
@@ -231,7 +231,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
                 if (std::abs(double(value)) > band) continue;
                 const Vec3 place = lattice.place(i, j, k);
                 if (is_known(place)) continue;
-                // Within about a cell of a mark the surface through it is accurate.
+                // Within about a cell of a mark, the surface through it is accurate, and gets a higher weight.
                 const double away2 = tree.nearest(place),
                              weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
                 const double off = std::clamp(surface.value(place), -band, band) - double(value);
@@ -372,7 +372,7 @@ std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
     return wrong(sides.inside, -1) + wrong(sides.outside, 1);
 }
 
-/// Increase of the error with the distance from the marks, from a line through 0 that is fitted to their squares.
+/// Increase of the error per distance from the marks: squared errors are fitted by a multiple of squared distances.
 double error_slope(const HeldOut& held, double guess_weight, double shrink) {
     double errors = 0, distances = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
@@ -441,7 +441,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.guess_error = median_size(held.of_guess);
         const double shrink = cell / inference.coarse_cell();
         report.weight_of_guess = Predictions(held, cell, shrink).weight_of_guess();
-        report.error_slope = error_slope(held, 1, shrink);  // of the guess
+        report.error_slope = error_slope(held, 1, shrink);  // of the guess; replaced if the body is used
         const Field level = inference.pooled(body, report.weight_of_guess);
         std::erase_if(result.marks, [&](const Vec3& mark) {
             const Vec3 place = to_frame(geometry, mark);
@@ -450,7 +450,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });
-        const auto reject_body = [&](const char* reason) {  // also restores marks that it shows as wrong
+        const auto reject_body = [&](const char* reason) {  // also restores marks that the body shows as wrong
             report.wrong_marks.clear();
             result.marks = world;
             keep_guess(reason);
@@ -458,9 +458,9 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
-        // If both agree, the guess, which is simpler, is used unless it is significantly worse (the one-standard-error
-        // rule: Breiman et al., Classification and Regression Trees, 1984). Otherwise the body is used, unless it is
-        // significantly worse.
+        // If guess and body agree, the guess, which is simpler, is used unless it is significantly worse than the body
+        // (the one-standard-error rule: Breiman et al., Classification and Regression Trees, 1984). Otherwise the body
+        // is used, unless it is significantly worse than the guess.
         // The comparison uses the measured errors, not those that are extrapolated to a finer lattice.
         const double worse = Predictions(held, cell, 1).guess_worse();
         if (overlap.dice > 1 - kCommon.minority ? worse <= 1 : worse < -2) {

@@ -23,7 +23,7 @@ struct Lines {
         step_a_ = steps[a_];
         step_b_ = steps[b_];
     }
-    /// visit(first node of the line), in parallel.
+    /// Calls visit(first node) for each line, in parallel.
     template <typename Visit>
     void for_each(const Visit& visit) const {
         tbb::parallel_for(0, lattice_.size[b_], [&](int b) {
@@ -148,7 +148,7 @@ Field sample(const Image& image, const Lattice& lattice, const RunContext& run) 
     image.load({first, last}, run);
     const std::size_t plane = std::size_t(lattice.size[0]) * std::size_t(lattice.size[1]);
     Field result(lattice.count());
-    // Voxels are averaged to nodes: the weight of a voxel for a node, along one axis.
+    // The value at a node is a mean over voxels: this is the weight of a voxel for a node along one axis.
     const auto weight = [&](int a, int node, int voxel) {
         const double away = std::abs(lattice.origin[a] + node * lattice.spacing[a] - voxel * g.spacing[a]);
         return std::max(0.0, 1 - away / lattice.spacing[a]);
@@ -258,8 +258,8 @@ Field derivative(const Lattice& lattice, const Field& field, int axis) {
 
 namespace {
 
-/// Squared distance to the nodes at which `squares` is 0: Felzenszwalb and Huttenlocher, Distance transforms of sampled
-/// functions, Theory of Computing 8, 2012.
+/// Replaces `squares`, which is 0 at some nodes and 1e20 at the others, by the squared distance to the nearest node at
+/// which it is 0: Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, Theory of Computing 8, 2012.
 void squared_distance_to(const Lattice& lattice, std::vector<float>& squares) {
     constexpr float kFar = 1e20F;
     for (int axis = 0; axis < 3; ++axis) {

@@ -7,8 +7,8 @@
 
 namespace covol::inference {
 
-/// Positions in the image's frame: index times spacing. The frame is isometric to the world, with the image's axes as
-/// coordinate axes.
+/// Positions in the image's frame, whose coordinate axes are those of the image: index times spacing. Unless the
+/// image's axes are sheared, distances in the frame equal those in the world.
 [[nodiscard]] Vec3 to_frame(const ImageGeometry& geometry, const Vec3& world);
 [[nodiscard]] Vec3 to_world(const ImageGeometry& geometry, const Vec3& place);
 
@@ -17,8 +17,8 @@ using Field = std::vector<float>;  ///< a value for each node of a lattice, x fa
 /// A box of nodes along the image's axes; lengths and positions are in the image's frame.
 struct Lattice {
     Index3 size{0, 0, 0};
-    Vec3 origin{0, 0, 0};   ///< of node (0, 0, 0)
-    Vec3 spacing{1, 1, 1};  ///< at least that of the image
+    Vec3 origin{0, 0, 0};   ///< position of node (0, 0, 0)
+    Vec3 spacing{1, 1, 1};  ///< of the nodes; at least that of the image
 
     [[nodiscard]] std::size_t count() const {
         return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]);
@@ -34,11 +34,12 @@ struct Lattice {
         return place(int(node % x), int(node / x % y), int(node / (x * y)));
     }
     [[nodiscard]] double finest() const;
-    /// The length of a cell along a direction.
+    /// The length along a unit vector that counts as one cell: the reciprocal of the vector's length in cells.
     [[nodiscard]] double cell_along(const Vec3& unit) const;
-    /// The root mean square of a cell's edges, weighted by a direction: the precision of a position along it.
+    /// The precision of a position along a unit vector: the root mean square of a cell's edges, weighted by the squared
+    /// components of the vector.
     [[nodiscard]] double extent_along(const Vec3& unit) const;
-    /// Trilinear; beyond the lattice the value at its boundary.
+    /// Trilinear interpolation; beyond the lattice, the value at its boundary.
     [[nodiscard]] double value(const Field& field, const Vec3& place) const;
 };
 
@@ -50,7 +51,7 @@ struct Lattice {
 /// which candidates are compared.
 [[nodiscard]] double fine_nodes();
 
-/// A level set at all nodes.
+/// The values of the level set u at all nodes.
 [[nodiscard]] std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u);
 
 /// Whether the image's box under a lattice is too large to be read as a whole.
@@ -59,16 +60,18 @@ struct Lattice {
 /// The image at the nodes: its voxels, or their mean with weights that decrease to 0 at the neighbouring nodes.
 [[nodiscard]] Field sample(const Image& image, const Lattice& lattice, const RunContext& run);
 
-/// The field convolved with a Gaussian. Beyond the boundary the last value is repeated. @param sigma  in the frame
+/// The field convolved with a Gaussian. Beyond the boundary the last value is repeated. @param sigma  world units
 [[nodiscard]] Field smooth(const Lattice& lattice, const Field& field, double sigma);
 
 /// Central differences along an axis, one-sided at the boundary.
 [[nodiscard]] Field derivative(const Lattice& lattice, const Field& field, int axis);
 
-/// Signed distance to the border of a body of nodes, negative inside, accurate to half a cell; large if there is none.
+/// Signed distance to the border of a body of nodes, negative inside, accurate to half a cell. Without a border, its
+/// absolute value is large.
 [[nodiscard]] Field signed_distance(const Lattice& lattice, const std::vector<char>& inside);
 
-/// Labels of the parts of a body that are connected through faces, from 1; 0 outside; and the number of parts.
+/// The parts of a body that are connected through faces: for each node the number of its part, from 1 on, or 0 outside
+/// of the body.
 struct Parts {
     std::vector<int> number;
     int count = 0;

@@ -14,11 +14,11 @@ inline constexpr int kFolds = 5;
 /// neither on the order in which the marks were given nor on a reflection of the image.
 struct Marks {
     std::vector<Vec3> places;
-    std::vector<std::size_t> spread;  ///< a subset, far apart, ascending: guesses are computed from these
-    double spacing = 0;               ///< median distance to the nearest other mark
-    double variance = 0;              ///< of a position along an axis
-    /// Half-spaces n.x <= offset that contain all marks. If marks lie close to an end of the image, the hull extends
-    /// up to it.
+    std::vector<std::size_t> spread;  ///< indices of marks far apart, ascending: guesses are computed from these
+    double spacing = 0;               ///< median distance of a mark to the nearest other one
+    double variance = 0;              ///< of the position of a mark along an axis
+    /// Half-spaces n.x <= offset that contain all marks. If marks lie within a spacing of an end of the image, there
+    /// are no half-spaces towards this end, so that the hull extends up to it.
     std::vector<std::pair<Vec3, double>> hull;
     std::vector<Vec3> inside, outside;  ///< positions whose side is known
 

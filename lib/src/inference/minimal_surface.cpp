@@ -8,18 +8,18 @@
 namespace covol::inference {
 namespace {
 
-/// A row of nodes and its neighbours.
+/// A row of nodes along x, and the steps in memory to its neighbouring rows.
 struct Row {
     std::size_t begin;
     int count;
     bool has_y, has_z;      // whether there is a next row along that axis
-    bool after_y, after_z;  // whether there is a previous row
+    bool after_y, after_z;  // whether there is a previous row along that axis
     std::size_t step_y, step_z;
 };
 
 struct State {
     Field bar, px, py, pz;
-    float scale[3];  // tau / h along each axis
+    float scale[3];  // step tau, divided by the spacing along each axis
     float tau;
 };
 
@@ -55,7 +55,8 @@ void descend(const Row& row, const Field& cost, State& s, Field& u) {
     const float *before_y = py - (row.after_y ? row.step_y : 0), *before_z = pz - (row.after_z ? row.step_z : 0);
     const float with_y = row.after_y ? s.scale[1] : 0.0F, with_z = row.after_z ? s.scale[2] : 0.0F;
     const auto at = [&](int i, float before_x) {
-        // At the end of the lattice p is 0, because the gradient there is 0.
+        // In the last node along an axis the component of p along it is 0, because the difference to the next node is
+        // set to 0.
         const float div = s.scale[0] * (px[i] - before_x) + s.scale[1] * py[i] - with_y * before_y[i] +
                           s.scale[2] * pz[i] - with_z * before_z[i];
         const float next = std::clamp(value[i] + div - s.tau * c[i], 0.0F, 1.0F);
@@ -69,7 +70,7 @@ void descend(const Row& row, const Field& cost, State& s, Field& u) {
 constexpr int kCheckEvery = 25;
 constexpr std::size_t kSteady = 20000;
 
-/// Updates the side of 1/2 on which each node is. @return number of changes
+/// Updates `side`, which is 1 at nodes with u > 1/2 and otherwise 0. @return number of nodes that have changed
 std::size_t update_sides(const Field& u, std::vector<char>& side) {
     std::size_t changed = 0;
     for (std::size_t n = 0; n < u.size(); ++n) {

@@ -8,8 +8,8 @@ namespace covol::inference {
 /// algorithm of Chambolle and Pock (J. Math. Imaging Vis. 40, 2011). The unit of length is the shortest edge of
 /// a cell. Stops when less than one of 20000 nodes has changed its side of 1/2 in 25 iterations.
 /// @param weight  of the surface, >= 0
-/// @param cost    of a node inside
-/// @param iterations  maximum
+/// @param cost    of including a node in the body; may be negative
+/// @param iterations  maximum number
 /// @param u       the initial value, and the result
 void minimize_surface(const Lattice& lattice, const Field& weight, const Field& cost, int iterations, Field& u,
                       const RunContext& run);

@@ -24,8 +24,8 @@ using namespace inference;
 
 /// A mark that the guess misses.
 struct Miss {
-    Vec3 place;      ///< in the frame
-    double off = 0;  ///< distance from the guess
+    Vec3 place;      ///< its position in the image's frame
+    double off = 0;  ///< its distance from the surface of the guess
     bool outside = false;
 };
 
@@ -66,10 +66,11 @@ public:
         });
     }
 
-    /// Bits of information that the image gives about the sides of the guess where no mark contradicts it.
+    /// Collects samples on both sides of the guess's surface where no mark contradicts it. @return the bits of
+    /// information that the image gives about their side: held_out_bits()
     double learn();
     void draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside);
-    /// The redrawn surface on the lattice of a guess.
+    /// The level set of the guess, with the redrawn part of its surface.
     [[nodiscard]] FloatGridPtr on(const FloatGrid& guess) const;
     [[nodiscard]] WorldBox box() const;
     /// Mean distance of the redrawn surface to the marks that the guess misses.
@@ -80,7 +81,8 @@ public:
     }
 
 private:
-    /// Distance to the nearest missed mark, relative to the distance by which it is missed.
+    /// The missed mark that is nearest relative to the distance by which the guess misses it, and this relative
+    /// distance.
     [[nodiscard]] std::pair<double, const Miss*> nearest_miss(const Vec3& place) const {
         std::pair<double, const Miss*> nearest{std::numeric_limits<double>::infinity(), nullptr};
         for (const Miss& miss : misses_) {
@@ -89,8 +91,9 @@ private:
         }
         return nearest;
     }
-    /// Confidence in the guess's side of a node, in [0,1]. A mark outside of the guess implies that the guess is too
-    /// small there, up to the distance by which it is missed; one inside implies that it is too large.
+    /// Confidence that a node is on the side on which it is in the guess, in [0,1]. A mark outside of the guess implies
+    /// that the guess is too small there, up to the distance by which it misses the mark, so that only nodes outside
+    /// are doubtful. A mark inside implies that the guess is too large.
     [[nodiscard]] double known(std::size_t n) const {
         const Miss& miss = *nearest_[n];
         if (miss.outside == is_inside(n)) return 1;
@@ -104,7 +107,7 @@ private:
         for (int a = 0; a < 3; ++a) {
             const double at = (place[a] - lattice_.origin[a]) / lattice_.spacing[a],
                          reach = lattice_.finest() / lattice_.spacing[a];
-            const double last = lattice_.size[a] - 1;  // the position may lie outside the lattice
+            const double last = lattice_.size[a] - 1;  // clamped because the position may lie outside the lattice
             low[a] = int(std::clamp(std::ceil(at - reach), 0.0, last + 1));
             high[a] = int(std::clamp(std::floor(at + reach), -1.0, last));
         }
@@ -124,12 +127,12 @@ private:
     std::vector<Miss> misses_;
     Lattice lattice_;
     Solid guess_;
-    Field distance_;  // to guess_, signed
+    Field distance_;  // signed distance to the surface of guess_
     ImageFeatures image_;
     Field freedom_;                     // distance to the nearest missed mark, relative to its Miss::off
-    std::vector<const Miss*> nearest_;  // that mark
+    std::vector<const Miss*> nearest_;  // the mark to which freedom_ refers
     std::vector<Sample> samples_;
-    Field level_;  // of the redrawn surface
+    Field level_;  // level set of the redrawn surface
 };
 
 double Redrawing::learn() {
@@ -154,7 +157,8 @@ double Redrawing::learn() {
     return held_out_bits(samples_, kFolds);
 }
 
-/// Assigns parts of one side, inside or outside, to the other side if they lie entirely in the region that is redrawn.
+/// Assigns connected parts of one side (inside if `of_inside`, else outside) to the other side if they lie entirely in
+/// the region that is redrawn.
 void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const {
     std::vector<char> side(body.size());
     for (std::size_t n = 0; n < body.size(); ++n) side[n] = (body[n] != 0) == of_inside ? 1 : 0;
@@ -184,7 +188,8 @@ void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& o
             weight[n] = 0;
         }
     };
-    // The nodes between a mark and the guess that misses it are missing in the guess, or wrongly part of it.
+    // The nodes between a missed mark and the surface of the guess are on the wrong side in the guess, and are held on
+    // the other one.
     std::array<Field, 3> slope;
     for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice_, distance_, a);
     for (const Miss& miss : misses_) {

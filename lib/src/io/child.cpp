@@ -30,11 +30,13 @@ namespace {
 /// File descriptors in the started program: the shared memory of the orders and of the results, the writing end of a
 /// pipe that is closed when the program ends, and the first descriptor that the program does not inherit.
 constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
-constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // the started program ignores them
+// Signals that stop programs. The started program ignores them, because wait_for() stops it.
+constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};
 
 enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kNoMemory, kCrashed };
 
-/// State and answer of a piece, shared by both processes. Memory of zeros means that the piece is waiting.
+/// State and answer of a piece, shared by both processes. In new memory, which is zero, each piece has the state
+/// kWaiting.
 struct Slot {
     std::uint32_t state;
     std::int32_t code;
@@ -49,7 +51,8 @@ struct Slot {
         std::strncpy(text, what, sizeof text - 1);
         set(kRefused);
     }
-    /// A malicious file may have made the started program write any number into `code`.
+    /// The error that refuse() has recorded. A malicious file may have made the started program write any data: an
+    /// invalid `code` becomes InvalidInput, and `text` may lack its terminating zero.
     [[nodiscard]] Error refusal() const {
         const bool known = code >= 0 && code <= static_cast<std::int32_t>(Errc::Cancelled);
         return {known ? static_cast<Errc>(code) : Errc::InvalidInput, std::string(text, strnlen(text, sizeof text))};
@@ -64,8 +67,8 @@ struct Head {
     std::int32_t parent;
 };
 struct Place {
-    std::uint64_t path, path_end, detail_end;  ///< positions in the texts
-    std::uint64_t begin, bytes;                ///< position and size in the results
+    std::uint64_t path, path_end, detail_end;  ///< begin and end of the path, and end of the detail, in the texts
+    std::uint64_t begin, bytes;                ///< position and size in bytes of the result, in the memory for results
 };
 
 class Orders {
@@ -112,14 +115,15 @@ struct Batch {
     }
 };
 
-/// Moves a file descriptor to a number that the started program does not inherit. @returns the number
+/// Moves a file descriptor to a number from kFirstOther on, so that the dup2() calls of SpawnPlan do not overwrite it.
+/// @returns the number
 int above_inherited(int descriptor) {
     const int other = descriptor < 0 ? -1 : fcntl(descriptor, F_DUPFD_CLOEXEC, kFirstOther);
     if (descriptor >= 0) close(descriptor);
     return other;
 }
 
-/// A pipe whose reading end sees a hang-up when all processes that hold its writing end have ended.
+/// A pipe on whose reading end poll() reports a hang-up when all processes that hold its writing end have ended.
 struct Pipe {
     Pipe() {
         int ends[2];
@@ -198,13 +202,14 @@ double cpu_seconds(pid_t process) {
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-/// Waits until the program ends. Kills it if it takes too long for a piece, or if the run is cancelled.
+/// Waits until the program ends. Kills the program if it takes too long for a piece, or if the run is cancelled.
 /// @param pipe  the reading end of a pipe whose writing end is closed when the program ends
 /// @param seconds  maximum CPU time for one piece
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
-    constexpr int kLongestPause = 20;  // milliseconds
-    constexpr double kMaxPauses = 10;  // maximum elapsed time / `seconds`: limits waiting without CPU time (slow disk)
+    constexpr int kLongestPause = 20;  // [ms] maximum time between two checks of the limits
+    // A piece may take this many times `seconds` of elapsed time, because reading from a slow disk uses no CPU time.
+    constexpr double kMaxPauses = 10;
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
     double computed_before = 0;
@@ -220,13 +225,14 @@ void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const R
         if (computed - computed_before > seconds) break;
         if (std::chrono::duration<double>(Clock::now() - since).count() > kMaxPauses * seconds) break;
         pollfd hung_up{pipe, 0, 0};
-        if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // the program is about to end
+        if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // The pipe is closed, so waitpid() will soon succeed.
     }
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
 }
 
-/// Runs the program on the batch. @returns the first piece whose outcome is still unknown after the program has ended
+/// Runs the program on the batch. @returns the index of the first piece whose outcome is still unknown after the
+/// program has ended
 std::size_t run_program(const std::string& program, const Orders& orders, const SharedMemory& results,
                         const Batch& batch, double seconds, const RunContext& run) {
     Pipe alive;
@@ -236,7 +242,9 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     wait_for(child, alive.from, batch, seconds, run);
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
-    if (batch.slots[n].now() != kBegun)  // not the file's fault: the libraries start threads when they are loaded
+    // The program has ended before it began this piece, so the file is not the reason. For example, a library may have
+    // been unable to start a thread when it was loaded.
+    if (batch.slots[n].now() != kBegun)
         throw Error(Errc::Io, program +
                                   ": the reader process ended before it could read a file; "
                                   "allow more processes, threads or memory");
@@ -270,7 +278,8 @@ SharedMemory::SharedMemory(std::uint64_t bytes)
                    std::max<std::uint64_t>(bytes, 1)) {}
 
 SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(descriptor), bytes_(bytes) {
-    // The seals prevent both processes from changing the size of memory that the other process has mapped.
+    // The seals prevent both processes from changing the size of memory that the other process has mapped; accesses
+    // beyond a reduced size would crash the other process.
     const bool made = ftruncate(descriptor, off_t(bytes)) == 0 &&
                       fcntl(descriptor, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) == 0;
     const int why = made ? 0 : errno;
@@ -313,7 +322,7 @@ std::vector<PieceOutcome> run_pieces(const std::string& program, std::uint32_t t
         for (Batch batch{orders.slots(), begin, end}; batch.begin < batch.end && !run.cancelled();)
             batch.begin = run_program(program, orders, results, batch, seconds, run);
     };
-    // Batches amortize the tens of milliseconds that starting the program and loading its libraries takes.
+    // Each process works on a batch, because starting the program and loading its libraries takes tens of milliseconds.
     constexpr std::size_t kMinOfBatch = 8, kMaxOfBatch = 64, kBatchesOfThread = 2;
     const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
     const std::size_t size = std::clamp(count / (kBatchesOfThread * threads), kMinOfBatch, kMaxOfBatch);
@@ -344,10 +353,11 @@ int serve_pieces(int count, char** arguments, const std::function<void(const Pie
     setrlimit(RLIMIT_CORE, &none);
     const Orders orders(SharedMemory(SharedMemory::Given{kOrders}));
     const SharedMemory results(SharedMemory::Given{kResults});
-    if (getppid() != orders.head().parent) return 2;  // the parent ended before the call of prctl()
+    // If the parent has ended before prctl(), the signal for its end will not arrive.
+    if (getppid() != orders.head().parent) return 2;
     const std::size_t end = std::strtoull(arguments[2], nullptr, 10);
     for (std::size_t n = std::strtoull(arguments[1], nullptr, 10); n < end; ++n) do_piece(work, orders, results, n);
-    _exit(0);  // skips destructors, because those of libraries may crash, too
+    _exit(0);  // ends without destructors, because those of a library may crash after it has read a damaged file
 }
 
 double max_seconds_for_pixels(std::uint64_t bytes) {

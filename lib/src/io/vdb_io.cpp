@@ -85,7 +85,7 @@ public:
     }
     ~Reader() override {
         stream_.exceptions(std::ios::goodbit);
-        // Removes the stream's reference to tags_ before both are destroyed.
+        // Removes the pointer to tags_ that the stream holds, before stream_ and tags_ are destroyed.
         vdb::io::clearStreamMetadataPtr(stream_);
     }
     Reader(const Reader&) = delete;
@@ -210,7 +210,7 @@ std::string unusable(const std::string& where, const std::string& path) {
 
 bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 
-/// The names and types of all grids: "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)".
+/// The names and types of all grids, for messages: "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)".
 std::string list_grids(const Reader& reader) {
     std::string list;
     for (std::size_t n = 0; n < reader.size(); ++n)
@@ -233,7 +233,8 @@ void check_grids(const std::string& function, const std::string& path, const std
 /// OpenVDB writes a random UUID into each file's header. Here it is replaced by a hash of the remaining contents, so
 /// that identical runs write identical files.
 void make_repeatable(const std::string& path) {
-    constexpr std::streamoff kUuid = 8 + 4 + 4 + 4 + 1;  // after the magic number, three versions and a flag
+    // Position in bytes of the UUID, after the magic number, three version numbers and a flag.
+    constexpr std::streamoff kUuid = 8 + 4 + 4 + 4 + 1;
     constexpr std::size_t kLength = 36;
     std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
     std::string uuid(kLength, '\0');
@@ -345,7 +346,8 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     };
     vdb::MetaMap file_metadata;
     add_provenance(file_metadata);
-    vdb::GridPtrVec copies;  // copies with metadata of their own and the trees of the originals
+    // Copies use the trees of `grids`, but have metadata of their own, so that the grids of the caller are unchanged.
+    vdb::GridPtrVec copies;
     for (const FloatGridPtr& grid : grids) {
         const FloatGridPtr copy = grid->copy();
         add_provenance(*copy);

@@ -44,7 +44,8 @@ std::array<float, 2> range_of(const FloatGrid& grid) {
     return range;
 }
 
-/// Converts a grid of values >= 0 that is 0 outside to a level set; values above `half` become inside.
+/// Converts an indicator, which is 0 outside and 2 * `half` inside, to a level set: values above `half` become
+/// negative, that is, inside.
 void make_level_set(FloatGrid& grid, float half) {
     const auto h = float(domain_of(grid).voxel_size);
     openvdb::tools::dilateActiveValues(grid.tree(), 2, openvdb::tools::NN_FACE_EDGE_VERTEX);

@@ -49,19 +49,20 @@ std::uint32_t read_length(std::istream& stream, const std::string& what, std::in
     return length;
 }
 
-/// OpenVDB reads this byte into a bool, for which other values are undefined behaviour.
+/// OpenVDB reads this byte into a bool, which must be 0 or 1: any other value is undefined behaviour.
 void check_bool(std::uint8_t value) {
     if (value > 1) throw std::runtime_error("expected 0 or 1 for false or true, got " + std::to_string(value));
 }
 
-/// Checks the header of Blosc, four words: versions, flags and element size; unpacked bytes; block size; packed bytes.
+/// Checks the header of Blosc, four numbers of 32 bits: versions, flags and element size; unpacked bytes; block size;
+/// packed bytes.
 void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t bytes, std::int64_t packed) {
     if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
         throw std::runtime_error("a block's size differs from that in its header");
 }
 
 /// Checks OpenVDB's metadata for delayed loading, which consists of two arrays with one value for each leaf. Each array
-/// follows its packed size, or a 0 if it is not packed; the second array may be missing.
+/// is preceded by its packed size in bytes, or by 0 if it is not packed; the second array may be missing.
 /// @param length  of the metadata in bytes; more than 0
 void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t file_bytes) {
     constexpr std::int64_t kMinLeaf = 64;  // minimum size of a leaf in bytes: the size of its mask
@@ -81,7 +82,8 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
         if (packed > 0) {
             if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
             const auto header = read<std::array<std::uint32_t, 4>>(stream);
-            // OpenVDB pads small blocks with zeros before it packs them.
+            // OpenVDB may pad a block that is smaller than kPadded bytes with zeros to this size before it packs the
+            // block.
             constexpr std::int64_t kPadded = 128;
             check_blosc_header(header, bytes < kPadded && header[1] == kPadded ? kPadded : bytes, stored);
         }
@@ -95,8 +97,8 @@ public:
         : stream_(stream), layout_(layout), value_(value) {}
 
     void tree() {
-        skip(sizeof(std::int32_t));  // number of buffers
-        skip(value_.whole);          // background
+        skip(sizeof(std::int32_t));  // number of buffers, which is not needed
+        skip(value_.whole);          // value of the background
         const auto tiles = read<std::uint32_t>(), children = read<std::uint32_t>();
         for (std::uint32_t n = 0; n < tiles; ++n) {
             skip(3 * std::int64_t(sizeof(std::int32_t)) + value_.whole);
@@ -123,7 +125,7 @@ private:
     void skip(std::int64_t bytes) {
         if (bytes < 0 || bytes > layout_.file_bytes - std::int64_t(stream_.tellg()))
             throw std::runtime_error("a block of " + std::to_string(bytes) + " bytes does not fit into the file");
-        // Seeking discards the stream's buffer, so reading and ignoring is faster for short distances.
+        // For short distances, reading and ignoring bytes is faster than seeking, which discards the stream's buffer.
         constexpr std::int64_t kFar = 1 << 16;
         if (bytes < kFar)
             stream_.ignore(bytes);
@@ -150,7 +152,7 @@ private:
     /// @param active  number of active values
     void values(std::int64_t count, std::int64_t active) {
         const auto kind = read<std::int8_t>();
-        // The byte states which inactive values follow: io/Compression.h of OpenVDB.
+        // `kind` states which inactive values, and which mask, precede the other values: io/Compression.h of OpenVDB.
         if (kind == vdb_io::NO_MASK_AND_ONE_INACTIVE_VAL || kind == vdb_io::MASK_AND_ONE_INACTIVE_VAL)
             skip(value_.whole);
         if (kind == vdb_io::MASK_AND_TWO_INACTIVE_VALS) skip(2 * value_.whole);
@@ -165,7 +167,7 @@ private:
         const bool blosc = (layout_.compression & vdb_io::COMPRESS_BLOSC) != 0;
         if (!blosc && (layout_.compression & vdb_io::COMPRESS_ZIP) == 0) return skip(bytes);
         const auto packed = read<std::int64_t>();
-        if (packed <= 0) {  // not packed
+        if (packed <= 0) {  // the block is not packed; its size is then stored as a negative number
             if (packed != -bytes)
                 throw std::runtime_error("expected a block of " + std::to_string(bytes) +
                                          " uncompressed bytes, its length is stated as " + std::to_string(packed));

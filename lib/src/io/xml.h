@@ -6,7 +6,7 @@
 namespace covol::detail {
 
 struct XmlTag {
-    std::string name;  ///< without a namespace
+    std::string name;  ///< without the prefix of a namespace
     bool closing = false;
     bool empty = false;  ///< as in <a/>: no closing tag follows
     std::map<std::string, std::string> attributes;
@@ -17,7 +17,8 @@ struct XmlTag {
     }
 };
 
-/// Iterates over the tags of an XML text. Comments and declarations are skipped; the iteration ends at a syntax error.
+/// Iterates over the tags of an XML text. Comments and declarations are skipped; next() returns false at the end of the
+/// text and at a syntax error.
 class XmlTags {
 public:
     /// @param text  has to outlive this object

@@ -7,9 +7,10 @@
 // Lengths and positions that floating-point numbers represent well, for files of any kind.
 namespace covol::detail {
 
-// The cubes of these lengths are volumes, which are also valid in single precision: some are stored in it.
+// World units. Their cubes, which are volumes, are still in the range of single precision, in which some volumes are
+// stored.
 constexpr double kMinLength = 1e-12, kLargestLength = 1e12;
-// Distance from 0, in voxels, at which double precision still resolves a millionth of a voxel.
+// Maximum distance from 0, in voxels, at which double precision still resolves a millionth of a voxel.
 constexpr double kFarthestVoxel = 4294967296.0;
 
 /// Maximum distance from 0 of the origin of an image or a grid with voxels of that size, in world units.

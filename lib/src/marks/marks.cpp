@@ -12,10 +12,11 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // structures; for more only warnings are logged
+constexpr std::size_t kMaxInLines = 4;  // maximum number of structures; with more, only warnings are logged
 
-/// Adds the hints of the cloud's points, which are the last points of `marks`. Each list is created once a cloud has
-/// values for it.
+/// Adds the normals and the directions to the sensor of a cloud whose points `world` are the last points of `marks`.
+/// The points without a normal or a direction get a vector of zeros; a list remains empty until a cloud has values for
+/// it.
 void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, Marks& marks) {
     const std::size_t before = marks.points.size() - world.size();
     std::vector<Vec3>& normals = marks.hints.normals;
@@ -119,7 +120,7 @@ std::vector<Vec3> positions_of(const Marks& marks, const std::optional<ImageGeom
 }
 
 Marks* find_structure(std::vector<Marks>& structures, const std::string& name) {
-    const std::string safe = safe_text(name);  // safe in files, tables and terminals
+    const std::string safe = safe_text(name);  // without characters that files, tables or terminals interpret
     const auto at =
         std::find_if(structures.begin(), structures.end(), [&](const Marks& marks) { return marks.name == safe; });
     return at != structures.end() ? &*at : nullptr;

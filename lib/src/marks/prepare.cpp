@@ -14,7 +14,7 @@
 namespace covol {
 namespace {
 
-/// The content of painted images; each is analysed when it is first needed.
+/// The content of painted images. Each image is analysed when it is first needed.
 class PaintReader {
 public:
     PaintReader(const std::optional<ImageGeometry>& image, bool force) : image_(image), force_(force) {}
@@ -44,7 +44,8 @@ private:
     std::map<const PaintedImage*, Painted> images_;
 };
 
-/// Rejects D above the diagonal of the points' box: an enclosed position at that distance from all points cannot exist.
+/// Rejects a tag distance above the diagonal of the points' box, because no enclosed position is that far from all
+/// points.
 void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
     if (points.empty()) return;
     const WorldBox box = bounding_box(points);
@@ -111,7 +112,8 @@ private:
         const auto append = [](std::vector<Vec3>& list, const std::vector<Vec3>& more) {
             list.insert(list.end(), more.begin(), more.end());
         };
-        // Not with other points: these have no normals, and the list must contain one for every mark.
+        // Only if there are no other points, because these have no normals, but the list must contain one for each
+        // mark.
         if (marks.points.empty()) {
             marks.hints.normals = network.outward;
             marks.hints.is_outward = true;

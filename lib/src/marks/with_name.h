@@ -5,7 +5,7 @@
 
 namespace covol::detail {
 
-/// Returns the result of `work`; its errors are prefixed with the structure's name.
+/// Returns the result of work(). The messages of errors that it throws are prefixed with `name`, that of the structure.
 template <typename Work>
 auto with_name(const std::string& name, const Work& work) {
     try {

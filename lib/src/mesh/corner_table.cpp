@@ -15,7 +15,8 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
       opposite_(corner_count(triangles.size()), kNone),
       corner_of_(vertices, kNone),
       on_boundary_(vertices, 0) {
-    // Sides sorted by the vertex that they leave.
+    // Each corner c also numbers the side from vertex(c) to the next vertex of the triangle; `leaving` contains the
+    // sides sorted by vertex(c).
     const auto corners = std::uint32_t(opposite_.size());
     std::vector<std::uint32_t> first(vertices + 1, 0), leaving(corners);
     for (std::uint32_t c = 0; c < corners; ++c) ++first[vertex(c) + 1];
@@ -28,7 +29,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     std::atomic<std::uint32_t> twice = kNone;
     tbb::parallel_for(std::uint32_t(0), corners, [&](std::uint32_t c) {
         const std::uint32_t from = vertex(previous(c)),
-                            to = vertex(next(c));  // the side as the adjacent triangle contains it
+                            to = vertex(next(c));  // the side in the adjacent triangle's direction
         for (std::uint32_t n = first[from]; n < first[from + 1]; ++n) {
             if (vertex(next(leaving[n])) != to) continue;
             if (opposite_[c] != kNone) twice = c;
@@ -47,7 +48,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     for (std::uint32_t c = 0; c < corners; ++c) {
         if (opposite_[c] != kNone) continue;
         on_boundary_[vertex(next(c))] = on_boundary_[vertex(previous(c))] = 1;
-        corner_of_[vertex(next(c))] = next(c);  // no triangle follows clockwise
+        corner_of_[vertex(next(c))] = next(c);  // the first corner: no triangle follows clockwise
     }
 }
 
@@ -92,7 +93,7 @@ void CornerTable::unflip(std::uint32_t corner) {
     link(c, o);
     if (corner_of_[w] == previous(c)) corner_of_[w] = o;
     if (corner_of_[v] == previous(o)) corner_of_[v] = c;
-    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // the first corner, if a or b is on the boundary
+    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // if a is on the boundary: its first corner
     if (corner_of_[b] == next(o)) corner_of_[b] = previous(c);
 }
 
@@ -103,7 +104,7 @@ bool CornerTable::can_collapse(std::uint32_t corner) const {
     if (v == w) return false;
     int common = 0;
     around(a, [&](std::uint32_t c) { common += adjacent(b, vertex(next(c))); });
-    // The vertices opposite to the edge lose a triangle each; at least three must remain.
+    // The two vertices opposite to the edge lose a triangle each; an inner vertex must keep at least three.
     return common == 2 && (is_boundary(v) || valence(v) > 3) && (is_boundary(w) || valence(w) > 3);
 }
 
@@ -118,8 +119,8 @@ void CornerTable::collapse(std::uint32_t corner) {
     const std::uint32_t beyond_wa = opposite_[next(o)], beyond_wb = opposite_[previous(o)];
     link(beyond_vb, beyond_va);
     link(beyond_wa, beyond_wb);
-    // The ends of the edge are not on the boundary, and neither are these sides; a boundary vertex opposite to the edge
-    // has its first corner elsewhere.
+    // Because the ends a and b of the edge are not on the boundary, these four sides have a triangle beyond them. If v
+    // or w is on the boundary, its first corner is in another triangle and remains valid.
     const auto corner_beside = [&](std::uint32_t vertex_at, std::uint32_t beyond) {
         const std::uint32_t at = next(beyond);
         return vertex(at) == vertex_at ? at : previous(beyond);

@@ -7,8 +7,9 @@
 
 namespace covol::meshing {
 
-/// Adjacency of a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t; `opposite` is the
-/// corner on the other side of the edge opposite to a corner (Rossignac et al., Corner table, 1999).
+/// Adjacency of a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t. The edge opposite
+/// to this corner belongs to a second triangle, whose corner opposite to the same edge is opposite(3 t + k) (Rossignac
+/// et al., Corner table, 1999).
 class CornerTable {
 public:
     static constexpr std::uint32_t kNone = ~std::uint32_t(0);
@@ -27,7 +28,8 @@ public:
     [[nodiscard]] bool is_closed() const {
         return std::find(on_boundary_.begin(), on_boundary_.end(), 1) == on_boundary_.end();
     }
-    /// A corner at the vertex, kNone if this has no triangle; at a boundary vertex the first one counter-clockwise.
+    /// A corner at the vertex, or kNone if the vertex has no triangle. At a boundary vertex it is the first corner in
+    /// counter-clockwise order.
     [[nodiscard]] std::uint32_t corner_of(std::uint32_t v) const { return corner_of_[v]; }
 
     /// Calls visit(corner) for each corner at the vertex, counter-clockwise.

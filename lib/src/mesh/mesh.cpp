@@ -22,8 +22,8 @@ Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(
 
 bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/// The side of triangle t from corner k to corner k+1, number 3 t + k; stored with its vertex of lower number, `high`
-/// is the other one.
+/// The side of triangle t from corner k to corner k+1 has the number 3 t + k. Sides are grouped by the lower one of
+/// their two vertex numbers; `high` is the other one.
 struct Side {
     std::uint32_t high;
     std::uint32_t number;
@@ -36,7 +36,8 @@ std::uint32_t corner_vertex(const TriangleMesh& mesh, std::uint32_t corner) {
 }
 std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 
-/// Calls visit(first, last) with the sides of triangles on each edge; degenerate triangles are skipped.
+/// Calls visit(first, last) for each edge, with the range of the triangles' sides that lie on it; degenerate triangles
+/// are skipped.
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
     const std::uint32_t corners = meshing::corner_count(mesh.triangles.size());
@@ -144,7 +145,7 @@ void meshing::add_normals(const std::array<Vec3, 3>& normals, const std::array<V
 
 std::array<float, 3> meshing::unit_normal(const Vec3& sum) {
     const double size = length(sum);
-    // Most file formats require a unit vector even for a vertex without a direction.
+    // A vertex of degenerate triangles only has no normal, but most file formats require a unit vector.
     return size > 0 ? std::array{float(sum[0] / size), float(sum[1] / size), float(sum[2] / size)}
                     : std::array{0.0F, 0.0F, 1.0F};
 }

@@ -22,7 +22,8 @@ std::vector<Corner> flatten(const std::vector<Vec3>& corners) {
         const Vec3 part = cross(minus(corners[n], corners[0]), minus(corners[n + 1], corners[0]));
         for (std::size_t a = 0; a < 3; ++a) normal[a] += part[a];
     }
-    // Omits the axis with the normal's largest component: areas keep their sign if the others are in cyclic order.
+    // The coordinate along the normal's largest component is omitted. Areas keep their sign if the two others are in
+    // cyclic order.
     std::size_t out = 0;
     for (std::size_t a = 1; a < 3; ++a)
         if (std::abs(normal[a]) > std::abs(normal[out])) out = a;
@@ -66,7 +67,8 @@ public:
     }
 
 private:
-    /// If no ear is left, as in a polygon that intersects itself, returns the corner with the largest area.
+    /// The next ear, from corner `at` on. If there is none, as in a polygon that intersects itself, returns the corner
+    /// whose triangle has the largest area.
     std::uint32_t find_ear(std::uint32_t at, std::size_t left) const {
         std::uint32_t best = at;
         double maximum = -INFINITY;

@@ -19,7 +19,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
 
-/// The number of corners. @throws Error Unsupported if 32 bits are not enough to number them.
+/// The number of corners of `triangles` triangles. @throws Error Unsupported if 32 bits are not enough to number them.
 inline std::uint32_t corner_count(std::uint64_t triangles) {
     constexpr std::uint64_t kMax = (~std::uint32_t(0)) / 3;
     if (triangles > kMax)
@@ -41,7 +41,8 @@ inline Vec3 area_normal(const Positions& p, const Triangle& t) {
 
 inline double area(const Vec3& a, const Vec3& b, const Vec3& c) { return length(area_normal(a, b, c)) / 2; }
 
-/// The cosine of the smallest of a triangle's angles, 1 for a degenerate one: smaller is better.
+/// The cosine of the smallest angle of a triangle, 1 for a degenerate triangle: the smaller the cosine, the better the
+/// shape.
 inline double worst_cosine(const Vec3& a, const Vec3& b, const Vec3& c) {
     const Vec3 side[3] = {minus(c, b), minus(a, c), minus(b, a)};
     double size[3];

@@ -12,12 +12,12 @@
 namespace covol::meshing {
 namespace {
 
-/// The rounding error of a product of three lengths, in double precision from differences of single-precision numbers,
-/// is far below this.
+/// Margin for rounding errors of triple products, as a fraction of the cube of the triangles' size. The errors are far
+/// smaller, because the products are computed in double precision from single-precision coordinates.
 constexpr double kRounding = 1e-13;
-constexpr double kFacing = 0.05;  // minimum cosine between normals in a single sheet and its direction
+constexpr double kFacing = 0.05;  // minimum cosine between a normal and the direction of a single sheet
 
-/// Whether the projections onto an axis are disjoint.
+/// Whether the projections of the triangles s and t onto an axis are disjoint, by more than `margin`.
 bool separates(const Vec3& axis, const Vec3* s, const Vec3* t, double margin) {
     double s_low = std::numeric_limits<double>::max(), s_high = -s_low, t_low = s_low, t_high = -s_low;
     for (int k = 0; k < 3; ++k) {
@@ -30,7 +30,8 @@ bool separates(const Vec3& axis, const Vec3* s, const Vec3* t, double margin) {
     return s_high + margin < t_low || t_high + margin < s_low;
 }
 
-/// Tests the separating axes of two triangles that share no corner.
+/// Whether the projections of two triangles that share no corner are disjoint on one of the axes of the separating axis
+/// theorem: the normals, and the cross products of two sides.
 bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
     const Vec3 ns = area_normal(s[0], s[1], s[2]), nt = area_normal(t[0], t[1], t[2]);
     const double margin = kRounding * size * size * size;
@@ -40,15 +41,16 @@ bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
         for (int j = 0; j < 3; ++j)
             if (separates(cross(side, minus(t[(j + 1) % 3], t[j])), s, t, margin)) return true;
     }
-    for (int i = 0; i < 3; ++i) {  // for triangles in one plane
+    for (int i = 0; i < 3; ++i) {  // for triangles in one plane: axes in this plane, perpendicular to a side
         if (separates(cross(ns, minus(s[(i + 1) % 3], s[i])), s, t, margin * size)) return true;
         if (separates(cross(nt, minus(t[(i + 1) % 3], t[i])), s, t, margin * size)) return true;
     }
     return false;
 }
 
-/// For triangles that share corner 0, which is the origin: whether a plane through it separates their other corners. At
-/// most one of these may lie in the plane for each triangle, in different directions from the origin.
+/// For triangles that share corner 0, which is the origin: whether a plane through the origin separates the other
+/// corners of s from those of t. Corners may lie in the plane, but not one of s and one of t in the same direction from
+/// the origin.
 bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     const double margin = kRounding * size * size * size;
     const auto side = [&](const Vec3& axis, const Vec3& p) { return dot(axis, p); };
@@ -82,7 +84,7 @@ bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
 bool apart_at_side(const Vec3* s, const Vec3* t, double size) {
     const Vec3 ns = area_normal(s[0], s[1], s[2]), nt = area_normal(t[0], t[1], t[2]);
     if (std::abs(dot(ns, minus(t[2], t[0]))) > kRounding * size * size * size) return true;
-    return dot(ns, nt) < 0;  // normals of the order 0, 1, 2 in both
+    return dot(ns, nt) < 0;  // opposite normals: the corners 2 lie on different sides of the edge
 }
 
 template <typename PerThread>
@@ -97,7 +99,7 @@ auto gathered(const PerThread& found) {
 }  // namespace
 
 bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t) {
-    // Shared corners first, in the same order in both triangles.
+    // Moves the shared corners to the front, in the same order in both triangles.
     Triangle first = s, second = t;
     int shared = 0;
     for (int i = 0; i < 3; ++i)
@@ -142,7 +144,7 @@ void ContactFinder::rebuild() {
     float longest = 0;
     for (int a = 0; a < 3 && !positions.empty(); ++a) longest = std::max(longest, high[a] - low[a]);
     const float scale = longest > 0 ? float((1 << kBits) - 1) / longest : 0.0F;
-    std::vector<std::uint64_t> keyed;  // position along a Z-order curve, then number
+    std::vector<std::uint64_t> keyed;  // high 32 bits: position along a Z-order curve; low: number
     keyed.reserve(triangles.size());
     for (std::size_t n = 0; n < triangles.size(); ++n)
         if (triangles[n][0] < positions.size()) keyed.push_back(n);
@@ -236,8 +238,9 @@ void ContactFinder::find_single_sheets() {
     cell_origin_ = boxes_[0].low;
     const float whole = std::max({boxes_[0].high[0] - boxes_[0].low[0], boxes_[0].high[1] - boxes_[0].low[1],
                                   boxes_[0].high[2] - boxes_[0].low[2]});
-    if (!(cell_size_ > 1e-5F * whole)) return;  // too many cells for their keys
-    cell_size_ *= 1.001F;                       // margin for the rounding of the centres
+    if (!(cell_size_ > 1e-5F * whole)) return;  // cell indices might not fit into 21 bits each, see key_of()
+    // Margin for rounding, so that the centres of triangles that touch lie in neighbouring cells.
+    cell_size_ *= 1.001F;
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
     keyed.reserve(order_.size());
     for (std::size_t n = 0; n < order_.size(); ++n)
@@ -347,7 +350,7 @@ bool ContactFinder::would_touch(const std::vector<Change>& changed, const std::a
 }
 
 bool ContactFinder::face_along_sheet(const std::vector<Change>& changed, const Position& around) const {
-    constexpr double kAlong = 0.3;  // minimum cosine
+    constexpr double kAlong = 0.3;  // minimum cosine between a normal and the direction of the sheet
     const Vec3 direction = single_sheet(around);
     return dot(direction, direction) > 0 && std::all_of(changed.begin(), changed.end(), [&](const Change& change) {
                const Vec3 n = area_normal(*positions_, change.corners);

@@ -14,7 +14,7 @@ namespace covol::meshing {
 /// Triangles that share a side are apart unless they are folded flat onto each other.
 [[nodiscard]] bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t);
 
-/// Finds triangles that touch, by a tree of boxes around runs of nearby triangles.
+/// Finds triangles that touch each other, with a tree of bounding boxes whose leaves are runs of kRun nearby triangles.
 class ContactFinder {
 public:
     using Pair = std::pair<std::uint32_t, std::uint32_t>;
@@ -22,35 +22,38 @@ public:
     /// @param positions, triangles  kept by reference.
     ContactFinder(const Positions& positions, const std::vector<Triangle>& triangles);
 
-    /// Call after positions or corners of triangles have changed.
+    /// Recomputes the boxes. Call after positions or corners of triangles have changed.
     void update();
 
-    /// Pairs of triangles that are not certainly apart, each once, lower number first, sorted. Removed triangles (with
-    /// a corner that is not a vertex) touch nothing.
+    /// Pairs of triangles for which are_apart() is false, each once, lower number first, sorted. Removed triangles
+    /// (with a corner that is not a vertex) touch nothing.
     /// @param was_free  whether the mesh is closed and had no contacts before its vertices moved by less than the size
-    /// of a triangle: single sheets are then skipped.
+    /// of a triangle. Parts in which the surface is a single sheet are then skipped, see find_single_sheets().
     [[nodiscard]] std::vector<Pair> contacts(bool was_free);
-    /// The same for pairs that contain one of these triangles.
+    /// The same for the pairs that contain one of the triangles `some`; single sheets are not skipped.
     [[nodiscard]] std::vector<Pair> contacts_of(const std::vector<std::uint32_t>& some) const;
 
-    /// Sorts the triangles again; call when most have changed or many are removed.
+    /// Divides the triangles into new runs. Call when most triangles have changed or many have been removed, because
+    /// the boxes of the old runs are then unnecessarily large.
     void rebuild();
-    /// Finds where the surface is a single sheet: cells as large as a triangle such that no triangle in them or their
-    /// neighbours faces away from their common direction. A line in this direction can cross a closed surface without
-    /// contacts only once there, so that nothing touches (as the normal cones of Volino and Magnenat-Thalmann,
-    /// Efficient self-collision detection, 1994).
+    /// Finds the cells of a lattice, as large as the largest triangle, in which the surface is a single sheet: no
+    /// triangle in the cell or its 26 neighbours faces away from their mean normal, the direction of the sheet. There,
+    /// a line in this direction crosses a closed surface without contacts only once, so that no triangles touch
+    /// (compare the normal cones of Volino and Magnenat-Thalmann, Efficient self-collision detection, 1994).
     void find_single_sheets();
-    /// The common direction if the last find_single_sheets() found a single sheet around a point; 0 otherwise.
+    /// The direction, a unit vector, of the single sheet that the last find_single_sheets() found around a point; 0 if
+    /// it found none there.
     [[nodiscard]] Vec3 single_sheet(const Position& p) const;
     /// Enlarges the boxes after one triangle has moved or its corners have changed: much faster than update().
     void grow(std::uint32_t triangle);
 
-    /// A triangle with its future corners.
+    /// A triangle and the corners that it would have after a change.
     struct Change {
         std::uint32_t number;
         Triangle corners;
     };
-    /// Whether, once these triangles have changed and two others are removed, one of them would touch another triangle.
+    /// Whether one of the triangles `changed` would touch another triangle if they had their new corners and the two
+    /// triangles `gone` were removed.
     [[nodiscard]] bool would_touch(const std::vector<Change>& changed, const std::array<std::uint32_t, 2>& gone) const;
     /// Whether there is a single sheet around a point according to the last find_single_sheets(), and these triangles
     /// face in its direction.
@@ -86,16 +89,17 @@ private:
 
     const Positions* positions_ = nullptr;
     const std::vector<Triangle>* triangles_ = nullptr;
-    std::vector<std::uint32_t> order_, place_;  ///< triangles in the order of the leaves, and each one's position
-    std::vector<Box> boxes_;                    ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
-    std::vector<Box> triangle_boxes_;           ///< in the tree's order
+    /// The triangles in the order of the tree's leaves, and the position of each triangle in order_.
+    std::vector<std::uint32_t> order_, place_;
+    std::vector<Box> boxes_;           ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
+    std::vector<Box> triangle_boxes_;  ///< of single triangles, in the order of order_
     struct Cell {
         std::uint64_t key;
         Vec3 direction;
     };
     [[nodiscard]] std::uint64_t key_of(const Position& p, int dx = 0, int dy = 0, int dz = 0) const;
     [[nodiscard]] const Cell* cell_at(std::uint64_t key) const;
-    std::vector<Cell> cells_;  ///< sorted
+    std::vector<Cell> cells_;  ///< sorted by key
     Position cell_origin_{};
     float cell_size_ = 1;
     std::size_t runs_ = 1;  ///< leaves of the tree, a power of two

@@ -19,8 +19,8 @@
 namespace covol::meshing {
 namespace {
 
-/// The cost of a collapse is multiplied by `factor` if it makes a triangle whose smallest angle is smaller than before
-/// and than the angle of `cosine`: 23, 14 and 6 degrees.
+/// If a collapse decreases the smallest angle of a triangle, and the cosine of this angle is then above `cosine`, the
+/// cost of the collapse is multiplied by `factor`. The cosines in kNeedles are those of 23, 14 and 6 degrees.
 struct Needle {
     double cosine;
     float factor;
@@ -43,10 +43,11 @@ public:
     bool keeps_topology(HalfedgeHandle edge) { return OpenMesh::TriMesh_ArrayKernelT<Traits>::is_collapse_ok(edge); }
 };
 
-/// Faces and vertices have the numbers of the triangles and vertices until garbage collection, which is never called.
+/// Builds OpenMesh's mesh. Its faces and vertices have the numbers of the triangles and vertices of `mesh`, and keep
+/// them because OpenMesh's garbage collection, which would change them, is never called.
 void build(HalfEdges& edges, const TriangleMesh& mesh) {
-    // Quadrics are differences of squares, and costs are fourth powers of lengths, in single precision: coordinates are
-    // therefore moved near 0 and scaled to about 1.
+    // The coordinates are moved near 0, because quadrics subtract squares of coordinates from each other, and scaled so
+    // that triangles have a size of about 1, because costs are fourth powers of lengths in single precision.
     const Vec3 middle = to_vec3(mesh.vertices[mesh.triangles.front()[0]]);
     double area = 0;
     for (const Triangle& t : mesh.triangles)
@@ -74,8 +75,8 @@ public:
     explicit SafeQuadric(HalfEdges& mesh) : Quadric(mesh) {}
     DECIMATER_MODNAME(SafeQuadric)
 
-    /// @param trust  whether triangles that face in the direction of a single sheet found by the finder are assumed not
-    /// to touch.
+    /// @param trust  whether to assume, without a test, that changed triangles touch no other ones if finder_ has found
+    /// a single sheet around them and they face in its direction.
     void begin(TriangleMesh& mesh, const CornerTable& table, const Surface* surface, const DecimateGoal& goal,
                bool trust, const RunContext& run) {
         mesh_ = &mesh;
@@ -98,26 +99,28 @@ public:
         this->mesh().is_chosen = [this](HalfEdges::HalfedgeHandle edge) { return is_chosen(edge); };
     }
 
-    /// Call before each decimate(), which examines all vertices.
+    /// Call before each decimate() of OpenMesh's decimater, which queries the edges of all vertices anew.
     void begin_pass() {
         chosen_.assign(mesh_->vertices.size(), HalfEdges::HalfedgeHandle());
         requested_ = kNoVertex;
     }
     [[nodiscard]] std::size_t left() const { return left_; }
 
-    /// @return whether no triangles touch, if the checks have trusted single sheets
+    /// Checks the whole mesh for contacts if tests were omitted in single sheets (trust_). @return whether no triangles
+    /// touch
     [[nodiscard]] bool is_free() {
         if (!trust_) return true;
         finder_->rebuild();
         return finder_->contacts(true).empty();
     }
 
-    /// The cost of the chosen collapse.
+    /// The cost of the collapse that choose() has chosen for the vertex edge.v0.
     float collapse_priority(const CollapseInfo& edge) override { return cost_[number(edge.v0)]; }
 
     void preprocess_collapse(const CollapseInfo& edge) override {
         gather(edge.v0v1);
-        for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();  // to be chosen again
+        // The neighbours' collapses have to be chosen again.
+        for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();
     }
 
     void postprocess_collapse(const CollapseInfo& edge) override {
@@ -130,7 +133,7 @@ public:
         requested_ = kNoVertex;
         left_ -= gone_.size();
         if (left_ >= refreshed_ / 2) return;
-        finder_->rebuild();  // because boxes only grow
+        finder_->rebuild();  // because grow() only enlarges boxes
         if (trust_) finder_->find_single_sheets();
         refreshed_ = left_;
         const auto all = double(mesh_->triangles.size());
@@ -189,8 +192,9 @@ private:
         }
     }
 
-    /// Checks the chosen collapse again, because neighbours of neighbours may have changed. If triangles would touch,
-    /// choose() will also check contacts for this vertex, which is not necessary for most vertices.
+    /// Checks the chosen collapse again immediately before it is made, because the mesh around the neighbours may have
+    /// changed since. If triangles would touch, choose() will from now on also check contacts for this vertex, which is
+    /// not necessary for most vertices.
     bool is_free_still(HalfEdges::HalfedgeHandle edge) {
         if (!mesh().keeps_topology(edge)) return false;
         gather(edge);
@@ -217,7 +221,8 @@ private:
 
     [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_->vertices[v]); }
 
-    /// The factor of the cost for the shapes after the collapse: infinite if it turns a triangle.
+    /// The factor by which the shapes of the changed triangles increase the cost of the collapse; infinite if one of
+    /// them turns over.
     [[nodiscard]] float shape_factor(std::uint32_t lost) const {
         const Vec3 from = at(lost);
         double worst = -1;
@@ -257,20 +262,22 @@ private:
     std::optional<Level> level_;
     std::vector<std::uint8_t> holds_;
     bool trust_ = false;
-    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and at the last rebuild of finder_
+    std::size_t left_ = 0, refreshed_ = 0;           // number of triangles: now, and at the last rebuild of finder_
     std::uint32_t requested_ = kNoVertex;            // the vertex whose edges the decimater queries
-    bool queued_ = false;                            // whether its chosen edge was among them
-    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // edge that leaves each vertex; invalid if no collapse is possible
-    std::vector<float> cost_;                        // of that collapse
+    bool queued_ = false;                            // whether the edge chosen for requested_ was among these
+    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // by vertex: edge to be collapsed; invalid if none can be
+    std::vector<float> cost_;                        // by vertex: cost of the chosen collapse
     std::vector<std::pair<float, HalfEdges::HalfedgeHandle>> candidates_;
-    std::vector<std::uint8_t> check_contacts_;    // whether the previously chosen collapse was obstructed
-    std::vector<ContactFinder::Change> changed_;  // by the collapse under examination
+    // By vertex: whether a chosen collapse was refused because triangles would touch.
+    std::vector<std::uint8_t> check_contacts_;
+    std::vector<ContactFinder::Change> changed_;  // triangles that the collapse under examination changes
     std::array<std::uint32_t, 2> gone_{};
 };
 
 /// @return whether no triangles touch afterwards
 bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal, bool trust, const RunContext& run) {
-    const CornerTable table(mesh.triangles, mesh.vertices.size());  // throws if invalid; OpenMesh would only print
+    // Throws if the mesh is not manifold, for which OpenMesh would only print a message.
+    const CornerTable table(mesh.triangles, mesh.vertices.size());
     HalfEdges edges;
     build(edges, mesh);
     OpenMesh::Decimater::DecimaterT<HalfEdges> decimater(edges);
@@ -281,7 +288,8 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     decimater.initialize();
     for (int pass = 0; pass < kCommon.rounds && decider.left() > goal.triangles; ++pass) {
         decider.begin_pass();
-        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // two for each collapse
+        // A collapse removes two triangles.
+        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;
     }
     return decider.is_free();
 }
@@ -294,7 +302,7 @@ void decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     if (decimate(work, surface, goal, true, run))
         mesh = std::move(work);
     else
-        decimate(mesh, surface, goal, false, run);  // with a check of each collapse
+        decimate(mesh, surface, goal, false, run);  // now with a contact check before each collapse
     remove_gone(mesh.triangles, mesh.vertices);
 }
 

@@ -8,8 +8,8 @@
 namespace covol::meshing {
 
 struct DecimateGoal {
-    std::size_t triangles = 0;  ///< number of triangles to be kept
-    double tolerance = 0;       ///< voxels; > 0: maximum distance of changed triangles from the surface
+    std::size_t triangles = 0;  ///< decimation ends when at most this number is left
+    double tolerance = 0;       ///< voxels: maximum distance of changed triangles from the surface; 0: no limit
 };
 
 /// Collapses edges into one of their ends by OpenMesh, in the order of increasing displacement of the surface (quadric

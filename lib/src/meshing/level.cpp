@@ -11,12 +11,12 @@
 namespace covol::meshing {
 namespace {
 
-constexpr int kSteps = 6;            // maximum; Newton's method converges in fewer or not at all
-constexpr double kConverged = 1e-4;  // voxels
-constexpr double kNearFace = 0.01;   // voxels: twice the chamfer of extract_mesh()
+constexpr int kSteps = 6;            // maximum; Newton's method in project() converges in fewer steps or not at all
+constexpr double kConverged = 1e-4;  // [voxels] maximum distance of project()'s result from the surface
+constexpr double kNearFace = 0.01;   // [voxels] twice the width of the chamfers that extract_mesh() makes
 
-/// Calls visit(point) for points of a triangle at most `step` apart: for small triangles its centre and the midpoints
-/// of its sides.
+/// Calls visit(point) for points of a triangle that are at most `step` apart: for small triangles the corners, the
+/// midpoints of the sides and the centre.
 template <typename Visit>
 void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, const Visit& visit) {
     const double longest = std::max({length(minus(b, a)), length(minus(c, b)), length(minus(a, c))});
@@ -29,8 +29,8 @@ void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, c
     visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
 }
 
-/// The one of two second differences that has the smaller magnitude, 0 if their signs differ: across a crease of the
-/// distance, no second difference is valid on both sides.
+/// The one of two adjacent second differences that has the smaller magnitude, 0 if their signs differ: a second
+/// difference across a crease of the distance is large, but describes the values on neither side of the crease.
 double minmod(double a, double b) {
     if (a * b <= 0) return 0;
     return std::abs(a) < std::abs(b) ? a : b;
@@ -48,8 +48,9 @@ Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isov
     }
 }
 
-/// The inverse of LatticeClip::position(), whose last layer inside a face and the layer on the face are not one voxel
-/// apart. @param stretch  receives the derivative
+/// Converts a position along an axis, in voxels, to a fractional layer of the grid: the inverse of
+/// LatticeClip::position(). The two differ only next to a face of the clip, because the layer that represents the face
+/// is not exactly one voxel from the last layer inside. @param stretch  receives the derivative
 double Level::lattice(int axis, double index, double& stretch) const {
     stretch = 1;
     for (const bool upper : {false, true}) {
@@ -125,7 +126,7 @@ Level::Sample Level::sample(const Vec3& world) const {
                (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) +
                    t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
 
-    for (int a = 0; a < 3; ++a) {  // subtracts t (1 - t) / 2 times the second difference along each axis
+    for (int a = 0; a < 3; ++a) {  // subtracts t (1 - t) / 2 times the second difference along axis a
         const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
         const auto& bend = cell.bend[a];
         const double first = bend[0] + t[c] * (bend[1] - bend[0]), second = bend[2] + t[c] * (bend[3] - bend[2]);
@@ -155,7 +156,7 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
         const double whole = here.value / std::sqrt(steep);
         const double move = std::clamp(whole, -kCommon.precision_voxels * h, kCommon.precision_voxels * h);
         gone += std::abs(move);
-        if (!(gone <= h)) return {};  // a zero farther away may belong to another sheet
+        if (!(gone <= h)) return {};  // a zero more than a voxel away may belong to another sheet
         p = plus(p, -move / std::sqrt(steep), g);
     }
     return {};
@@ -163,13 +164,14 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
 
 double Level::distance(const Vec3& world) const {
     const Sample here = sample(world);
-    // The slope, 1 for a distance, vanishes midway between two walls.
+    // Value divided by slope. The slope of a distance is 1, but vanishes midway between two walls: the lower bound
+    // prevents a division by 0 there.
     return std::abs(here.value) / std::max(length(here.gradient), kCommon.minority);
 }
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {
     bool farther = false;
-    // The level set is interpolated within cells of a voxel.
+    // Samples a voxel apart suffice, because the level set is interpolated within cells of this size.
     for_each_sample(a, b, c, voxel_size(),
                     [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
     return farther;
@@ -200,7 +202,8 @@ MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
     struct Sum {
         double max = 0, whole = 0, area = 0;
     };
-    // Fixed parts are summed in a fixed order, so that the result is bitwise equal for any number of threads.
+    // Sums over pieces of a fixed size are added in a fixed order, so that the result is bitwise equal for any number
+    // of threads.
     constexpr std::size_t kPiece = 4096;
     std::vector<Sum> sums((mesh.triangles.size() + kPiece - 1) / kPiece);
     tbb::parallel_for(std::size_t(0), sums.size(), [&](std::size_t piece) {

@@ -33,13 +33,14 @@ public:
     [[nodiscard]] Sample sample(const Vec3& world) const;
     [[nodiscard]] double voxel_size() const { return domain_.voxel_size; }
 
-    /// The point of the surface that a search along the gradient finds, at most about a voxel away; none if it finds
-    /// none. Coordinates whose bit is set in `held` do not change.
+    /// The point of the surface that Newton's method along the gradient finds, at most about a voxel away; none if it
+    /// does not converge. Coordinate a does not change if bit a of `held` is set.
     [[nodiscard]] std::optional<Vec3> project(const Vec3& world, unsigned held = 0) const;
     /// Distance of a point from the surface, to first order, world units.
     [[nodiscard]] double distance(const Vec3& world) const;
 
-    /// Whether a point of a triangle is farther from the surface than this number of voxels.
+    /// Whether one of the samples of a triangle, at most a voxel apart, is farther from the surface than this number of
+    /// voxels.
     [[nodiscard]] bool is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const;
 
     /// A bit for each axis along which a point lies on a face of the clip.
@@ -65,19 +66,21 @@ private:
     detail::LatticeClip clip_;
     Domain domain_;
     double isovalue_;
-    mutable std::array<Cell, 64> cells_;  ///< cache of one cell for each index modulo 4
+    mutable std::array<Cell, 64> cells_;  ///< cache: one cell for each combination of the indices modulo 4
     bool clipped_ = false;
-    std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite if there is none
+    std::array<std::array<float, 2>, 3> face_{};  ///< of the clip along each axis, world units; infinite: none
 };
 
-/// The surface of a Level, for any number of threads: each thread uses an own level().
+/// The surface of a Level, for any number of threads: each thread calls level() for an object of its own.
 class Surface {
 public:
-    /// @param level_set  kept by reference; its clip is undone as in extract_mesh().
+    /// @param level_set  kept by reference. If a clip has cut it, the distance to the whole solid is restored around
+    /// the clip's faces (detail::uncut), as in extract_mesh().
     /// @param origin  of the meshes of this surface
     Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin);
     [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_, origin_}; }
-    /// Deviation of a mesh from the surface, in voxels, at points at most a voxel apart; without faces of the clip.
+    /// Deviation of a mesh from the surface, in voxels, at points at most a voxel apart. Triangles on faces of the clip
+    /// are omitted.
     [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
 
 private:
@@ -91,8 +94,8 @@ private:
 /// What a vertex lies on and must not leave when it moves.
 enum Hold : std::uint8_t {
     kFaces = 7,     ///< a bit for each axis: on a face of the clip that is perpendicular to it
-    kOnLevel = 8,   ///< on the isosurface; together with a face, on the face's rim
-    kChamfer = 16,  ///< between two faces of the clip: is not moved on its own
+    kOnLevel = 8,   ///< on the isosurface; with a bit of kFaces: on the rim of that face
+    kChamfer = 16,  ///< on a chamfer, see Level::on_chamfer(): moves only if an edge is collapsed
     kFixed = 32     ///< on the mesh's boundary or without triangles: does not move
 };
 

@@ -19,11 +19,13 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kFewPoints = 2048;  // up to this, testing every leaf is faster than a tree of all crossings
+// Up to this number, testing every leaf for each point is faster than a tree of all crossings.
+constexpr std::size_t kFewPoints = 2048;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Crossings of the surface with edges of the lattice that start at voxels of this leaf with values up to `limit`.
+/// Appends the crossings of the surface with the lattice's edges that start at active voxels of this leaf whose value
+/// (distance) is at most `limit`, in world units.
 void add_crossings(const FloatGrid& surface, const Leaf& leaf, double limit, std::vector<Vec3>& crossings) {
     const auto at = surface.getConstAccessor();
     for (auto value = leaf.cbeginValueOn(); value; ++value) {
@@ -42,7 +44,7 @@ void add_crossings(const FloatGrid& surface, const Leaf& leaf, double limit, std
     }
 }
 
-/// Whether add_crossings() finds crossings within the leaf itself.
+/// Whether add_crossings() finds a crossing on an edge between two voxels of the leaf.
 bool has_crossing(const Leaf& leaf, double limit) {
     const float* values = leaf.buffer().data();
     const LeafMask negative = negative_mask(values);
@@ -57,7 +59,8 @@ bool has_crossing(const Leaf& leaf, double limit) {
     return false;
 }
 
-/// Squared distances, in voxels, from a position to the nearest and the farthest point of the box of a leaf's edges.
+/// Squared distances, in voxels, from a position to the nearest and the farthest point of the box that contains the
+/// lattice's edges that start in a leaf.
 struct LeafReach {
     double nearest = 0, farthest = 0;
     LeafReach(const openvdb::Vec3d& at, const openvdb::Coord& origin) {
@@ -69,7 +72,7 @@ struct LeafReach {
     }
 };
 
-/// A set of crossings that contains the nearest one to each point.
+/// A set of crossings that contains, for each point, the crossing nearest to it.
 std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec3>& points) {
     const double limit = 2 * surface.voxelSize()[0];
     std::vector<const Leaf*> leaves;
@@ -101,7 +104,8 @@ std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec
 
 std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec3>& points) {
     using Range = tbb::blocked_range<std::size_t>;
-    // Less than a voxel from the band's end, corners of a point's cell lie outside the band, where values are clamped.
+    // Within a voxel of the band's end, corners of a point's cell may lie outside the band, where values are clamped,
+    // so that the interpolated value would be wrong.
     const double limit = double(surface.background()) - surface.voxelSize()[0];
     std::vector<double> distances(points.size());
     std::vector<char> is_far(points.size());

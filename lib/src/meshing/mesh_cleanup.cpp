@@ -40,7 +40,7 @@ Point to_point(const std::array<float, 3>& p) { return {p[0], p[1], p[2]}; }
 bool intersect(const TriangleMesh& mesh, std::size_t a, std::size_t b) {
     auto t = mesh.triangles[a];
     auto s = mesh.triangles[b];
-    // Shared corners first, in the same order in both triangles.
+    // Moves the shared corners to the front, in the same order in both triangles.
     int shared = 0;
     for (int i = 0; i < 3; ++i)
         for (int j = shared; j < 3; ++j)
@@ -60,7 +60,7 @@ bool intersect(const TriangleMesh& mesh, std::size_t a, std::size_t b) {
         case 1:
             return CGAL::do_intersect(first, Kernel::Segment_3(corner(s[1]), corner(s[2]))) ||
                    CGAL::do_intersect(second, Kernel::Segment_3(corner(t[1]), corner(t[2])));
-        case 2:  // folded onto each other
+        case 2:  // a common side: whether one triangle is folded flat onto the other
             return CGAL::coplanar(corner(t[0]), corner(t[1]), corner(t[2]), corner(s[2])) &&
                    CGAL::coplanar_orientation(corner(t[0]), corner(t[1]), corner(t[2]), corner(s[2])) == CGAL::POSITIVE;
         default: return true;
@@ -126,7 +126,7 @@ int repair(SurfaceMesh& mesh) {
     return holes;
 }
 
-/// Number of equilateral triangles of this edge length that cover `area`.
+/// Number of equilateral triangles of this edge length that cover `area`; at least 4, as in a tetrahedron.
 std::size_t triangles_of(double edge, double area) {
     return std::size_t(std::max(4.0, area / (std::sqrt(3.0) / 4 * edge * edge)));
 }
@@ -142,7 +142,8 @@ struct Work {
     [[nodiscard]] double voxel_size() const { return domain_of(*level_set).voxel_size; }
 };
 
-/// The larger of the distances in both directions: one detects parts that are lost, the other parts that are added.
+/// The larger of the distances from `before` to `after`, which detect parts that were lost, and from `after` to
+/// `before`, which detect parts that were added.
 MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
     const auto samples = [](const TriangleMesh& mesh) {
         std::vector<Vec3> points;
@@ -186,7 +187,7 @@ void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::
 }
 
 CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
-    constexpr int kRounds = 3;  // of relaxation after decimation
+    constexpr int kRounds = 3;  // rounds of relaxation after decimation
     const TriangleMesh before = work.mesh;
     std::optional<meshing::Surface> surface;
     if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue, work.mesh.origin);
@@ -198,7 +199,7 @@ CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
     return step_report(work, before);
 }
 
-/// One step of Laplacian smoothing with this weight.
+/// A step of Laplacian smoothing: moves each vertex by the fraction `weight` of the way to the mean of its neighbours.
 void smooth_step(TriangleMesh& mesh, double weight) {
     std::vector<std::array<double, 4>> sums(mesh.vertices.size(), std::array<double, 4>{});
     for (const auto& t : mesh.triangles)

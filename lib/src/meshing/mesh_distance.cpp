@@ -55,7 +55,7 @@ public:
         const auto is_own = [&](Triangles::const_iterator t) {
             return begin_ + std::size_t(t - triangles_.begin()) == own;
         };
-        // CGAL does not apply the filter in a tree of a single triangle.
+        // Treated here, because CGAL does not apply the filter `is_own` in a tree of a single triangle.
         if (triangles_.size() == 1 && is_own(triangles_.begin())) return std::numeric_limits<double>::infinity();
         const auto hit = tree_.first_intersection(ray, is_own);
         if (!hit) return std::numeric_limits<double>::infinity();
@@ -123,7 +123,9 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
 
 double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
     constexpr std::size_t kMaxRays = 512;
-    constexpr double kThinFraction = 0.01;  // quantile: ignores single slivers, which do not represent the wall
+    // The result is this quantile of the thicknesses along the rays, not the minimum, because single slivers do not
+    // represent the wall.
+    constexpr double kThinFraction = 0.01;
     const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMaxRays);
     std::vector<double> walls(rays, std::numeric_limits<double>::infinity());
     with_threads(run, [&] {

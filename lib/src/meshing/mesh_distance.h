@@ -10,7 +10,7 @@ namespace covol::detail {
 /// @pre mesh.triangles is not empty
 [[nodiscard]] std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points);
 
-/// @pre there is at least one
+/// Mean, 95th percentile and maximum of the distances. @pre `distances` is not empty
 [[nodiscard]] FitStatistics statistics_of(std::vector<double> distances);
 
 }  // namespace covol::detail

@@ -23,7 +23,7 @@ public:
     MeshRows(const TriangleMesh& mesh, const ImageGeometry& lattice)
         : mesh_(mesh), triangles_of_(lattice.size[2] + 1, 0) {
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v) points_.push_back(lattice.world_to_index(mesh.place(v)));
-        // Triangles sorted by the slices that they reach.
+        // Sorts the triangles by slices. A triangle that reaches several slices occurs in each of them.
         for_each_slice(lattice.size[2], [&](std::uint32_t, int k) { ++triangles_of_[k + 1]; });
         std::partial_sum(triangles_of_.begin(), triangles_of_.end(), triangles_of_.begin());
         order_.resize(triangles_of_.back());
@@ -31,8 +31,8 @@ public:
         for_each_slice(lattice.size[2], [&](std::uint32_t t, int k) { order_[next[k]++] = t; });
     }
 
-    /// Fills the slices [first, first + size[2]), i fastest; 1 inside. @throws Error InvalidInput with the message
-    /// `not_closed` if the mesh is not closed.
+    /// Fills `out` with the slices [first, first + size[2]) of the lattice, i fastest: 1 inside, 0 outside.
+    /// @throws Error InvalidInput with the message `not_closed` if the mesh is not closed.
     void fill(int first, const Index3& size, std::vector<std::uint8_t>& out, const std::string& not_closed) const {
         std::fill(out.begin(), out.end(), std::uint8_t(0));
         std::vector<std::uint8_t> open(std::size_t(size[2]), 0);
@@ -71,8 +71,8 @@ private:
         }
     }
 
-    /// Twice the signed area of (a, b, row) in the plane of j and k, exactly the negative of that of (b, a, row), and
-    /// its sign after the infinitesimal shift of the row.
+    /// Twice the signed area of the triangle of a, b and the row, projected onto the plane of j and k, and its sign
+    /// after the infinitesimal shift of the row. Exchanging a and b exactly negates both.
     struct Turn {
         double area;
         int sign;

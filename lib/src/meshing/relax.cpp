@@ -22,8 +22,9 @@ namespace covol {
 namespace meshing {
 namespace {
 
-// Length of a move, as a fraction of the way to the neighbours' mean: the largest one that reverses no undulation,
-// because the mean of six evenly distributed neighbours is at least -1/2 times an undulation.
+// Length of a move, as a fraction of the way to the mean of the neighbours. It is the largest one that does not reverse
+// an undulation: if a vertex is at height a, the mean of six evenly distributed neighbours is at least at -a/2, and
+// a move by 2/3 of the way leads to a height of at least a - 2/3 (a + a/2) = 0.
 constexpr double kStep = 2.0 / 3.0;
 
 // Minimum decrease of the smallest angle's cosine by a flip: only prevents endless flips between equal angles.
@@ -90,7 +91,8 @@ private:
         return holds_[a] & holds_[b] & holds_[c] & kFaces;
     }
 
-    /// Whether flipping the edge opposite to the corner increases the smallest angle and preserves the surface.
+    /// Whether flipping the edge opposite to the corner increases the smallest angle of its two triangles without
+    /// turning them over or moving them off the level set or the faces of the clip.
     [[nodiscard]] bool worth_flipping(std::uint32_t corner) const {
         const std::uint32_t across = table_.opposite(corner);
         if (across == CornerTable::kNone) return false;
@@ -149,7 +151,7 @@ private:
     std::vector<std::uint32_t> undo_flips(const std::vector<std::uint32_t>& some, std::vector<Flip>& turned) {
         std::vector<std::uint8_t> dirty(mesh_.triangles.size(), 0);
         for (const std::uint32_t t : some) dirty[t] = 1;
-        for (bool grown = true; grown;) {  // includes whole chains of flips with common triangles
+        for (bool grown = true; grown;) {  // adds flips that have a triangle in common with an added one
             grown = false;
             for (const Flip& flip : turned) {
                 std::uint8_t &s = dirty[flip.corner / 3], &t = dirty[flip.across / 3];
@@ -168,7 +170,8 @@ private:
         return changed;
     }
 
-    /// The position of a vertex after a step towards the mean of its neighbours.
+    /// The position of a vertex after a step towards the mean of its neighbours; unchanged if it must not move, or if
+    /// the new position cannot be projected onto the surface.
     [[nodiscard]] Position moved(std::uint32_t v) const {
         const Position& here = mesh_.vertices[v];
         if (holds_[v] & (kFixed | kChamfer)) return here;
@@ -210,7 +213,7 @@ private:
         return face == 0 && levels_.local().is_farther(a, b, c, tolerance_);
     }
 
-    /// Moves all chosen vertices by one step, except those whose triangles would turn over.
+    /// Moves all chosen vertices by one step, except those whose triangles would turn over or leave the surface.
     void move() {
         Positions next = mesh_.vertices;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 512), [&](const auto& range) {
@@ -224,7 +227,7 @@ private:
     /// Moves vertices back to `before` and undoes flips until no triangles touch that did not touch before.
     void undo_contacts(const Positions& before, std::vector<Flip>& turned) {
         finder_.update();
-        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // checking all is then faster
+        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // checking all triangles is then faster
         std::vector<ContactFinder::Pair> contacts =
             all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
         while (!contacts.empty()) {
@@ -256,8 +259,8 @@ private:
         return all;
     }
 
-    /// Collapses the shortest sides of slivers. Moves cannot widen those on a part of the solid, such as an edge, that
-    /// is narrower than a triangle. @return how many
+    /// Collapses the shortest side of each sliver. Moves of vertices alone cannot widen slivers on a part of the solid,
+    /// such as a sharp edge, that is narrower than a triangle. @return the number of collapses
     std::size_t collapse_slivers() {
         finder_.update();
         std::deque<std::uint32_t> queue;
@@ -328,7 +331,7 @@ private:
         if (!edge.select(corner)) return false;
         const std::uint32_t a = edge.kept(), b = edge.lost();
         for (const Position& there : meeting_points(a, b)) {
-            // Requires fewer slivers, and no angle smaller than the smallest one before.
+            // The collapse must reduce the number of slivers, and make no angle smaller than the smallest one before.
             int slivers = 0;
             double narrowest_before = 0, narrowest = 0;
             bool worse = false;
@@ -365,7 +368,8 @@ private:
     mutable tbb::enumerable_thread_specific<Level> levels_;
     std::vector<std::uint8_t> holds_;
     std::vector<std::uint32_t> vertices_, scope_;  // chosen vertices to be moved, and the triangles around them, sorted
-    const double tolerance_;                       // voxels; 0: none
+    // [voxels] maximum distance of triangles from the surface; 0: no limit
+    const double tolerance_;
     const RunContext& run_;
 };
 

@@ -17,7 +17,7 @@ namespace covol::meshing {
     return before[t[0]] != after[t[0]] || before[t[1]] != after[t[1]] || before[t[2]] != after[t[2]];
 }
 
-/// Whether the triangle turns by more than the angle of this cosine.
+/// Whether the normal of the triangle turns by more than the angle with this cosine.
 [[nodiscard]] inline bool is_turned(const Triangle& t, const Positions& before, const Positions& after, double cosine) {
     const Vec3 was = area_normal(before, t), is = area_normal(after, t);
     return has_moved(t, before, after) && !(dot(was, is) > cosine * length(was) * length(is));
@@ -36,12 +36,13 @@ template <typename Bad>
     return result;
 }
 
-/// Moves the corners of these triangles back to `before`. @return all triangles that change, sorted
+/// Moves the corners of the triangles `some` back to `before`. @return all triangles that this changes, sorted
 std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
                                    const Positions& before, Positions& after);
 
-/// Moves the corners of these triangles back, and then those of bad triangles around them, until none is bad.
-/// bad(number) must be false for triangles that have not moved. @return the triangles that change
+/// Moves the corners of the triangles `some` back to `before`, and then those of changed triangles for which
+/// bad(number) is true, until there are none. bad(number) must be false for triangles at their positions in `before`.
+/// @return the triangles that this changes
 template <typename Bad>
 std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vector<std::uint32_t>& some,
                                        const Positions& before, Positions& after, const Bad& bad) {

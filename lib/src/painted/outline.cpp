@@ -45,7 +45,7 @@ private:
     using Step = std::array<int, 2>;
 
     [[nodiscard]] std::size_t nodes() const { return std::size_t(slice_.nx + 1) * std::size_t(slice_.ny + 1); }
-    /// Index of the pair of a voxel and its neighbour in a direction.
+    /// The index of the edge between voxel p and its neighbour p + to.
     [[nodiscard]] std::size_t id(const Step& p, const Step& to) const {
         const int i = p[0] + std::max(to[0], 0), j = p[1] + std::max(to[1], 0);
         return (std::size_t(j) * std::size_t(slice_.nx + 1) + std::size_t(i)) * 2 + (to[0] != 0 ? 0 : 1);
@@ -61,7 +61,7 @@ private:
             const Step ahead{-out[1], out[0]};
             const Step next{p[0] + ahead[0], p[1] + ahead[1]}, corner{next[0] + out[0], next[1] + out[1]};
             if (!inside(next)) {
-                out = ahead;  // turn around this voxel; one that touches at the corner belongs to another patch
+                out = ahead;  // turn around this voxel; one that touches it only at the corner is separate
             } else if (inside(corner)) {
                 p = corner;
                 out = {-ahead[0], -ahead[1]};
@@ -76,7 +76,8 @@ private:
     std::vector<std::uint8_t> seen_;
 };
 
-/// The slice, with the voxels at the image's ends repeated beyond them.
+/// The slice, extended by `by` voxels beyond each end of the image that it reaches; the outermost voxels are repeated
+/// there.
 Slice grown(const Slice& slice, const std::array<bool, 4>& ends, int by) {
     const int left = ends[0] ? by : 0, right = ends[1] ? by : 0, low = ends[2] ? by : 0, high = ends[3] ? by : 0;
     Slice wide;
@@ -90,7 +91,7 @@ Slice grown(const Slice& slice, const std::array<bool, 4>& ends, int by) {
     return wide;
 }
 
-/// Chessboard distance of each voxel to the nearest one outside.
+/// Chessboard distance of each voxel to the nearest voxel outside, in two passes.
 std::vector<int> depths(const Slice& slice) {
     std::vector<int> depth(slice.inside.size(), 0);
     const auto value = [&](int i, int j) {
@@ -117,7 +118,8 @@ std::vector<int> depths(const Slice& slice) {
 Patch classified(std::size_t area, int deepest, double sum) {
     Patch patch;
     patch.area = area;
-    // Depths across a band of 1, 2, 3 and 4 voxels: 1, 1 1, 1 2 1, 1 2 2 1.
+    // The depths across bands of 1, 2, 3 and 4 voxels are 1; 1 1; 1 2 1; 1 2 2 1. Widths of 3 and 4 have the same
+    // maximum and are distinguished by the mean, 4/3 or 3/2.
     const double mean = sum / double(area);
     const bool even = deepest == 2 && mean > (4.0 / 3.0 + 3.0 / 2.0) / 2;
     patch.width = 2 * deepest - (even ? 0 : 1);
@@ -133,7 +135,7 @@ std::vector<Polygon> pixel_outlines(const Slice& slice) { return Walk(slice).go(
 Polygon smoothed(const Polygon& outline) {
     const int count = int(outline.size());
     const int n = std::min(kOutline.window, int(kOutline.window_of_line * count));
-    if (n < 2) return outline;  // a quadratic interpolates three values exactly
+    if (n < 2) return outline;  // a quadratic through three values would change nothing
     const std::vector<double> weights = quadratic_weights(n);
     Polygon line(outline.size());
     for (int v = 0; v < count; ++v) {
@@ -144,7 +146,7 @@ Polygon smoothed(const Polygon& outline) {
         }
         const Vec2& old = outline[std::size_t(v)];
         for (int a = 0; a < 2; ++a)
-            // The centres of the voxels on both sides of the line are half a voxel away.
+            // The line must not pass the centres of the voxels beside it, which are half a voxel away.
             line[std::size_t(v)][a] = std::clamp(mean[a], old[a] - 0.5, old[a] + 0.5);
     }
     return line;

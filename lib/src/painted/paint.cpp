@@ -120,7 +120,8 @@ AxisPaint properties_across(const Paint& paint, int axis) {
         bool has_area = false, has_stroke = false;
         for (const Patch& patch : found[std::size_t(n)]) {
             has_stroke |= patch.stroke;
-            // A patch without a voxel that others surround gives little information about a cross-section.
+            // A patch of width 1, in which no voxel is surrounded by others, gives little information about a
+            // cross-section.
             if (patch.stroke || patch.width == 1) continue;
             has_area = true;
             result.widest = std::max(result.widest, patch.width);

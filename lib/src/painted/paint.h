@@ -9,7 +9,7 @@
 
 namespace covol::painted {
 
-/// The paint of one label in its box.
+/// The paint of one label: which voxels in a box have the label.
 class Paint {
 public:
     Paint(const Image& labels, int label, const VoxelBox& box);
@@ -19,9 +19,10 @@ public:
     [[nodiscard]] const VoxelBox& box() const { return box_; }
     [[nodiscard]] const Index3& image_size() const { return image_; }
 
-    /// @param number  counted from the image's first slice
+    /// @param number  of the slice along the axis, counted from the image's first slice
     [[nodiscard]] Slice slice(int axis, int number) const;
-    /// Whether the box's sides within the slices are the image's ends.
+    /// Whether the four sides of the box that bound a slice across the axis are ends of the image, in the order of
+    /// outlines().
     [[nodiscard]] std::array<bool, 4> ends(int axis) const;
     void erase(int axis, int number);
     /// Positions, in voxels of the image, of the voxels that have a neighbour outside.
@@ -32,7 +33,7 @@ public:
     static std::array<int, 2> plane(int axis) { return {axis == 0 ? 1 : 0, axis == 2 ? 1 : 2}; }
 
 private:
-    /// A part of an image of this size. @param voxels  of the part, at least one
+    /// Paint that consists of the given voxels, at least one. @param image  size of the image
     Paint(const Index3& image, const std::vector<Index3>& voxels);
 
     [[nodiscard]] std::size_t at(const Index3& p) const {
@@ -49,10 +50,10 @@ private:
 
 /// Properties of the slices across one axis.
 struct AxisPaint {
-    std::vector<int> areas;           ///< slices with an area: a patch that is no stroke and wider than 2 voxels
-    std::vector<int> painted;         ///< slices with any paint
-    std::vector<std::size_t> voxels;  ///< by painted slice
-    std::vector<char> small;          ///< by painted slice: only patches that are neither areas nor strokes
+    std::vector<int> areas;           ///< slices with an area, a patch that is no stroke and wider than 2 voxels
+    std::vector<int> painted;         ///< numbers of the slices with any paint
+    std::vector<std::size_t> voxels;  ///< number of painted voxels, by painted slice
+    std::vector<char> small;          ///< by painted slice: whether all patches are neither areas nor strokes
     int widest = 0;                   ///< width of the widest area, voxels
     int longest_run = 0;              ///< largest number of adjacent slices with an area
 };

@@ -35,7 +35,8 @@ std::string size_text(const Index3& n) {
     return std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]);
 }
 
-/// "3, 8, 13, ..., 43 (9 slices)"
+/// The numbers as text. Of more than kMaxListed, only the first six and the last are listed: "3, 8, 13, 18, 23, 28,
+/// ..., 43".
 std::string list_text(const std::vector<int>& numbers) {
     std::ostringstream text;
     for (std::size_t n = 0; n < numbers.size(); ++n) {
@@ -59,7 +60,7 @@ std::string count_text(std::size_t count, const char* what) {
     throw Error(Errc::InvalidInput, text.str());
 }
 
-/// The box of the voxels of each label.
+/// The bounding box of the voxels of each label other than 0.
 std::map<int, VoxelBox> boxes_of(const Image& labels) {
     const Index3 size = labels.geometry().size;
     std::vector<std::map<int, VoxelBox>> slices(static_cast<std::size_t>(size[2]));
@@ -105,7 +106,8 @@ bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) 
            kCommon.clear_ratio * paint.longest_run * geometry.spacing[axis] <= across;
 }
 
-/// Adds small patches that are alone in their slice, away from other paint: tips of tapering structures.
+/// The slices with areas, and those with only small patches and without paint on the adjacent slices: the tips of
+/// tapering structures.
 std::vector<int> with_tips(const AxisPaint& paint) {
     std::vector<int> slices = paint.areas;
     for (std::size_t n = 0; n < paint.painted.size(); ++n) {

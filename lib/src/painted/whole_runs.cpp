@@ -12,8 +12,8 @@ namespace {
 
 /// The first or last slice of a piece of paint.
 struct End {
-    double fraction = 0;  ///< ratio of the end slice's section to the largest one
-    bool blunt = false;   ///< section larger than that of any ellipsoid that ends before the next slice
+    double fraction = 0;  ///< area of the end slice's section, divided by that of the piece's largest section
+    bool blunt = false;   ///< larger section than that of an ellipsoid that ends before the next slice
 };
 
 /// @param areas      of the slices, beginning with the end slice
@@ -36,11 +36,12 @@ End end_of(const std::vector<std::size_t>& areas, bool elongated) {
 /// blunt, 1 if both lie at the image's ends.
 double blunt_ends(const Paint& piece, int axis) {
     const AxisPaint slice_paint = properties_across(piece, axis);
-    // The piece is a stroke, or a wall of strokes on neighbouring slices.
+    // Such a piece is a stroke, or a wall of strokes on neighbouring slices, and has no blunt end.
     if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
         return 0;
     const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
-    // The area of a disc is 1.3 to 1.8 squares of its width.
+    // The area of a disc is 1.3 to 1.8 times widest^2, because the width of a patch is that of its largest inscribed
+    // square.
     const bool elongated = double(largest) > kCommon.clear_ratio * slice_paint.widest * slice_paint.widest;
     std::vector<End> ends;
     if (piece.box().min[axis] > 0) ends.push_back(end_of(slice_paint.voxels, elongated));
@@ -53,7 +54,7 @@ double blunt_ends(const Paint& piece, int axis) {
     return any ? sum / double(ends.size()) : 0;
 }
 
-/// Whether the box is equally long along all axes, up to a voxel.
+/// Whether the sides of a box have the same length in world units, up to the longest edge of a voxel.
 bool is_cube(const VoxelBox& box, const Vec3& spacing) {
     const Index3 n = box.size();
     const std::array<double, 3> side{n[0] * spacing[0], n[1] * spacing[1], n[2] * spacing[2]};
@@ -64,7 +65,7 @@ bool is_cube(const VoxelBox& box, const Vec3& spacing) {
 }  // namespace
 
 std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry) {
-    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // mean ratios, weighted by voxels; voxels of blunt pieces
+    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // mean of blunt_ends(); voxels of blunt pieces
     for (const Paint& piece : paint.pieces())
         for (int a = 0; a < 3; ++a) {
             const double ends = blunt_ends(piece, a);

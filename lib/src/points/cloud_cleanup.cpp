@@ -28,7 +28,7 @@ using Entry = std::pair<Point, std::size_t>;
 using PointMap = CGAL::First_of_pair_property_map<Entry>;
 using Tag = CGAL::Parallel_tag;
 
-constexpr std::size_t kFewest = 7;  // minimum number of points: each then has six neighbours
+constexpr std::size_t kFewest = 7;  // minimum number of points, so that each has six neighbours
 
 class Cleaner {
     // See not_cancelled_ about how CGAL stores its arguments.

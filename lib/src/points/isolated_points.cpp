@@ -45,7 +45,7 @@ std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
     return links;
 }
 
-/// Points joined by links, each group identified by its smallest index.
+/// Groups of points that are joined by links. A group is identified by the smallest index of its points.
 class Groups {
 public:
     explicit Groups(std::size_t points) : sets_(points), size_(points, 1), places_(points) {}
@@ -75,7 +75,7 @@ private:
     [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] >= 4; }
 
     detail::DisjointSets sets_;
-    std::vector<std::size_t> size_;  ///< distinct positions in each group
+    std::vector<std::size_t> size_;  ///< number of distinct positions in each group
     std::size_t places_;
     std::uint32_t largest_ = 0;
     int large_ = 0;
@@ -101,8 +101,8 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     if (points.size() < 2 || points.size() > kCommon.sample) return {};
     const std::vector<Link> links = shortest_tree(points);
     Groups groups(points.size());
-    // Marks at the same position are merged first: the links between them are so short that any other link would be
-    // long in comparison.
+    // Marks at the same position are merged first, because any other link would count as long in comparison with the
+    // links between them.
     const auto first =
         std::size_t(std::upper_bound(links.begin(), links.end(), kCommon.same_place * links.back().length,
                                      [](double length, const Link& link) { return length < link.length; }) -
@@ -113,8 +113,8 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);
         const double next = links[n + 1].length;
-        // For marks on seven structures, both evenly distributed and on outlines, each link is at most 1.4 times as
-        // long as the one before it.
+        // Each link is compared with the next shorter one. For correct marks on seven structures, both evenly
+        // distributed and on outlines, the ratio of their lengths is at most 1.4.
         const bool is_long = next > kCommon.clear_ratio * links[n].length || next > kIsolated.far * usual;
         if (is_long && groups.largest_is_all_but_few()) return points_outside(groups.largest(), groups, points);
     }

@@ -17,7 +17,7 @@ constexpr std::size_t kParallel = 20000;
 struct KdTree::Search {
     Vec3 query;
     double best;
-    bool skip_self;  ///< the query is one of the tree's points, which has not been skipped yet
+    bool skip_self;  ///< the next point at distance 0 is the query itself, which is to be skipped
     const Vec3* at = nullptr;
 };
 

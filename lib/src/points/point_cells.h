@@ -23,12 +23,12 @@ public:
     /// The points, sorted.
     [[nodiscard]] const std::vector<Vec3>& sorted() const { return sorted_; }
     [[nodiscard]] std::size_t cell_count() const { return starts_.size() - 1; }
-    /// The range of a cell's points in the sorted order.
+    /// The range of the points in the n-th cell with points, in the sorted order.
     [[nodiscard]] Range cell(std::size_t n) const { return {starts_[n], starts_[n + 1]}; }
     [[nodiscard]] double edge() const { return edge_; }
 
-    /// Finds ranges of the sorted order that contain all points in the box, and the other points of the cells that
-    /// overlap it; `ranges` is overwritten.
+    /// Sets `ranges` to ranges of the sorted order that contain all points in the box. They also contain points outside
+    /// of the box, but only in cells that overlap it.
     void find(const WorldBox& box, std::vector<Range>& ranges) const;
     /// The same for the cube around `place` with an edge of 2 `reach`.
     void find(const Vec3& place, double reach, std::vector<Range>& ranges) const;
@@ -43,7 +43,7 @@ private:
     std::array<std::int64_t, 3> count_;  // number of cells along each axis
     std::vector<std::uint32_t> order_, starts_;
     std::vector<std::uint64_t> keys_;  // keys of the cells with points, ascending
-    std::vector<std::uint32_t> rows_;  // first key of each row along k; empty if there are too many rows
+    std::vector<std::uint32_t> rows_;  // index of the first key of each row along k; empty if there are too many rows
     std::vector<Vec3> sorted_;
 };
 

@@ -50,11 +50,11 @@ public:
 private:
     [[nodiscard]] Index3 cell(const Vec3& p) const {
         Index3 c;
-        for (int a = 0; a < 3; ++a)  // all farther points are in the last cell: slow, but correct
+        for (int a = 0; a < 3; ++a)  // points beyond the last cell are put into it: slow, but correct
             c[a] = static_cast<int>(std::min((p[a] - lowest_[a]) / radius_, double(1 << 20)));
         return c;
     }
-    // One is added because the neighbours of the lowest cells have the index -1.
+    // 1 is added to each index, because around() also forms the keys of cells with the index -1.
     [[nodiscard]] static std::uint64_t key(const Index3& c) {
         return (std::uint64_t(c[0] + 1) << 42) + (std::uint64_t(c[1] + 1) << 21) + std::uint64_t(c[2] + 1);
     }
@@ -71,7 +71,7 @@ struct Plane {
     [[nodiscard]] double height(const Vec3& p) const { return normal.dot(vector(p) - center); }
 };
 
-/// @param weight  function of a neighbour's squared distance: its weight
+/// @param weight  function of a neighbour's squared distance that returns its weight
 template <typename Weight>
 Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
     Plane plane;
@@ -136,8 +136,8 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     if (!(spacing > 0) || points.empty()) return choice;
     const double widest = second_longest_edge(bounding_box(points)) / 2;
     bool any = false, thin = false;
-    // Starts from the largest size: a ball with a radius of a few spacings contains so few points that a plane fits
-    // them even if they fill space.
+    // The search starts from the largest size, because in a ball with a radius of a few spacings a plane fits the few
+    // points even if these fill space.
     for (int k = kCommon.rounds; k >= 0; --k) {
         const double h = spacing * std::pow(kCommon.growth, k);
         if (k > 0 && kScan.plane_voxels * h > widest) continue;

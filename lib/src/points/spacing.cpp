@@ -35,7 +35,7 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
                        [](const Item& a, const Item& b) { return a.key != b.key ? a.key < b.key : a.index < b.index; });
     std::vector<std::uint8_t> keep(points.size(), 0);
     const double minimum = 0.25 * cell * cell;
-    std::vector<std::size_t> kept;  // indices in the current cell; few, because they are at least cell / 2 apart
+    std::vector<std::size_t> kept;  // kept points of the current cell; few, because they are at least cell / 2 apart
     for (std::size_t n = 0; n < items.size(); ++n) {
         if (n == 0 || items[n].key != items[n - 1].key) kept.clear();
         const Vec3& point = points[items[n].index];

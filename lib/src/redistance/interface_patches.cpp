@@ -30,7 +30,7 @@ constexpr std::array<int, 8> kCornerOffset = [] {
     return offset;
 }();
 
-/// The values of u at the 9^3 corners of a leaf's cells.
+/// The values of u at the 9^3 corners of a leaf's cells; kOutside at corners outside the domain.
 class CellValues {
 public:
     CellValues(const FloatGrid& u, const Domain& domain) : accessor_(u.getConstAccessor()), domain_(box_of(domain)) {}
@@ -40,7 +40,8 @@ public:
         std::array<Block, 8> blocks;
         for (int block = 0; block < 8; ++block)
             blocks[block] = find_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
-        // Most leaves of a wide band lie on one side of the surface.
+        // A quick test, because most leaves of a wide band lie on one side of the surface. A leaf that is cut by the
+        // domain's end is outside there, so that it may have crossings even if all values of u are inside.
         const openvdb::CoordBBox box(origin, origin.offsetBy(kLeafDim));
         const bool is_cut = !domain_.isInside(box), first = blocks[0].first() < 0;
         if (!(is_cut && first) &&
@@ -60,7 +61,7 @@ public:
         return any && !all;
     }
 
-    /// Bit k: the corners of the cell (i, j, k) are not all on one side.
+    /// Bit k is set if the corners of the cell (i, j, k) are not all on one side of the surface.
     [[nodiscard]] unsigned crossed(int i, int j) const {
         const int* row = negative_.data() + i * kSide + j;
         int any = row[0] | row[1] | row[kSide] | row[kSide + 1], all = row[0] & row[1] & row[kSide] & row[kSide + 1];
@@ -69,7 +70,7 @@ public:
         return unsigned(any & ~all) & ((1U << kLeafDim) - 1);
     }
 
-    /// Bit c: corner c of the cell is inside.
+    /// Bit c is set if corner c of the cell is inside.
     [[nodiscard]] int signs(int i, int j, int k) const {
         const int* row = negative_.data() + i * kSide + j;
         const auto along_k = [k](int bits) { return bits >> k & 3; };
@@ -82,7 +83,8 @@ public:
         return std::any_of(kCornerOffset.begin(), kCornerOffset.end(), [at](int c) { return at[c] == kOutside; });
     }
 
-    /// The zero crossing on edge e of the cell, relative to the cell.
+    /// The zero crossing on edge e of the cell, in voxels from the cell's first voxel; halfway along the edge if one of
+    /// its ends lies outside the domain.
     [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
         const float* at = values_.data() + cell_voxel(i, j, k);
         const int a = kEdgeStart[e], b = edge_end(e);
@@ -95,7 +97,7 @@ public:
 private:
     /// The part of one of the eight surrounding leaves or tiles that the cells need.
     struct Block {
-        const float* buffer;  ///< null: a constant value
+        const float* buffer;  ///< null: all values are `constant`
         float constant;
         std::array<int, 3> size;
         float* to;
@@ -103,7 +105,7 @@ private:
         [[nodiscard]] float first() const { return buffer ? buffer[0] : constant; }
         [[nodiscard]] bool is_all(bool negative) const {
             if (!buffer) return (constant < 0) == negative;
-            if (size[1] == kLeafDim && size[2] == kLeafDim) {  // whole slices
+            if (size[1] == kLeafDim && size[2] == kLeafDim) {  // whole slices, which are 64-bit words of a LeafMask
                 const LeafMask mask = size[0] == kLeafDim ? negative_mask(buffer) : LeafMask{negative_slice(buffer)};
                 const std::uint64_t all = negative ? ~std::uint64_t(0) : 0;
                 return std::all_of(mask.begin(), mask.begin() + size[0],
@@ -145,10 +147,10 @@ private:
     FloatGrid::ConstAccessor accessor_;
     openvdb::CoordBBox domain_;
     std::array<float, kSide * kSide * kSide> values_;
-    std::array<int, kSide * kSide> negative_;  // bit k of row i * kSide + j
+    std::array<int, kSide * kSide> negative_;  // bit k of entry i * kSide + j: voxel (i, j, k) is inside
 };
 
-/// Calls visit(i, j, k, case) for the cells with a crossing, in OpenVDB's order.
+/// Calls visit(i, j, k, case) for the cells with a crossing, k fastest as in OpenVDB's leaves.
 template <typename Visit>
 void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) {
     for (int i = 0; i < kLeafDim; ++i)
@@ -178,14 +180,14 @@ Patch make_patch(const Coord& origin, const Point* points, int count, std::uint3
     return patch;
 }
 
-/// Adds `block` and the neighbours whose cells reach into it.
+/// Adds `block` and its seven neighbours at lower indices, whose last cells have corners in `block`.
 void add_with_lower_neighbours(const Coord& block, std::vector<Coord>& blocks) {
     for (int n = 0; n < 8; ++n)
         blocks.push_back(block.offsetBy(-kLeafDim * (n >> 2 & 1), -kLeafDim * (n >> 1 & 1), -kLeafDim * (n & 1)));
 }
 
-/// Adds blocks of 8^3 in tiles that are inside, if something outside may be next to them without a leaf in between: the
-/// domain's end, or a tile of the other sign.
+/// Adds the blocks of 8^3 voxels of inside tiles that may be adjacent to the domain's end or to an outside tile. The
+/// surface may cross the cells between these although there is no leaf.
 void add_tile_blocks(const FloatGrid& u, const openvdb::CoordBBox& domain, std::vector<Coord>& blocks) {
     const auto accessor = u.getConstAccessor();
     const auto meets_outside = [&](const Coord& block) {
@@ -237,7 +239,8 @@ std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
 PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bound) const {
     const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
     const Point arm = p - patch.center;
-    // The patch lies in a cylinder: if that is farther away than `bound`, so is the patch.
+    // The patch lies in the cylinder of its height and radius: if the squared distance of the cylinder is not below
+    // `bound`, neither is that of the patch.
     const float along = dot(arm, patch.normal);
     const float beyond = std::max(0.0F, std::abs(along) - patch.height);
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);

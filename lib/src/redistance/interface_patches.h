@@ -18,7 +18,7 @@ struct Patch {
     std::array<float, 3> normal;  ///< unit; of the whole polygon
     float radius;                 ///< maximum distance of a vertex from the axis (center, normal)
     float height;                 ///< maximum distance of a vertex from the plane through the center
-    std::uint32_t first;          ///< vertices [first, first + count)
+    std::uint32_t first;          ///< its vertices are InterfacePatches::vertices [first, first + count)
     std::uint32_t count;
 };
 
@@ -33,14 +33,14 @@ struct InterfacePatches {
     [[nodiscard]] PatchOutline outline(const Patch& patch) const {
         return {patch.normal.data(), patch.center.data(), vertices.data() + patch.first, static_cast<int>(patch.count)};
     }
-    /// Distance from the centre of voxel `at` to the patch; infinite if its square is not below `bound`.
+    /// Squared distance from the centre of voxel `at` to the patch; infinite if it is not below `bound`.
     [[nodiscard]] PatchHit nearest(const Coord& at, const Patch& patch, float bound) const;
 };
 
 /// Treatment of a surface that reaches the domain's boundary.
 enum class DomainEnd {
-    Closed,  ///< beyond it is outside: the surface is closed half a voxel beyond the last voxel centres
-    Open     ///< it ends there
+    Closed,  ///< everything beyond is outside: the surface is closed half a voxel beyond the last voxel centres
+    Open     ///< the surface ends at the boundary
 };
 
 /// Finds the patches of u; negative is inside.

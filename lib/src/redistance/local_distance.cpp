@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr float kFallTolerance = 5e-3F;  // voxels
+constexpr float kFallTolerance = 5e-3F;  // [voxels] smaller decreases of a distance cause no further visits
 constexpr float kUnclamped = 0.99F;
 
 /// Loads a padded leaf of u. Values are mirrored at the domain's end, so that there is no surface beyond it.
@@ -65,11 +65,12 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
     load_star_from(distance(leaf), across, out);
 }
 
-// Visits leaves in two colours. A leaf is visited again, in the rows next to the changes, if a leaf across a face has
-// changed since.
+// Solves the eikonal equation leaf by leaf. Leaves have two colours like the fields of a chessboard, and those of one
+// colour are visited in parallel. If a leaf across a face has changed since its last visit, a leaf is visited again in
+// the rows next to the changes.
 void LocalDistance::spread() {
     const SchemeKernels& kernel = kernels();
-    std::vector<RowMask> decreased(band_.size() + 1, 0);  // rows that decreased in the last visit
+    std::vector<RowMask> decreased(band_.size() + 1, 0);  // by leaf: rows with values that decreased in its last visit
     bool first = true;
     for (std::atomic<bool> again = true; again; first = false) {
         again = false;
@@ -90,9 +91,9 @@ void LocalDistance::spread() {
     }
 }
 
-// The rows of a leaf next to rows, in the leaves across its faces, that have decreased.
+// The rows of a leaf that are adjacent to decreased rows of the leaves across its faces.
 RowMask LocalDistance::beside(const std::vector<RowMask>& decreased, std::size_t leaf) const {
-    constexpr RowMask kFirst = 0x0101010101010101ULL;  // j = 0
+    constexpr RowMask kFirst = 0x0101010101010101ULL;  // the rows with j = 0
     RowMask across[6];
     for (int face = 0; face < 6; ++face) across[face] = decreased[band_.neighbours(leaf)[kFaceSlots[face]]];
     return across[kMinusI] >> 56 | across[kPlusI] << 56 | (across[kMinusJ] >> 7 & kFirst) |
@@ -103,7 +104,7 @@ void LocalDistance::settle(std::size_t leaf) {
     alignas(64) float d[kPaddedSize], u[kPaddedSize];
     load_distance(leaf, d);
     load_u(u_, band_, domain_, leaf, u);
-    kernels().settle(u, d, cut(leaf));  // its cuts are not needed any more
+    kernels().settle(u, d, cut(leaf));  // overwrites the leaf's cuts, which are not needed any more
 }
 
 }  // namespace covol::detail

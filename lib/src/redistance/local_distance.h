@@ -9,8 +9,8 @@
 
 namespace covol::detail {
 
-/// The half width of the band of a moving surface, in voxels: 3 up to the clamp, and about 2 by which the surface may
-/// move before the band is rebuilt.
+/// The half width of the band of a moving surface, in voxels: 3 in which the distance is not clamped, and about 2 by
+/// which the surface may move before the band is rebuilt.
 inline constexpr double kTrackingWidth = 5.0;
 
 /// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with
@@ -18,18 +18,18 @@ inline constexpr double kTrackingWidth = 5.0;
 /// for nearest points.
 class LocalDistance {
 public:
-    static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
+    static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< number of values in Scratch::cuts for each leaf
     struct Scratch {
-        float* cuts;                           ///< kCuts for each leaf to compute
-        float* distances;                      ///< kLeafSize for each leaf
-        const std::uint32_t* place = nullptr;  ///< position of a leaf among `cuts`; null: the leaf's own number
+        float* cuts;                           ///< kCuts values for each leaf of the zone
+        float* distances;                      ///< kLeafSize values for each leaf of the band
+        const std::uint32_t* place = nullptr;  ///< by leaf: number of its block in `cuts`; null: the leaf's own number
     };
 
-    /// @param u        in voxels; blocks beyond the band contain no distances
-    /// @param zone     by leaf: nonzero if its distances are computed; other leaves contribute |u|
-    /// @param clamp    values of |u| from this on are not distances
+    /// @param u        in voxels; its blocks beyond the band need not contain distances
+    /// @param zone     by leaf: nonzero if its distances are computed; in all other leaves |u| is taken as the distance
+    /// @param clamp    voxels: u was clamped to this magnitude, so that larger distances are not taken from it
     /// @param width    maximum distance, voxels
-    /// @param scratch  its content is not read
+    /// @param scratch  memory for intermediate results and the distances; its initial content is not used
     LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone,
                   const Domain& domain, float clamp, float width, Scratch scratch);
     void compute();

@@ -5,8 +5,8 @@
 
 namespace covol {
 
-/// A level set has no zero crossing where its surface was searched for. Some callers handle this; for all others it is
-/// invalid input.
+/// Thrown if a level set has no zero crossing in the region in which its surface was searched for. Some callers catch
+/// it; for all others it is an Error InvalidInput.
 class NoSurface : public Error {
 public:
     explicit NoSurface(const std::string& message) : Error(Errc::InvalidInput, message) {}

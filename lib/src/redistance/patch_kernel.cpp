@@ -10,8 +10,8 @@
 namespace covol::detail {
 namespace {
 
-// Limits for triangles that have a normal.
-constexpr float kSmallestArea = 1e-24F;  // squared: edges of a millionth of a voxel
+// Triangles with a smaller area or angle get no normal, see PatchFan::make().
+constexpr float kSmallestArea = 1e-24F;  // [voxels^4] squared: edges of a millionth of a voxel
 constexpr float kSmallestAngle = 1e-4F;
 
 template <typename Real>
@@ -67,11 +67,13 @@ COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
 COVOL_INLINE Float8 positive(Float8 x) { return x > 0.0F ? x : Float8{}; }
 
 COVOL_INLINE Float8 ceil_of(Float8 x) {
-    const Float8 whole = __builtin_convertvector(__builtin_convertvector(x, Int8), Float8);  // towards 0
+    // The conversion to integers rounds towards 0.
+    const Float8 whole = __builtin_convertvector(__builtin_convertvector(x, Int8), Float8);
     return whole < x ? whole + 1.0F : whole;
 }
 
-/// Positions first, first + 1, ... along an axis that may lie within `half` of a centre that moves from lane to lane.
+/// The integer positions along an axis within `half` of a centre that differs from lane to lane: first, first + 1, ...,
+/// at most `maximum` of them.
 struct Positions {
     Float8 first;
     int maximum;
@@ -88,7 +90,8 @@ COVOL_INLINE Int8 is_in_leaf(Int8 at) { return (at & ~7) == 0; }
 /// the squared distance `outside` from it.
 COVOL_INLINE Float8 min_square(const PatchCylinder& cylinder, Float8 along, Float8 outside) {
     const Float8 above = positive((along < 0.0F ? -along : along) - cylinder.patch_height);
-    // (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r² avoids the square root.
+    // With q for `outside` and r for the radius: (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r². This bound needs no
+    // square root.
     const Float8 excess = positive(outside - cylinder.patch_radius * cylinder.patch_radius);
     return (1 - 1e-5F) * (above * above + 0.25F * excess * excess / (outside + 1e-12F));
 }
@@ -117,13 +120,13 @@ void PatchFan::make(const PatchOutline& outline) {
         const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
         t.inverse_from = inverse(t.from_from);
         t.inverse_edge = inverse(product(t.edge, t.edge));
-        // The normal of a triangle that is so narrow or small is dominated by rounding. Its edges are as near as its
-        // interior.
+        // The normal of so narrow or small a triangle is dominated by rounding and is not used. The triangle's edges
+        // are practically as near to any position as its interior.
         if (!(t.area > std::max(kSmallestArea, kSmallestAngle * kSmallestAngle * t.from_from * t.to_to))) {
             t.area = 0;
             std::fill_n(t.normal, 3, 0.0F);
         }
-        t.inverse_area = 1 / t.area;  // infinite without a normal, so that nothing is within
+        t.inverse_area = 1 / t.area;  // without a normal infinite: nearest_of() then computes NaN and ignores it
     }
 }
 
@@ -133,7 +136,8 @@ PatchHit nearest_on(const PatchFan& fan, const float arm[3]) {
     return {hit.squared, hit.is_interior};
 }
 
-// Lanes lie along the axis that the polygon faces most: the cylinder's section moves from lane to lane by the slope.
+// The eight lanes are voxels along axis m, the one closest to the polygon's normal. From lane to lane, the centre of
+// the cylinder's section moves by slope_u and slope_v along the other two axes.
 COVOL_CLONES void offer_patch(const PatchOutline& outline, const PatchCylinder& cylinder, std::int32_t index,
                               const PatchLeaf& leaf, PatchFan& fan) {
     constexpr int kStride[3] = {64, 8, 1};

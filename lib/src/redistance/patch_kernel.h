@@ -16,17 +16,17 @@ struct PatchOutline {
 /// The polygon as a fan of triangles around its centre.
 struct PatchFan {
     static constexpr int kMaxTriangles = 12;  ///< a cell has twelve edges
-    /// Of the centre and two consecutive vertices.
+    /// The triangle of the centre and two consecutive vertices.
     struct Triangle {
         float from[3];  ///< the first vertex, from the centre
         float edge[3];  ///< from the first to the second vertex
         float normal[3];
         float from_from, from_to, to_to;   ///< scalar products of the vectors from the centre to the vertices
-        float area;                        ///< the squared length of the normal; 0 if there is none
-        float inverse_area;                ///< infinite if there is none
-        float inverse_from, inverse_edge;  ///< of squared lengths; 0 if there is none
+        float area;                        ///< squared length of the normal; 0 if the triangle is too small for one
+        float inverse_area;                ///< 1 / area; infinite if there is no normal
+        float inverse_from, inverse_edge;  ///< 1 / squared length of `from` and of `edge`; 0 if that length is 0
     };
-    int count = 0;  ///< 0: not made yet
+    int count = 0;  ///< number of triangles; 0 before make()
     Triangle triangles[kMaxTriangles];
 
     PatchFan() {}  // NOLINT: the triangles are large and may not be needed
@@ -72,7 +72,7 @@ struct PatchLeaf {
 
 /// Assigns the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to their current
 /// one.
-/// @param fan  of the outline; made on demand
+/// @param fan  the fan of `outline`; made when it is first needed
 void offer_patch(const PatchOutline& outline, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf,
                  PatchFan& fan);
 

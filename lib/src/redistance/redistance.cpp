@@ -58,7 +58,8 @@ public:
     // candidates from their neighbours.
     void find(const RunContext& run) {
         seed();
-        // Two voxels that are both above the inside of their patches cannot improve each other.
+        // If the nearest points of two voxels both lie within their patches, the voxels do not exchange patches: seed()
+        // has already offered each of them every patch in whose cylinder it lies.
         std::vector<LeafMask> beside(band_.size());
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
         propagate(band_, beside, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
@@ -83,11 +84,12 @@ private:
         return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
     }
 
-    /// Leaves of one colour are at least three leaves apart, so that no two of them write to the same one.
+    /// The cylinders of a leaf's patches reach into the adjacent leaves. Leaves of one colour are processed in
+    /// parallel; along each axis they are a multiple of three leaves apart, so that no two write to the same leaf.
     void seed() {
         std::array<std::vector<std::size_t>, 27> colours;
         for (std::size_t n = 0; n < interface_.leaves.size(); ++n) {
-            const Coord at = interface_.leaves[n] >> 3;  // in leaves
+            const Coord at = interface_.leaves[n] >> 3;  // in units of leaves
             const auto rest = [&](int a) { return std::size_t((at[a] % 3 + 3) % 3); };
             colours[rest(0) * 9 + rest(1) * 3 + rest(2)].push_back(n);
         }
@@ -125,7 +127,8 @@ private:
         offer_patch(interface_.outline(patch), cylinder, static_cast<std::int32_t>(index), known_by(leaf), fan);
     }
 
-    /// Voxels that are not above the inside of a patch, and their neighbours in the leaf and across its faces.
+    /// Voxels whose nearest point does not lie within their patch, and the neighbours of such voxels in the leaf and
+    /// across its faces.
     [[nodiscard]] LeafMask beside_creases(std::size_t leaf) const {
         constexpr LeafMask kNone{};
         const auto outside = [this](std::size_t n) {
@@ -156,8 +159,8 @@ private:
     std::vector<LeafMask> interior_;  ///< voxels whose nearest point lies within their patch
 };
 
-/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one
-/// within.
+/// Bit p: voxel p of the leaf is inside. Voxels beyond the domain have the sign of the nearest voxel of the domain if
+/// `end` is Open; otherwise they are outside.
 LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain,
                      DomainEnd end) {
     LeafMask inside{};

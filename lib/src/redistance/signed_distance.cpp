@@ -19,18 +19,19 @@ namespace {
 
 /// The nearest point of the interface to a voxel beside it, approximately.
 struct Foot {
-    Vec3 point;                   // index space
-    std::array<float, 3> normal;  // towards phi > 0
+    Vec3 point;                   // in index space
+    std::array<float, 3> normal;  // unit vector towards phi > 0
 };
 
 /// Input of the search for the interface.
 struct Field {
     const LeafBand& band;
     const LeafArray<float>& phi;
-    const std::vector<LeafMask>& valid;  // voxels that are used
-    std::vector<LeafMask> inside;        // used voxels with phi < 0
+    const std::vector<LeafMask>& valid;  // by leaf: voxels that are used; all others are ignored
+    std::vector<LeafMask> inside;        // by leaf: used voxels with phi < 0
 
-    /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; none if it is not used.
+    /// phi at the voxel (i, j, k) relative to the leaf's first one. It may lie outside the leaf by one voxel along one
+    /// axis. None if the voxel is not in `valid`.
     [[nodiscard]] std::optional<float> at(std::size_t leaf, int i, int j, int k) const {
         const int slot = neighbour_slot(i >> 3, j >> 3, k >> 3);
         const std::int32_t there = slot == 13 ? std::int32_t(leaf) : band.neighbours(leaf)[slot];
@@ -96,7 +97,9 @@ Foot find_foot(const Field& field, std::size_t leaf, int i, int j, int k, float&
     return foot;
 }
 
-/// Feet are about one voxel apart: a lateral offset up to that is due to the sampling, not to the surface.
+/// The distance of a voxel from a foot and its tangent plane. Feet are about one voxel apart, so that the voxel may lie
+/// up to kSampling voxels beside the axis of its nearest foot only because of the sampling: this lateral offset is
+/// ignored, and only what exceeds it is added.
 float distance_to_foot(const Foot& foot, const Coord& voxel) {
     constexpr float kSampling = 0.75F;
     float squared = 0, along = 0;
@@ -114,7 +117,7 @@ struct Interface {
     std::vector<LeafMask> inside;    ///< by leaf: phi < 0
     std::vector<LeafMask> beside;    ///< by leaf: voxels with a foot
     std::vector<Foot> feet;          ///< by leaf, then by voxel
-    std::vector<float> distances;    ///< of these voxels from their feet
+    std::vector<float> distances;    ///< distances of these voxels from their feet
     std::vector<std::size_t> first;  ///< by leaf: index of its first foot
 
     [[nodiscard]] std::vector<Vec3> points() const {

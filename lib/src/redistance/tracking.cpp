@@ -24,7 +24,8 @@ namespace {
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 constexpr float kWidth = float(kTrackingWidth);
 
-/// Clamps the values; tiles, which are far from the surface, and the background get the limit.
+/// Clamps the values of leaves. Tiles, which are far from the surface, and the background get the limit and keep their
+/// sign.
 void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) {
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         float* values = tree.probeLeaf(band.origin(leaf))->buffer().data();
@@ -115,11 +116,11 @@ bool recompute(const LeafBand& region, const std::vector<unsigned char>& zone, F
     return true;
 }
 
-constexpr float kNear = 1.5F;  // voxels
+constexpr float kNear = 1.5F;  // [voxels] near_distance() is used up to this distance
 
 /// The distance of a voxel next to the front, to second order: |u| / |grad u|, in voxels. Infinity if u is not close to
-/// a distance, or has a kink, so that upwind and central differences disagree.
-/// @param u  the voxel in a padded buffer
+/// a distance, or has a kink: upwind and central differences then disagree.
+/// @param u  points to the voxel's value in a padded buffer
 float near_distance(const float* u) {
     constexpr float kKink = 0.25F, kNone = std::numeric_limits<float>::infinity();
     if (!(std::abs(*u) < kNear * float(kSteepest))) return kNone;
@@ -140,7 +141,7 @@ float near_distance(const float* u) {
 
 std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
                                       double clamp) {
-    // The region has one more ring of leaves, whose values are only read.
+    // `region` has one more ring of leaves than `changed`. Their values are only read.
     std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());
@@ -165,8 +166,8 @@ void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
 }
 
 void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& run) {
-    // The stencil reads beyond the band, where the distance has to continue: a plateau would spread by a voxel per
-    // step.
+    // The stencil of the flow reads one voxel beyond the active band. The distance is therefore computed farther: a
+    // constant value there would spread into the band by a voxel per step.
     constexpr double kReach = kFreeWidth + 0.9;
     static_assert(kReach < kLeafDim);
     const FloatGridPtr next = redistance(u, domain, kReach, DomainEnd::Open, u.getName().c_str(), run);

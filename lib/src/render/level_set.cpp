@@ -11,7 +11,8 @@
 namespace covol::figure {
 namespace {
 
-/// The extent of the centres of voxels within a voxel of the surface; add(centre, extent) enlarges an extent.
+/// The extent of the centres of the voxels that are within a voxel of the surface. add(centre, extent) must enlarge the
+/// extent such that it contains the centre.
 template <typename Add>
 Extent extent_of(const FloatGrid& grid, const Add& add) {
     const openvdb::tree::LeafManager<const FloatGrid::TreeType> leaves(grid.tree());

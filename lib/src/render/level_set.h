@@ -12,13 +12,14 @@ namespace covol::figure {
 inline openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
 /// The cubic B-spline whose coefficients are the voxels: twice differentiable, so that normals do not show the voxels.
-/// For a ball of radius R, its zero lies h/(3R) voxels inside, where h is the voxel size. For one thread.
+/// It smooths the level set: its zero lies h/(3R) voxels inside the surface of a ball of radius R, where h is the voxel
+/// size. For one thread.
 class SmoothField {
 public:
     explicit SmoothField(const FloatGrid& grid);
     struct Sample {
         double value;   ///< world units
-        Vec3 gradient;  ///< world
+        Vec3 gradient;  ///< with respect to world coordinates
     };
     [[nodiscard]] Sample at(const Vec3& world);
     /// Only the value; outside the band that of the nearest voxel.

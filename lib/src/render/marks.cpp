@@ -14,7 +14,7 @@ void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& ca
     struct Seen {
         double x, y, depth;
         Color color;
-        bool is_behind_translucent;  // behind a translucent surface
+        bool is_behind_translucent;
     };
     std::vector<Seen> seen;
     const double reach = slack + 1.5 * radius * camera.pixel;

@@ -17,7 +17,7 @@ struct Ball {
 /// Radius of the balls in pixels: proportional to the height of the text, and smaller if there are more marks.
 [[nodiscard]] double mark_radius(double text, std::size_t count);
 
-/// Draws the balls that no surface hides; one may lie up to `slack` (world units) behind the surface that it marks.
+/// Draws the balls that no surface hides. Balls up to `slack` (world units) behind a surface count as lying on it.
 void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer, double radius,
                 double slack);
 

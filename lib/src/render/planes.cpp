@@ -12,8 +12,8 @@
 namespace covol::figure {
 namespace {
 
-/// For each axis of the image the closest world axis, and whether they have opposite directions. The three world axes
-/// are different.
+/// For each axis of the image the closest world axis, and whether they have opposite directions. Each world axis is
+/// assigned to one axis of the image.
 struct Directions {
     std::array<int, 3> world{0, 1, 2};
     std::array<bool, 3> reversed{false, false, false};
@@ -87,8 +87,8 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
         constexpr std::array<std::array<int, 2>, 3> kLaid{{{2, 1}, {0, 2}, {0, 1}}};
         return {axis, index, kLaid[axis][0], kLaid[axis][1], false, false};
     }
-    // The right side of the picture is the patient's left, in sagittal planes the back; the lower side is the feet, in
-    // axial planes the back.
+    // As in radiology: the right side of the picture is the patient's left, in sagittal planes the patient's back; the
+    // lower side is towards the feet, in axial planes towards the back.
     const Directions directions = directions_of(scene.image->geometry());
     const int normal = directions.world[axis], right = normal == 0 ? 1 : 0, down = normal == 2 ? 1 : 2;
     Plane plane{axis, index, 0, 0, false, false};
@@ -106,10 +106,12 @@ Plane plane_across(int axis, double index, const RenderScene& scene) {
 }
 
 MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeometry& geometry) {
-    constexpr double kNear = 0.1;      // maximum distance from an integer index
-    constexpr double kOnSlices = 0.9;  // minimum fraction of the marks
+    constexpr double kNear = 0.1;      // [slices] maximum distance of a mark from the slice on which it was set
+    constexpr double kOnSlices = 0.9;  // minimum fraction of the marks that lie on slices
     MarkedSlices found;
-    double sparsest = 0.6;  // marked slices / all slices from the first to the last of them; only fewer count
+    // An axis is chosen only if the marked slices are fewer than this fraction of the slices from the first to the last
+    // marked one.
+    double sparsest = 0.6;
     for (const int a : {2, 1, 0}) {
         std::set<int> slices;
         std::size_t on = 0;
@@ -164,7 +166,7 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
         int cut = 0;
         for (const WorldBox& box : boxes) {
             const auto range = inside(range_of(box, axis, geometry), axis, geometry);
-            // Near a box's end, a slice only cuts the tip of the structure.
+            // Near a box's end, a slice cuts only the tip of the structure and is not counted as cutting it.
             const double tip = 0.15 * (range[1] - range[0]);
             cut += slice >= range[0] + tip && slice <= range[1] - tip ? 1 : 0;
         }

@@ -26,7 +26,7 @@ constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // margins, as fractio
 // Opacity of structures around others, and of all structures if the image's volume is to be visible inside.
 constexpr double kEnclosingOpacity = 0.35, kVolumeOpacity = 0.16;
 constexpr double kVolumeDensity = 4.0;
-constexpr double kBytesPerPixel = 90;  // of colours, depths and normals while a picture is made
+constexpr double kBytesPerPixel = 90;  // memory for colours, depths and normals while a picture is made
 constexpr int kPlanes = 3;
 constexpr std::size_t kMaxBalls = 3000;
 
@@ -74,7 +74,8 @@ public:
     }
 
 private:
-    /// Structures that enclose others are translucent.
+    /// Structures that enclose others are translucent, so that these are visible. So are all structures if the image's
+    /// volume is shown, unless their opacity is stated.
     [[nodiscard]] double opacity_of(std::size_t n) const {
         if (const auto& stated = scene_.structures[n].opacity) return *stated;
         if (options_.volume) return kVolumeOpacity;
@@ -110,7 +111,8 @@ private:
                         std::lround(std::clamp(geometry.world_to_index(*options_.at)[a], 0.0, geometry.size[a] - 1.0)));
                 across[a] = plane_across(a, index, scene_);
             }
-            // In the first arrangement, the first plane shares a side with each of the others.
+            // In the first arrangement of ways(), the plane beside the first one should have the same vertical axis as
+            // that one, and the plane below it the same horizontal axis.
             choose_first(across);
         }
         window_ = scene_.image->percentiles(kLow, kHigh);
@@ -125,9 +127,9 @@ private:
         }
     }
 
-    /// Puts the planes into the order of ways(). In the first arrangement the second plane is beside the first one and
-    /// has the same vertical axis; in the others its axes are exchanged, unless they are anatomical. Slices are ordered
-    /// column by column.
+    /// Puts the planes into the order of the parts in ways(). In the first arrangement the second plane is beside the
+    /// first one and has the same vertical axis; in the others its axes are exchanged, unless they are anatomical. With
+    /// the option `slices`, the planes are numbered row by row, but the parts column by column.
     void arrange(int way) {
         if (options_.slices) {
             std::vector<Plane> ordered;
@@ -136,7 +138,7 @@ private:
                 for (std::size_t n = c; n < planes_.size(); n += columns) ordered.push_back(planes_[n]);
             planes_ = ordered;
         } else if (way == 0) {
-            std::swap(planes_[1], planes_[2]);  // the first column contains the first and the third
+            std::swap(planes_[1], planes_[2]);  // the first column contains the first and the third plane
         } else {
             planes_[1] = upright();
         }
@@ -369,7 +371,7 @@ private:
     double text_;
     int gap_;
     double radius_ = 3;
-    std::vector<WorldBox> boxes_;  // of the surfaces
+    std::vector<WorldBox> boxes_;  // bounding boxes of the surfaces, world units
     std::vector<Body> bodies_;
     std::vector<Vec3> all_marks_;
     Region region_;

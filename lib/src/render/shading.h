@@ -19,7 +19,7 @@ struct Lights {
 
     static constexpr double kAmbient = 0.34, kKey = 0.64, kFill = 0.16, kShine = 0.10, kGloss = 30, kRim = 0.25;
 
-    /// @param normal  unit, on the eye's side
+    /// @param normal  unit vector on the side of the surface that faces the eye
     [[nodiscard]] Color shade(const Color& color, const Vec3& normal) const {
         const double light =
             kAmbient + kKey * std::max(0.0, dot(normal, key)) + kFill * std::max(0.0, dot(normal, fill));

@@ -17,8 +17,10 @@ namespace {
 
 constexpr std::size_t kMaxMarks = 120;
 constexpr int kMaxSamples = 4;  // samples of the image along each side of a pixel
-constexpr float kFar = 1e6F;    // pixels
-constexpr double kFlat = 0.2;   // minimum slope within the plane: below it, the surface is nearly parallel to the plane
+constexpr float kFar = 1e6F;    // pixels: initial distance of an outline
+// Minimum slope of the level set within the plane by which its values are divided. If the slope is smaller, the surface
+// is nearly parallel to the plane.
+constexpr double kFlat = 0.2;
 
 /// The image's values in one plane.
 class Slice {
@@ -47,7 +49,7 @@ public:
         size_ = {size[plane.across], size[plane.down]};
     }
 
-    /// Bilinear, at indices along the plane's two axes.
+    /// The bilinearly interpolated value at a position, given as indices along the plane's two axes.
     [[nodiscard]] double at(double u, double v) const {
         const auto [i, s] = place(u, 0);
         const auto [j, t] = place(v, 1);
@@ -152,7 +154,8 @@ private:
         }
     };
 
-    /// Adds the distances from the outline, the zero of a level set: its value divided by its slope within the plane.
+    /// Adds the distances from the outline of structure n, the zero of its level set: the value divided by the slope
+    /// within the plane.
     void find_outline(int n, std::vector<Nearest>& nearest) const {
         const int width = at_.width + 2, height = at_.height + 2;  // one more pixel on every side, for slopes
         std::vector<float> values(std::size_t(width) * height);
@@ -172,7 +175,8 @@ private:
         });
     }
 
-    /// Lines have the same width everywhere. Along a border of two structures, each line lies on its own side of it.
+    /// Draws the outlines with the same width everywhere. Along a common border of two structures, each outline lies on
+    /// the side of its own structure, so that both are visible.
     void draw_outlines() const {
         std::vector<Nearest> nearest(std::size_t(at_.width) * at_.height);
         for (int n = 0; n < int(scene_.structures.size()); ++n) find_outline(n, nearest);
@@ -253,7 +257,7 @@ private:
         draw_text(canvas_, at_.right() - pad, middle_y, across[plane_.mirror_across ? 1 : 0], style);
         style.align = Align::Center;
         draw_text(canvas_, middle_x, at_.bottom() - pad, down[plane_.mirror_down ? 1 : 0], style);
-        // The upper letter is below the plane's name if that extends beyond the middle.
+        // If the plane's name extends to the middle, the upper letter is placed below the name.
         const bool under = at_.x + 2 * pad + text_width(name, size) > middle_x - 0.5 * size;
         draw_text(canvas_, middle_x, at_.y + pad + cap + (under ? 1.2 * size : 0), down[plane_.mirror_down ? 0 : 1],
                   style);

@@ -12,9 +12,9 @@ namespace covol::figure {
 /// A plane perpendicular to one of the image's axes, with its orientation on the picture.
 struct Plane {
     int axis = 2;                                     ///< the axis to which it is perpendicular
-    double index = 0;                                 ///< along that axis
+    double index = 0;                                 ///< index of the voxels along `axis`
     int across = 0, down = 1;                         ///< axes of the image that run to the right and down
-    bool mirror_across = false, mirror_down = false;  ///< the index increases to the left, upwards
+    bool mirror_across = false, mirror_down = false;  ///< whether the index increases to the left, upwards
 
     friend bool operator==(const Plane&, const Plane&) = default;
 };
@@ -28,15 +28,15 @@ struct Region {
     }
 };
 
-/// The structures and a margin around them, limited to the image or the structures' own extent.
+/// The structures and a margin around them. The margin ends at the image's end unless a structure extends beyond it.
 [[nodiscard]] Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& geometry, double margin);
 
 /// The plane perpendicular to an axis; oriented as in radiology if the axes are anatomical, else along the image's
 /// axes.
 [[nodiscard]] Plane plane_across(int axis, double index, const RenderScene& scene);
 
-/// The slices on which a person has set marks: perpendicular to the axis along which the marks have few indices, which
-/// are integers. If there is no such axis, `axis` is -1.
+/// The slices on which a person has set marks. They are perpendicular to the axis along which the marks have few
+/// different indices, which are integers. If there is no such axis, `axis` is -1.
 struct MarkedSlices {
     int axis = -1;
     std::vector<int> slices;  ///< sorted
@@ -54,16 +54,17 @@ struct MarkedSlices {
 
 /// How slices are drawn.
 struct SliceStyle {
-    double pixel = 1;                    ///< world units
+    double pixel = 1;                    ///< size of a pixel, world units
     double text = 16;                    ///< size of the font, pixels
-    Color beyond{0, 0, 0};               ///< beyond the image's end
+    Color beyond{0, 0, 0};               ///< colour beyond the image's end
     std::array<double, 2> window{0, 1};  ///< values shown as black and white
     std::vector<Plane> others;           ///< planes whose intersections with this one are drawn
     double mark_radius = 3;              ///< pixels
 };
 
-/// Draws the plane's part that lies in the region: the image, the outlines, the marks within half a slice, its name,
-/// and letters at its edges if the axes are anatomical.
+/// Draws the plane's part that lies in the region: the image, the outlines, the marks whose distance from the plane is
+/// at most half of the image's largest spacing, the plane's name, and letters of the directions at its edges if the
+/// axes are anatomical.
 void draw_slice(Canvas& canvas, const Rect& at, const Plane& plane, const Region& region, const RenderScene& scene,
                 const SliceStyle& style, const RunContext& run);
 
@@ -75,7 +76,7 @@ void draw_slice(Canvas& canvas, const Rect& at, const Plane& plane, const Region
 /// anatomical axes.
 [[nodiscard]] std::array<std::string, 2> letters_of(int axis, const ImageGeometry& geometry);
 
-/// "slice 16, z = 56 µm"
+/// The plane's name, for example "slice 16, z = 56 µm".
 [[nodiscard]] std::string name_of(const Plane& plane, const RenderScene& scene);
 
 }  // namespace covol::figure

@@ -20,18 +20,20 @@ namespace {
 
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
-constexpr int kMaxHits = 12;                             // of one ray with one translucent body
-constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
-constexpr double kOneWall = 1;                           // voxels: bodies closer than that have a common wall
-constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
-constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
-constexpr double kOpaque = 0.999;                        // fraction from which on everything behind is hidden
+constexpr int kMaxHits = 12;  // maximum number for one ray and one translucent body
+// [voxels] Distance up to which a position counts as on the surface, and step of the search along a grazing ray.
+constexpr double kOnSurface = 0.02, kFinestStep = 0.25;
+constexpr double kOneWall = 1;  // [voxels] bodies closer than that have a common wall
+// Cosine between the ray and the normal: below it, the ray grazes the surface.
+constexpr double kGrazing = 0.2;
+constexpr int kFiner = 4;          // number of rays along each side of a pixel at an edge
+constexpr double kOpaque = 0.999;  // fraction from which on everything behind is hidden
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
 constexpr double kCosEdge = 0.8;  // cosine between neighbouring pixels' normals: below it, there is an edge
 constexpr int kRows = 8;
 
 struct Hit {
-    double depth = kMissing;  // towards the eye
+    double depth = kMissing;  // from the camera's center towards the eye, world units
     Vec3 normal{0, 0, 0};
     int body = -1;
     bool enters = true;  ///< whether the ray enters the body here
@@ -67,7 +69,7 @@ public:
             if (is_behind_neighbour(hit)) continue;
             const Body& body = bodies_[hit.body];
             const double facing = std::abs(dot(hit.normal, camera_.basis.to_eye));
-            // A slanted layer is thicker along the ray.
+            // A slanted layer is more opaque, because the ray's way through it is longer.
             const double fraction = body.opacity >= 1 ? 1 : 1 - std::pow(1 - body.opacity, 1 / std::max(0.2, facing));
             const double adds = (1 - seen.fraction) * fraction;
             seen.color = sum(seen.color, scaled(lights_.shade(body.color, hit.normal), adds));
@@ -97,7 +99,7 @@ private:
 
     void find_hits(int n, const Vec3& middle) {
         const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
-        double from = openvdb::math::Delta<double>::value();  // before everything that the ray meets
+        double from = openvdb::math::Delta<double>::value();  // start of the ray, before everything that it meets
         const double h = fields_[n].voxel_size();
         const int maximum = bodies_[n].opacity >= 1 ? 1 : kMaxHits;
         for (int tries = 0, found = 0; tries < kMaxHits && found < maximum; ++tries) {
@@ -113,8 +115,9 @@ private:
         }
     }
 
-    /// The intersection of the ray with the smooth field's zero, near that with the interpolated voxels. Has no body if
-    /// the ray only grazes the voxels, because their outline would be visible otherwise.
+    /// The intersection of the ray with the zero of the smooth field, close to its intersection at t with the linearly
+    /// interpolated voxels. The result has no body (-1) if the ray grazes only the latter surface: otherwise single
+    /// voxels would be visible at the outline.
     Hit refined(int n, const Vec3& origin, double t) {
         SmoothField& field = fields_[n];
         const Vec3 along = times(-1, camera_.basis.to_eye);
@@ -145,7 +148,8 @@ private:
     }
 
     const std::vector<Body>& bodies_;
-    std::vector<Intersector> intersectors_;  // each stores its current ray
+    // One for each body. They store the current ray, so that each thread needs its own.
+    std::vector<Intersector> intersectors_;
     const Camera& camera_;
     double reach_;
     Lights lights_;

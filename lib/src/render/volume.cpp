@@ -13,7 +13,7 @@ namespace {
 constexpr double kMaxVoxels = 3.2e7;
 constexpr double kMaxRays = 1.2e6;
 constexpr int kMaxSteps = 1200;
-constexpr double kDark = 0.12;  // values up to this one are treated as empty
+constexpr double kDark = 0.12;  // values, 0 to 1, up to which voxels are transparent
 
 Index3 choose_step(const VoxelBox& region, const Vec3& spacing) {
     Index3 step{1, 1, 1};
@@ -107,7 +107,8 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
     const double step = std::max(0.7 * finest, std::sqrt(longest) / kMaxSteps);
     const double absorption = 6 * density * step / thinnest;
     const Vec3 zero = g.world_to_index({0, 0, 0});
-    const Vec3 slope = times(-1, minus(g.world_to_index(camera.basis.to_eye), zero));  // of the index along the ray
+    // Change of the index per world unit along the ray.
+    const Vec3 slope = times(-1, minus(g.world_to_index(camera.basis.to_eye), zero));
     std::vector<Color> colors(std::size_t(width) * height);
     std::vector<float> fractions(colors.size());
     tbb::parallel_for(0, height, [&](int y) {

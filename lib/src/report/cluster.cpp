@@ -11,10 +11,11 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kGrowth = 1.15;  // of the cell size per iteration, until the triangles are few enough
-// First cell size, relative to the one at which this is expected: a smaller one costs iterations, a larger one detail.
+constexpr double kGrowth = 1.15;  // factor of the cell size per iteration, until the triangles are few enough
+// First cell size, as a fraction of the one at which the triangles are expected to be few enough. A smaller fraction
+// costs iterations, a larger one detail.
 constexpr double kFirstFraction = 0.8;
-constexpr std::uint64_t kAxisBits = 21;  // of a cell's number, per axis
+constexpr std::uint64_t kAxisBits = 21;  // bits of a cell's number for each axis
 
 struct Box {
     std::array<float, 3> min{}, max{};
@@ -36,7 +37,7 @@ double area_of(const TriangleMesh& mesh) {
     return area;
 }
 
-/// The number of each vertex's cell, in the order of first occurrence.
+/// The number of each vertex's cell. Cells are numbered in the order in which they first occur.
 struct Cells {
     std::vector<std::uint32_t> of_vertex;
     std::size_t count = 0;
@@ -56,7 +57,7 @@ Cells cells_of(const TriangleMesh& mesh, const Box& box, double edge) {
     return cells;
 }
 
-/// Triangles of three different cells each, without duplicates.
+/// The triangles whose corners lie in three different cells, as numbers of these cells, without duplicates.
 std::vector<std::array<std::uint32_t, 3>> triangles_of(const TriangleMesh& mesh, const Cells& cells) {
     std::vector<std::array<std::uint32_t, 3>> triangles;
     for (const auto& t : mesh.triangles) {
@@ -70,7 +71,7 @@ std::vector<std::array<std::uint32_t, 3>> triangles_of(const TriangleMesh& mesh,
     return triangles;
 }
 
-/// Means over the cells.
+/// The mean of the vertices' values in each cell.
 std::vector<float> means(const std::vector<float>& values, const Cells& cells) {
     std::vector<double> sum(cells.count);
     std::vector<int> count(cells.count);

@@ -11,7 +11,7 @@ namespace covol::detail {
 /// A mesh for display, with values at its vertices.
 struct PageMesh {
     TriangleMesh mesh;
-    std::vector<std::pair<std::string, std::vector<float>>> values;  ///< name, one for each vertex
+    std::vector<std::pair<std::string, std::vector<float>>> values;  ///< name, and one value for each vertex
 };
 
 /// Vertex clustering: merges the vertices of each cell of a lattice into one of them, the nearest to their mean, with

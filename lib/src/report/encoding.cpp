@@ -40,7 +40,7 @@ std::string pack(const std::vector<std::uint8_t>& bytes) {
 std::string safe_in_script(std::string_view json) {
     std::string text;
     text.reserve(json.size());
-    for (const char c : json) switch (c) {  // outside of strings, JSON has none of these
+    for (const char c : json) switch (c) {  // JSON contains these only in strings, where they may be escaped
             case '<': text += "\\u003c"; break;
             case '>': text += "\\u003e"; break;
             case '&': text += "\\u0026"; break;

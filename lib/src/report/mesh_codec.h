@@ -16,8 +16,8 @@ struct CodedMesh {
     /// For each axis x, y, z: the low bytes, then the high bytes, of the differences between each vertex and the
     /// previous one, modulo 2^16. Vertices are in the order in which the triangles use them.
     std::vector<std::uint8_t> positions;
-    /// For each corner the number of vertices used so far, minus the number of its vertex: 0 is a new vertex. 7 bits
-    /// per byte, the lowest first; all bytes of a number except the last have the bit 128.
+    /// For each corner a number: the count of vertices used so far, minus the number of the corner's vertex, so that
+    /// 0 is a new vertex. Numbers have 7 bits per byte, the lowest first; all bytes except the last have the bit 128.
     std::vector<std::uint8_t> corners;
     std::vector<std::uint32_t> from;  ///< for each coded vertex its number in the mesh
 };

@@ -14,10 +14,10 @@ namespace covol {
 namespace {
 
 constexpr double kMaxOfCode = 65535;
-constexpr int kFastest = 1;  // zlib's level: a user waits for it
+constexpr int kFastest = 1;  // zlib's level of compression: a user waits for the slice
 constexpr int kMaxPixels = 1024;
 constexpr int kTile = 32;           // pixels: the box of voxels around a tile is small, whatever its direction
-constexpr double kMaxOfTile = 1e7;  // voxels of that box
+constexpr double kMaxOfTile = 1e7;  // maximum number of voxels in that box
 
 Vec3 place_of(const ObliqueRequest& wanted, double x, double y) {
     Vec3 place{};
@@ -67,7 +67,8 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
         throw Error(Errc::InvalidOptions,
                     "oblique slice: expected 1 to " + std::to_string(kMaxPixels) + " pixels along each side");
     const double pixel = std::clamp(std::min(length(wanted.right), length(wanted.down)), 1.0, double(1 << 20));
-    // Rounded down to a power of two, as factors of levels usually are.
+    // The size of a pixel, in voxels, is rounded down to a power of two, because the factors of levels usually are
+    // powers of two.
     const std::size_t at = image.level_for(1 << int(std::floor(std::log2(pixel))));
     const ImageLevels::Level& level = image.levels()[at];
     const Index3& whole = image.levels().front().size;

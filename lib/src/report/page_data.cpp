@@ -16,7 +16,7 @@ namespace covol {
 namespace {
 
 constexpr double kMaxCode = 65535;
-constexpr int kFast = 1;  // zlib's level: a user waits for it
+constexpr int kFast = 1;  // zlib's level of compression: a user waits for the slice
 
 template <typename T>
 void append(std::vector<std::uint8_t>& bytes, T value) {
@@ -29,10 +29,10 @@ void append(std::vector<std::uint8_t>& bytes, T value) {
 /// The position of a slice's pixels in a level of the image.
 struct SlicePlan {
     std::size_t level = 0, along = 2, right = 0, down = 1;
-    std::int32_t at = 0;                ///< the level's voxel
-    Index3 size{0, 0, 0};               ///< of the level
+    std::int32_t at = 0;                ///< the slice's index in the level
+    Index3 size{0, 0, 0};               ///< of the level, voxels
     std::int32_t across = 1, rows = 1;  ///< voxels of the level per pixel, right and down
-    SliceRequest::Part part;            ///< of the slice's pixels
+    SliceRequest::Part part;            ///< the pixels of the slice that are encoded
 };
 
 SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
@@ -104,7 +104,8 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
                           const RunContext& run) {
     const SlicePlan plan = plan_slice(image, wanted);
     const int width = plan.part.width, height = plan.part.height;
-    if (!image.is_in_chunks() && image.image().chunks()) {  // a compressed stream: the slice is decoded once, here
+    // The image is a compressed stream: the slice is decoded once here, and not by each of the parallel tasks.
+    if (!image.is_in_chunks() && image.image().chunks()) {
         VoxelBox slice = image.image().held();
         slice.min[plan.along] = slice.max[plan.along] = plan.at;
         image.image().load(slice, run);

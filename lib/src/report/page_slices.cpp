@@ -16,7 +16,7 @@ namespace covol::detail {
 namespace {
 
 constexpr double kLow = 0.002, kHigh = 0.998;  // intensity percentiles shown as black and white
-constexpr double kMargin = 0.15;               // around the positions, as a fraction of their box's longest side
+constexpr double kMargin = 0.15;               // margin around the positions, as a fraction of their box's longest side
 constexpr int kMinVoxels = 3;                  // minimum number of voxels along an axis, however long the others are
 
 std::int64_t count_of(const Index3& size) { return std::int64_t(size[0]) * size[1] * size[2]; }

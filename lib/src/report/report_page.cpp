@@ -24,7 +24,8 @@ using detail::pack;
 
 Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
 
-// Browsers compute in single precision: if the first mesh has an origin of its own, the whole page is relative to it.
+// All positions of the page are relative to the origin of the first mesh. Browsers compute in single precision, which
+// is too coarse for coordinates far from 0.
 Vec3 origin_of(const ReportPage& page) { return page.structures.front().mesh->origin; }
 
 std::string packed_marks(const std::vector<Vec3>& marks, const Vec3& origin, std::int64_t maximum) {
@@ -171,7 +172,7 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
         summary.slices_size = plan.size;
         summary.slices_step = plan.step;
     } catch (const Error& error) {
-        if (error.code() != Errc::InvalidOptions) throw;  // more chunks than memory allows
+        if (error.code() != Errc::InvalidOptions) throw;  // the image's chunks need more memory than is allowed
         run.warn(std::string("the report page has no slices: ") + error.what());
     }
     return data;

@@ -50,7 +50,8 @@ const SchemeKernels& kernels() {
     return chosen;
 }
 
-// Planes are copied first, then rows, then voxels, because a copied value may itself be a copy.
+// Planes are copied first, then rows, then voxels: a voxel outside along two axes gets the value of a voxel that is
+// itself a copy.
 void mirror_outside(float* values, const int lo[3], const int hi[3]) {
     for (int i = -1; i <= 8; ++i)
         if (const int from = std::clamp(i, lo[0], hi[0]); from != i)
@@ -71,7 +72,7 @@ void close_faces(Fraction* c, const int lo[3], const int hi[3]) {
     for (int n = 0; n < kLeafSize; ++n) {
         const int at[3] = {n >> 6, (n >> 3) & 7, n & 7};
         if (inner_k && is_inner(0, at[0]) && is_inner(1, at[1])) {
-            n += 7;  // the row
+            n += 7;  // skips the row, which has no face on the boundary
             continue;
         }
         bool outside = false;

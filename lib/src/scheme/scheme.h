@@ -18,7 +18,7 @@ inline constexpr int padded(int i, int j, int k) { return ((i + 1) * 10 + (j + 1
 /// Neighbours q of a voxel in the order of the coefficient arrays.
 enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
 
-/// Marks an unknown value of d or g; there is no attraction across a face with one.
+/// Marks an unknown value of d or g. There is no attraction across a face beside a voxel with an unknown value.
 inline constexpr float kUnknown = -1.0F;
 
 /// A coefficient of a row, 0 to 1, in units of 1/kFractionUnit: half the memory of a float, because sweeps are limited
@@ -48,8 +48,8 @@ struct SchemeConstants {
     float theta;          ///< θ
     float rho;            ///< ρ
     float curvature;      ///< τδ/h²
-    float epsilon2;       ///< ε² of |∇u|
-    float edge_epsilon2;  ///< ε² of |∇g|, per voxel
+    float epsilon2;       ///< ε² in √(ε² + |∇u|²)
+    float edge_epsilon2;  ///< ε² in √(ε² + |∇g|²), with |∇g| per voxel
 };
 
 /// Properties of the equations (matrix rows) of a leaf.
@@ -91,7 +91,7 @@ struct SchemeKernels {
     /// value decreases by more than `tolerance` (R. Zhao 2005, with a surface that cuts voxel edges as boundary).
     /// @param d    padded (faces), >= 0; values only decrease; the halo is not written
     /// @param cut  from cut_edges
-    /// @param due  the rows next to a decrease; they are visited, and then those next to rows that decrease
+    /// @param due  the rows to be visited, which are next to a decrease. Rows next to a row that decreases are added
     /// @return     the rows with a value that decreased by more than `tolerance`
     RowMask (*eikonal)(float* d, const float* cut, RowMask due, float tolerance);
 

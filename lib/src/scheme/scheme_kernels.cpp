@@ -81,12 +81,13 @@ struct Faces {
 
 inline void add(float* to, Lanes what) { store(to, load(to) + what); }
 
-// Faces across i or j: `z` is the lower corner's vertex, `edge` the stride to the face's other corner.
+// The faces across i or j of a row of eight voxels along k. `z` points to the first vertex of the row, and `edge` is
+// the stride from there to the vertices at the faces' other side.
 inline FaceSums row_face(const float* q, int across, const float* z, int edge, float epsilon2) {
     return face_sums(load(q - across), load(q), load(z), load(z + edge), load(z + 1), load(z + edge + 1), epsilon2);
 }
 
-// Only for the voxel rows in `rows`, and the faces that they need.
+// Computes the sums for the voxel rows in `rows` and for their faces only.
 void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask rows, Faces& faces) {
     for (int row = 0; row < 64; ++row) store(faces.norm + row * 8, Lanes{});
     const auto voxel = [u](int i, int j) { return u + padded(i, j, 0); };
@@ -120,7 +121,8 @@ void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask
             add(norm, sums.norm);
             for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
         }
-        // The ninth faces of eight rows form one more vector, whose lanes run along j.
+        // A row of eight voxels has nine faces across k. The ninth faces of the eight rows with this i form one more
+        // vector, whose lanes run along j.
         const float* q = voxel(i, 0) + 8;
         const float* z = vertex(i, 0) + 8;
         const auto lanes = [](const float* first) { return load_strided(first, kRow); };
@@ -147,7 +149,7 @@ struct Star {
     [[nodiscard]] Lanes difference(int face) const { return ((q[face] >= 0.0F) & (p >= 0.0F)) ? q[face] - p : Lanes{}; }
 };
 
-// velocity[f] = v_pq / h², Eqs. (17), (20).
+// Adds to velocity[f] = v_pq / h² for each face f, Eqs. (17), (20).
 inline void add_point_attraction(const Star& phi, float theta, Lanes velocity[6]) {
     for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
 }
@@ -178,7 +180,7 @@ inline void store_fractions(const Lanes a[6], Lanes scale, Fraction* c) {
         fraction[f] = UnsignedLanes(__builtin_convertvector(a[f] * scale + 0.5F, LaneBits));
         total += fraction[f];
     }
-    const LaneBits full = LaneBits(total) >= kFractionUnit;  // -1 where true
+    const LaneBits full = LaneBits(total) >= kFractionUnit;  // -1 if true
     for (int f = 0; f < 6; ++f) store(c + f * 8, LaneBits(fraction[f] + UnsignedLanes(full & (fraction[f] != 0))));
 }
 
@@ -224,7 +226,7 @@ RowFacts assemble(const float* u, const float* phi, const float* g, const float*
     return {largest(largest_sum), sum(residual)};
 }
 
-/// u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old) for a row of eight along k.
+/// The equations of eight voxels along k: u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old).
 struct RowEquation {
     Lanes known, minus, plus, old;
     [[nodiscard]] Lanes value(Lanes before, Lanes after) const {
@@ -328,7 +330,8 @@ inline Lanes root_of(Lanes x) {
     return safe * inverse_sqrt(safe);
 }
 
-/// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v is below it.
+/// The distance x at which the fronts arrive: the solution x >= v of Σ q² (x - v)² = 1, in which the sum is over the
+/// axes with v < x.
 inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     order(a, b), order(b, c), order(a, b);
     const Lanes one = broadcast(1.0F);
@@ -341,14 +344,14 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
         x = x > next.v ? both : x;
     };
     add_axis(b);
-    // If the second axis does not count, the third does not either.
+    // The axes are sorted by v: if the v of the second one is not below x, neither is that of the third.
     const Lanes limit = x;
     add_axis(c);
     x = limit > c.v ? x : limit;
     return x;
 }
 
-/// The same if no edge is cut: q = 1.
+/// The same if no edge is cut, so that q = 1 along all axes. @param a, b, c  the values v
 inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
     const Lanes lower = min(a, b), upper = max(a, b), first = min(lower, c);
     const Lanes second = max(lower, min(upper, c)) - first, third = max(upper, c) - first;
@@ -382,7 +385,7 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
             const Arrival ai = along(cut_i, min_i), aj = along(cut_j, min_j);
             const Lanes before = load(row), below = broadcast(row[-1]), above = broadcast(row[8]);
             Lanes now = before;
-            // Along k until nothing decreases any more.
+            // The values of a row depend on each other along k: the row is updated until none decreases any more.
             for (bool falls = true; falls;) {
                 const Lanes min_k = min(shifted_up(now, below), shifted_down(now, above));
                 const Arrival ak = along(cut_k, min_k);
@@ -410,7 +413,7 @@ RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
 
 inline Lanes absolute(Lanes x) { return max(x, -x); }
 
-/// Calls visit(axis, q) for a row's neighbours.
+/// Calls visit(axis, q) for the six rows q beside a row, shifted by one voxel along each axis.
 template <typename Visit>
 inline void for_neighbours(const float* row, Visit visit) {
     visit(0, load(row - kI)), visit(0, load(row + kI));
@@ -419,7 +422,7 @@ inline void for_neighbours(const float* row, Visit visit) {
 }
 
 void cut_edges(const float* u, float* cut) {
-    constexpr float kMin = 1e-4F;  // voxels
+    constexpr float kMin = 1e-4F;  // [voxels] minimum of s, so that 1/s is finite
     const Lanes one = broadcast(1.0F);
     for (int row = 0; row < 64; ++row) {
         const float* at = u + padded(row >> 3, row & 7, 0);

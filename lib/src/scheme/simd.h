@@ -11,7 +11,7 @@ namespace {
 
 // NOLINTBEGIN(modernize-use-using): attributes of vectors bind to a typedef
 typedef float Lanes __attribute__((vector_size(32)));                              // 8 floats
-typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
+typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // not necessarily aligned
 typedef unsigned short LooseShorts __attribute__((vector_size(16), aligned(2), may_alias));
 typedef int LaneBits __attribute__((vector_size(32)));
 typedef unsigned UnsignedLanes __attribute__((vector_size(32)));
@@ -59,7 +59,7 @@ inline float largest(Lanes v) {
     return m;
 }
 
-/// 1/√x to about 1e-7, x > 0: the processor's estimate and one step of Newton's method.
+/// 1/√x for x > 0, with a relative error of about 1e-7: the processor's estimate and one step of Newton's method.
 inline Lanes inverse_sqrt(Lanes x) {
 #if defined(__AVX512VL__)
     const Lanes y = (Lanes)_mm256_rsqrt14_ps((__m256)x);

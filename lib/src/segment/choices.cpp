@@ -16,7 +16,7 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr double kMaxReach = 1 << 22;  // maximum distance from a lattice's origin, voxels, with some margin
+constexpr double kMaxReach = 1 << 22;  // [voxels] maximum distance from a lattice's origin, with some margin
 
 /// Sets the weights of terms of Eq. (3) to zero if the input that they need is missing.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
@@ -32,7 +32,7 @@ EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remar
     return evolve;
 }
 
-// A single outlier can make the domain larger than any lattice can hold.
+// A single outlier can make the domain larger than any lattice can hold. The error names the outlier.
 void check_extent(const std::vector<Vec3>& points, double h) {
     if (points.size() < 8 || std::sqrt(3.0) * longest_side(bounding_box(points)) < kMaxReach * h) return;
     Vec3 middle{};
@@ -47,14 +47,16 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
     const double maximum = away[away.size() * 99 / 100];
-    // No outlier: the farthest point fits, or the others hardly fit without it, because the voxels are too small.
+    // The farthest point is no outlier if it fits, or if the others hardly fit without it, because the voxels are too
+    // small.
     if (far < kMaxReach * h || maximum >= kMaxReach / 2 * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
                                         " times as far as 99 % of them; remove it if it is a mistake");
 }
 
-// Points without an image are a cloud if they do not lie in one plane, and are many or fill a solid.
+// Whether the points are treated as a cloud: without an image, if they do not lie in one plane, and are too many for
+// the guess or fill a solid.
 bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
     if (is_any<CloudStart>(o.start)) {
@@ -67,7 +69,8 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
             cloud::fill_a_solid(points, measure_spacing(points).median, problem.run));
 }
 
-// Tagging needs marks whose spacing is much smaller than the thickness of the body everywhere; the guess does not.
+// Chooses the guess for few marks: tagging would need marks whose spacing is everywhere much smaller than the thickness
+// of the body.
 StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points, Remarks& remarks) {
     const SegmentOptions& o = problem.options;
     if (is_any<GuessStart>(o.start)) return StartMethod::Guess;
@@ -90,7 +93,7 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
     return kept;
 }
 
-// A thick layer of points, or several adjacent layers, are replaced by the surface in their middle.
+// Replaces a thick layer of points, or several adjacent layers, by points on the surface in their middle.
 std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
     const double radius = kScan.plane_voxels * h, thickness = measure_layer_thickness(points, radius, run);
     if (!(thickness > kAutomatic.noticeable_voxels * h)) return points;
@@ -121,14 +124,16 @@ Choices with_flow(const Problem& problem, Choices c) {
     const RunContext& run = problem.run;
     Remarks& remarks = c.report.remarks;
     const bool tags = c.start == StartMethod::Tagged, guesses = c.start == StartMethod::Guess;
-    const double delta_voxels = tags || guesses ? kAutomatic.tag_delta_voxels : 1.0;  // these start close to the result
+    // Tagging and the guess start close to the result, so that a smaller weight of curvature is sufficient.
+    const double delta_voxels = tags || guesses ? kAutomatic.tag_delta_voxels : 1.0;
     if (!c.evolve.delta) c.evolve.delta = delta_voxels * c.h;
     const bool is_final_start =
         (guesses || c.start == StartMethod::Cloud) && problem.is_guided() && uses_points(c.evolve);
-    if (is_final_start || c.start == StartMethod::Corrected) return c;  // no flow; a later time frame may need delta
+    // There is no flow. `delta` is set nevertheless, because a later time frame may need it.
+    if (is_final_start || c.start == StartMethod::Corrected) return c;
     if (!problem.options.evolve.delta)
         remarks.choose("delta", number(*c.evolve.delta), number(delta_voxels) + " voxels", run);
-    c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels set their own time steps
+    c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels set `tau`, on which solved_to() depends
     if (!c.evolve.tau)
         remarks.choose("tau", number(c.h), "1 voxel at unit speed; longer while the surface moves slowly", run);
     if (!c.edge.sigma && uses_image(c.evolve)) {
@@ -147,8 +152,8 @@ Choices with_flow(const Problem& problem, Choices c) {
     return c;
 }
 
-/// Estimates the area of the indicator's surface: a plane crosses 1.5 cells per cell of its area, averaged over
-/// directions.
+/// Estimates the area of the indicator's surface from the cells that it crosses. A plane of the area of n cell faces
+/// crosses 1.5 n cells, averaged over the directions of the plane.
 double area_of(const Indicator& indicator) {
     double squares = 0;
     indicator.crossed([&](const WorldBox& box) {
@@ -200,7 +205,8 @@ Resolved resolve(const Problem& problem) {
             c.h = h;
             remarks.choose("voxel_size", number(h), number(kCommon.precision_voxels) + " cells of the indicator", run);
         }
-        // The surface that closes a scan may be much larger than the part that the points lie on.
+        // The surface that closes a scan may be much larger than the part on which the points lie. The voxel size is
+        // therefore also limited by the area of the whole surface.
         const double area =
             area_of(c.cloud->orientation.screened ? *c.cloud->orientation.screened : *c.cloud->orientation.indicator);
         const double minimum = std::sqrt(area / (kAutomatic.max_facets * double(c.cloud->points.size())));
@@ -239,7 +245,7 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     };
     const auto finer = [&](double spacing, double enough) {
         const double times = std::sqrt(double(distinct.size()) / enough);
-        // If points lie densely on curves, their spacing would give too many voxels for the extent of the surface.
+        // If points lie densely on curves, a voxel size of their spacing would give too many voxels on the surface.
         const WorldBox box = bounding_box(distinct);
         double area = 0;
         for (int a = 0; a < 3; ++a)

@@ -9,7 +9,8 @@
 
 namespace covol::pipeline {
 
-/// Automatic attraction range. Points attract fully up to half of it, which is the half-width of the narrow band.
+/// [voxels] Automatic attraction range. Points attract fully up to half of this distance, which is the half-width of
+/// the narrow band.
 inline constexpr double kAttractionVoxels = 2 * kHalfWidthVoxels;
 
 /// How the level set starts, resolved from SegmentOptions::start and the input.

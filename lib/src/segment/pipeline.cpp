@@ -20,7 +20,7 @@ SegmentResult run_steps(const Problem& problem, Reached* reached) {
     const Choices& choices = resolved.choices;
     StepReport before = choices.report;
     if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
-    StartSurface start = make_start(problem, choices, std::move(resolved.marks));  // includes distance and band
+    StartSurface start = make_start(problem, choices, std::move(resolved.marks));  // with the distance to the points
     const EdgeChoice edge = choose_edge_feature(problem, choices);
     before.add(edge.report);
     if (reached != nullptr) *reached = {start.u->deepCopy(), start.u, start.distance, nullptr};

@@ -43,7 +43,7 @@ Domain Problem::coarsened(const Domain& fine, double h) const {
     lattice.voxel_size = h;
     if (image != nullptr && !options.lattice_origin)
         lattice = make_domain(make_domain(image->geometry().world_box(), fine.voxel_size).world_box(), h);
-    else  // aligns the outer faces of voxel (0,0,0)
+    else  // aligns the outer faces of the voxels (0,0,0) of both lattices
         for (double& x : lattice.origin) x += 0.5 * (h - fine.voxel_size);
     return covering(lattice, fine.world_box());
 }

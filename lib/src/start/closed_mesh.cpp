@@ -13,7 +13,8 @@ namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// The directed edges that would close each rim, by their first vertex. At each vertex as many edges begin as end.
+/// The directed edges that are missing along the rims of holes: for each vertex, the ends of those that begin there. At
+/// each vertex as many missing edges begin as end.
 std::map<std::uint32_t, std::vector<std::uint32_t>> missing_edges(const TriangleMesh& mesh) {
     std::vector<std::pair<Edge, int>> edges;
     edges.reserve(3 * mesh.triangles.size());
@@ -44,7 +45,7 @@ double area_of(const TriangleMesh& mesh, std::size_t first) {
     return area;
 }
 
-/// Adds a fan of triangles from the rim's centre.
+/// Closes a hole by a fan of triangles between its rim and the rim's centre.
 void add_cap(const std::vector<std::uint32_t>& rim, TriangleMesh& mesh) {
     Vec3 centre{};
     for (const std::uint32_t v : rim)

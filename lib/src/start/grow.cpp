@@ -50,7 +50,7 @@ public:
     [[nodiscard]] std::size_t stride(int axis) const {
         return axis == 2 ? 1 : axis == 1 ? std::size_t(size_[2]) : std::size_t(size_[2]) * std::size_t(size_[1]);
     }
-    /// visit(neighbour, axis) for the neighbours across the six faces.
+    /// Calls visit(neighbour, axis) for the neighbours across the six faces.
     template <typename Visit>
     void for_each_neighbour(std::size_t n, const Visit& visit) const {
         const Coord c = at(n) - min_;
@@ -89,10 +89,10 @@ void Box::blur(std::vector<float>& values, double sigma) const {
     }
 }
 
-/// The front in a box around the start.
+/// A front that begins at the start and takes the voxels of a box in the order in which it arrives at them.
 class Front {
 public:
-    /// @param sigma  of the Gaussian with which the image was smoothed, voxels
+    /// @param sigma  standard deviation of the Gaussian with which the image was smoothed, voxels
     Front(const Box& box, const std::vector<float>& image, const std::vector<float>& level, double voxel, double sigma)
         : box_(box), image_(image), level_(level), voxel_(voxel), correlated_faces_(1 + 4 * M_PI * sigma * sigma) {}
 
@@ -176,7 +176,7 @@ public:
     }
 
 private:
-    /// The mean change across the front, minus the error that noise causes in a mean over this number of faces.
+    /// The mean change of the image across the front's faces, minus the error that noise causes in this mean.
     [[nodiscard]] double edge() const {
         if (faces_ <= 0) return 0;
         const auto count = double(faces_);
@@ -205,7 +205,8 @@ private:
         });
     }
 
-    /// Godunov's upwind solution of speed |grad T| = 1 (Sethian, PNAS 93, 1996).
+    /// The time T at which the front arrives at voxel n: Godunov's upwind solution of speed |grad T| = 1 (Sethian,
+    /// PNAS 93, 1996).
     [[nodiscard]] float arrival_at(std::size_t n) const {
         std::array<double, 3> near;
         near.fill(std::numeric_limits<double>::infinity());
@@ -213,7 +214,8 @@ private:
             if (taken_[other]) near[axis] = std::min(near[axis], double(arrival_[other]));
         });
         std::sort(near.begin(), near.end());
-        // The front is half as fast where noise no longer explains the difference.
+        // At a difference of kCommon.errors standard deviations, which noise hardly explains, the front is half as
+        // fast as inside; at larger ones it is much slower.
         const double away = std::abs(double(image_[n]) - inside_.middle) / (kCommon.errors * inside_.width);
         const double slowness = 1 + away * away * away * away;
         double time = near[0] + slowness, sum = near[0], squares = near[0] * near[0];
@@ -237,7 +239,7 @@ private:
 
     const Box& box_;
     const std::vector<float>&image_, &level_;
-    double voxel_, correlated_faces_;  // number of faces of a front whose errors are correlated
+    double voxel_, correlated_faces_;  // number of faces of a front with correlated errors
     Spread inside_;
     std::vector<float> arrival_;
     std::vector<char> taken_;
@@ -262,7 +264,8 @@ FloatGridPtr level_set_of(const Box& box, std::vector<float> region, const Domai
 GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigma, const RunContext& run) {
     const Domain domain = domain_of(start);
     const openvdb::CoordBBox active = start.evalActiveVoxelBoundingBox();
-    int pad = active.dim()[active.dim().maxIndex()];  // at least the width of a band
+    // [voxels] First margin around the start. It is at least as wide as the band, which the box therefore contains.
+    int pad = active.dim()[active.dim().maxIndex()];
     for (;; pad *= 2) {
         Coord lo, hi;
         for (int a = 0; a < 3; ++a) {

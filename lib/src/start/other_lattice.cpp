@@ -25,7 +25,7 @@ public:
     [[nodiscard]] bool is_mixed() const {
         return std::any_of(values_.begin(), values_.end(), [&](float v) { return (v < 0) != (values_[0] < 0); });
     }
-    /// Trilinear. @param at  position in voxels from the block's first one
+    /// The trilinearly interpolated value. @param at  position in voxels from the block's first one
     [[nodiscard]] float sample(const openvdb::Vec3d& at) const {
         int base[3];
         float part[3];
@@ -80,7 +80,7 @@ ToSource::ToSource(const Domain& domain, const openvdb::math::Transform& source)
 }
 
 std::optional<Coord> ToSource::shift() const {
-    constexpr double kSame = 1e-9;  // fraction of a voxel, for each voxel of distance
+    constexpr double kSame = 1e-9;  // maximum deviation of the lattices, voxels per voxel of distance
     for (int a = 0; a < 3; ++a)
         for (int b = 0; b < 3; ++b)
             if (std::abs(along_[std::size_t(a)][b] - (a == b ? 1 : 0)) > kSame) return std::nullopt;

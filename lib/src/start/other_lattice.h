@@ -14,7 +14,7 @@ namespace covol::detail {
 /// Values of a field at the voxels lo..hi of the domain's lattice, k fastest; negative is inside.
 using Sampler = std::function<void(const openvdb::Coord& lo, const openvdb::Coord& hi, float* values)>;
 
-/// From voxels of a domain to index space of a grid with a linear transform.
+/// Maps voxels of a domain to the index space of a source grid with a linear transform.
 class ToSource {
 public:
     ToSource(const Domain& domain, const openvdb::math::Transform& source);
@@ -31,11 +31,12 @@ private:
     std::array<openvdb::Vec3d, 3> along_;
 };
 
-/// False if all values in the box have the same sign. Boxes larger than a leaf with its next layer are not tested,
-/// which would take longer than it may save: the result is then true.
+/// Whether the surface may cross the box: false if all values in the box have the same sign. For boxes larger than a
+/// leaf with its next layer the result is true without a test, which would take longer than it may save.
 [[nodiscard]] bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box);
 
-/// The grid's values if the lattices coincide, otherwise trilinear ones. Both arguments are kept by reference.
+/// Samples the grid on the domain's lattice: its own values if the lattices coincide, otherwise trilinearly
+/// interpolated ones. Both arguments are kept by reference.
 [[nodiscard]] Sampler sampler_of(const FloatGrid& grid, const ToSource& to_source);
 
 }  // namespace covol::detail

@@ -18,7 +18,7 @@ CoordBBox first_layer(int axis) {
     return layer;
 }
 
-/// visit(offset of a voxel in its leaf) for a box in the leaf, in a sampler's order.
+/// Calls visit(offset) with the offset in the leaf of each voxel of a box in it, k fastest as in a Sampler's values.
 template <typename Visit>
 void for_each_in(const CoordBBox& box, const Visit& visit) {
     for (int i = box.min().x(); i <= box.max().x(); ++i)
@@ -170,8 +170,9 @@ bool SampledLeaves::Entry::has_one_sign() const {
     return is_any_negative != is_any_positive;
 }
 
-// All values that a distance reads lie in crossed leaves and in the first layers behind them: if a voxel next to the
-// surface, or one that its slope is computed from, lay in another leaf, that leaf would be crossed.
+// All values that signed_distance() reads lie in crossed leaves and in the first layers of the leaves that follow them:
+// if a voxel next to the surface, or one from which its slope is computed, lay in another leaf, that leaf would be
+// crossed.
 Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
     std::vector<Request> requests;
     for (const Coord& o : beside)

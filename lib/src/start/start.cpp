@@ -68,7 +68,8 @@ FloatGridPtr start_from_distance(const Domain& domain, const WorldBox& box, cons
     const auto world = [&](const Coord& origin, double i, double j, double k) {
         return domain.index_to_world({origin.x() + i, origin.y() + j, origin.z() + k});
     };
-    // The leaf's farthest voxel centre lies 3.5 sqrt(3) voxels from its middle.
+    // The leaf's farthest voxel centres lie 3.5 sqrt(3) voxels from its middle. If the surface is farther away, the
+    // leaf has no voxel in the band.
     const double reach = (kHalfWidthVoxels + 3.5 * std::sqrt(3.0)) * h;
     LeafBand band(filter(leaves_in(domain, box),
                          [&](const Coord& o) { return std::abs(distance(world(o, 3.5, 3.5, 3.5))) <= reach; }));
@@ -90,7 +91,7 @@ std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& s
 }
 
 /// A start from a field whose zero level set is the surface.
-/// @param beside  the leaves that it crosses, and those around them
+/// @param beside  the leaves that the surface crosses, and those around them
 FloatGridPtr start_on(const Domain& domain, const std::vector<Coord>& beside, const Sampler& sample, const char* where,
                       const RunContext& run) {
     run.check();
@@ -121,7 +122,7 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
 
 using detail::to_text;
 
-/// 1 if the mask is above 0, else 0: labels must not be interpolated.
+/// 1 if the mask is above 0, else 0: values between those of different labels have no meaning.
 Image binarised(const Image& mask) {
     const Index3 n = mask.geometry().size;
     const std::size_t count = std::size_t{1} * n[0] * n[1] * n[2];
@@ -193,7 +194,7 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j)
                     for (int k = lo.z(); k <= hi.z(); ++k, ++n)
-                        // The image repeats its border values beyond its end, but the mask ends there.
+                        // Image::sample() repeats border values beyond the image's end, but the mask ends there.
                         values[n] = values[n] > 0 &&
                                             contains(geometry, domain.index_to_world({double(i), double(j), double(k)}))
                                         ? 0.5F - values[n]
@@ -231,8 +232,8 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
     with_threads(run, [&] {
         const double h = domain.voxel_size;
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
-            // A row of up to eight values takes as long as one of eight: rows follow the last axis, or the middle one
-            // in a layer across the last.
+            // level() takes as long for a row of one value as for one of eight. Rows therefore run along the last axis,
+            // or along the middle axis in a layer that is only one voxel thick along the last axis.
             const bool is_layer = lo.z() == hi.z();
             const int count = is_layer ? hi.y() - lo.y() + 1 : hi.z() - lo.z() + 1;
             const Vec3 step = is_layer ? Vec3{0, h, 0} : Vec3{0, 0, h};

@@ -17,11 +17,12 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Half of the longest edge of the minimum spanning tree of the seeds (Prim), or, for many seeds, of the longest
-/// distance to the nearest other seed.
+/// The radius at which balls around the seeds join: half of the longest edge of the seeds' minimum spanning tree
+/// (Prim's algorithm). For many seeds, which are dense paint, half of the longest distance of a seed from the nearest
+/// other one; separate patches of paint may then remain separate.
 double joining_radius(const std::vector<Vec3>& seeds) {
     if (seeds.size() > kCommon.sample) {
-        double widest = 0;  // for dense paint; separate patches may remain separate
+        double widest = 0;
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));
         return std::sqrt(widest) / 2;

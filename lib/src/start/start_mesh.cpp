@@ -17,7 +17,7 @@
 namespace covol {
 namespace {
 
-/// @return the distance in the domain's index space
+/// The signed distance to the mesh, on the lattice of the domain. OpenVDB determines its sign, see correct_signs().
 FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
     for (int a = 0; a < 3; ++a) domain.origin[a] -= mesh.origin[a];  // vertices are relative to the mesh's origin
     std::vector<openvdb::Vec3s> points(mesh.vertices.size());
@@ -53,7 +53,7 @@ void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh
     const Index3 slab = {lattice.size[0], lattice.size[1], kSlices};
     const std::size_t voxels = std::size_t(slab[0]) * std::size_t(slab[1]) * kSlices;
     std::vector<std::uint8_t> inside(voxels);
-    std::map<int, std::vector<FloatGrid::TreeType::LeafNodeType*>> leaves;  // by slice
+    std::map<int, std::vector<FloatGrid::TreeType::LeafNodeType*>> leaves;  // by the z of their first slice
     for (auto leaf = distance.tree().beginLeaf(); leaf; ++leaf) leaves[leaf->origin().z()].push_back(&*leaf);
     const int z0 = box.min().z() & ~7;
     for (const auto& [z, of_slab] : leaves) {

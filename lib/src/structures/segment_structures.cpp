@@ -22,11 +22,12 @@
 namespace covol {
 namespace {
 
-constexpr double kAccuracyVoxels = 0.25;  // voxels of the image
-constexpr double kWeakLine = 0.93;        // 1 - g if the image is 1.2 times as bright as the band's median
-constexpr double kLargeOverlap = 0.02;    // fraction of the volume of the smaller structure
-constexpr double kMinCorrelation = 0.5;   // of intensity along a surface, from frame to frame
-constexpr int kBesideBand = 5;  // voxels beside the surface's band, from which the usual slopes are determined
+constexpr double kAccuracyVoxels = 0.25;  // [voxels of the image] accuracy within reach_of_marks()
+constexpr double kWeakLine = 0.93;        // weak_edge for lines: 1 - g at 1.2 times the brightness of the band's median
+constexpr double kLargeOverlap = 0.02;    // overlaps above this fraction of the smaller structure's volume are reported
+constexpr double kMinCorrelation = 0.5;   // minimum correlation of the intensities along a surface from frame to frame
+// [voxels] Width of the region beside the surface's band in which the usual slopes of the image are measured, too.
+constexpr int kBesideBand = 5;
 
 /// The region in which edges are computed for a surface that was found without them.
 FloatGridPtr around(const FloatGrid& surface) {
@@ -72,13 +73,14 @@ void measure_again(StructureResult& structure, const std::optional<Image>& image
                                          : detail::distances_to(mesh, structure.marks);
     });
     report.fit = detail::statistics_of(distances);
-    // A mark that two structures share lies off the surface of at least one of them, which needs no warning.
+    // After the separation, a mark of two structures lies off the surface of at least one of them. This is reported
+    // as information, not as a warning.
     for (const std::string& line :
          pipeline::compare_with_marks(report, surface, image ? &*image : nullptr, structure.marks, distances))
         run.info("after separation from the other structures, " + line);
 }
 
-/// Makes the surfaces disjoint.
+/// Makes the surfaces disjoint, measures those that changed again, and reports large overlaps.
 void separate_all(StructuresResult& all, const std::optional<Image>& image, const RunContext& run) {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<Structure> solids;
@@ -93,7 +95,7 @@ void separate_all(StructuresResult& all, const std::optional<Image>& image, cons
     }
     all.overlaps = std::move(separated.report.overlaps);
     for (const StructureOverlap& overlap : all.overlaps) {
-        if (overlap.inner) continue;  // one inside the other, which is no mistake
+        if (overlap.inner) continue;  // one structure inside the other, which is intended
         const StructureResult &a = all.structures[overlap.a], &b = all.structures[overlap.b];
         const double smaller = std::min(a.result.report.surface.volume, b.result.report.surface.volume);
         if (overlap.volume < kLargeOverlap * smaller) continue;
@@ -207,7 +209,8 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     const double range = used.evolve.attraction_range.value_or(0);
     options.reach = range > 0 ? range : reach_of_marks(result, image);
     options.suggestions = suggestions;
-    // For lines, g depends on intensity, which is rarely 0, unlike slopes: g falls below 1/2 even without a line.
+    // For lines as edges, g depends on the intensity. This is rarely 0, unlike slopes, so that g falls below 1/2 even
+    // without a line: with the usual weak_edge, every position would count as supported by the image.
     if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
     FloatGridPtr g = result.edge;
     if (!g) {  // edges that did not act were not computed

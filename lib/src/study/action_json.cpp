@@ -74,7 +74,7 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kMaxId = std::uint64_t(1) << 53;  // integers that a browser represents exactly
+    static constexpr std::uint64_t kMaxId = std::uint64_t(1) << 53;  // up to here a browser represents integers exactly
 
     static double number_of(const json& value, const char* name) {
         if (!value.is_number() || !std::isfinite(value.get<double>()))
@@ -114,7 +114,8 @@ void write_outline(const StudyOutline& outline, json& j) {
     j["world"] = outline.world;
 }
 
-/// An action's name, and how it is read and written; one for each alternative of StudyAction, in its order.
+/// The name of an action in JSON, and functions that read and write its fields. There is one specialisation for each
+/// alternative of StudyAction, in the same order.
 template <typename Action>
 struct Form;
 

@@ -14,8 +14,8 @@ namespace {
 
 using detail::refuse;
 
-constexpr double kMaxVoxels = double(1 << 28);  // of the box around a structure's paint
-constexpr double kMaxVisits = double(1 << 30);  // visits of voxels for one stroke: some seconds
+constexpr double kMaxVoxels = double(1 << 28);  // maximum, of the box around a structure's paint
+constexpr double kMaxVisits = double(1 << 30);  // maximum of visited voxels per stroke: some seconds
 constexpr int kMargin = 10;  // voxels around the paint: more than the 8 over which outlines are smoothed
 
 /// A segment of a stroke's line.
@@ -89,7 +89,8 @@ VoxelBox nowhere() {
     return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
 }
 
-/// Pieces of at most twice the radius, because the box around a long one is mostly empty.
+/// Divides a stroke's line into pieces that are at most twice as long as the radius, because the box around a long one
+/// is mostly empty, and calls take(piece) for each.
 template <typename Take>
 void each_piece(const StudyStroke& stroke, const Take& take) {
     if (stroke.world.size() == 1) take(Piece{stroke.world[0], stroke.world[0]});
@@ -116,7 +117,7 @@ VoxelBox box_around(const StudyStructure& structure, const ImageGeometry& image)
     return all;
 }
 
-/// Distances of a stroke on one slice are measured within that slice.
+/// Draws a stroke into `out`. If the stroke is on one slice, distances from it are measured within that slice.
 void draw(const StudyStroke& stroke, const ImageGeometry& image, const VoxelBox& box, std::vector<std::uint8_t>& out) {
     const Index3 size = box.size();
     const Lengths lengths(image);

@@ -97,7 +97,7 @@ std::string read_text(const fs::path& path) {
     return text;
 }
 
-/// The complete lines, each without its end.
+/// The lines that end in a newline, without it. An incomplete last line is omitted.
 std::vector<std::string_view> whole_lines(std::string_view text) {
     std::vector<std::string_view> lines;
     for (std::size_t end; (end = text.find('\n')) != std::string_view::npos; text.remove_prefix(end + 1))
@@ -118,7 +118,7 @@ void each_action(const std::vector<std::string_view>& lines, const fs::path& pat
 
 }  // namespace
 
-/// A file to which lines are appended, each flushed.
+/// A file to which lines are appended. append() returns when the line is on disk.
 struct Study::Journal {
     fs::path path;
     Descriptor file;
@@ -148,7 +148,8 @@ struct Study::Journal {
         }
         if (done < text.size() || ::fdatasync(file.get()) != 0) {
             const std::string why = error_text();
-            [[maybe_unused]] const int left = ::ftruncate(file.get(), end);  // else it is cut when opened again
+            // If this fails, too, the incomplete line is cut off when the study is opened again.
+            [[maybe_unused]] const int left = ::ftruncate(file.get(), end);
             fail(Errc::Io, path, "it cannot be written (" + why + "); the last action was not kept");
         }
         end += off_t(text.size());

@@ -24,7 +24,7 @@ namespace covol {
 namespace {
 
 constexpr std::size_t kFewestMarks = 4;  // fewer do not determine a surface
-constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a user should wait
+constexpr double kManyVoxels = 1e5;      // in a band; with more, the first surface gets larger voxels
 
 /// Lowers the priority of threads that compute surfaces below that of threads that serve a page, and of the browser on
 /// the same cores.
@@ -32,7 +32,7 @@ class LowerPriority : public tbb::task_scheduler_observer {
 public:
     explicit LowerPriority(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
     void on_scheduler_entry(bool /*is_worker*/) override {
-        constexpr int kNice = 5;  // a third of the time of other threads if the cores do not suffice
+        constexpr int kNice = 5;  // if the cores do not suffice, a third of the time of other threads
         static thread_local const int done = ::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);
         (void)done;
     }
@@ -79,7 +79,7 @@ bool is_on_one_slice(const std::vector<StudyStroke>& strokes) {
 
 /// Describes what is missing for a surface; empty if nothing is.
 std::string missing(const StudyStructure& structure) {
-    // Outlines or a guess are sufficient, or the segmentation reports what is missing.
+    // With outlines or a guess nothing is checked here: if they are not sufficient, the segmentation reports it.
     if (!structure.outlines.empty() || structure.guess) return {};
     if (!structure.strokes.empty())
         return structure.marks.empty() && is_on_one_slice(structure.strokes)
@@ -121,7 +121,7 @@ struct StudySolver::State {
     struct Job {
         std::shared_ptr<const StudyStructure> structure;
         std::uint64_t sequence = 0;
-        bool is_known = false;  ///< whether its surface is known: confirm()
+        bool is_known = false;  ///< whether its surface is known, see confirm()
     };
 
     State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,
@@ -130,7 +130,7 @@ struct StudySolver::State {
         run.cancel = &cancel;
         set_options(std::move(o));
     }
-    /// @pre locked, or no solver is running
+    /// @pre `mutex` is locked, or no solver is running
     void set_options(SegmentOptions o) {
         options = std::move(o);
         if (options.voxel_size) return;
@@ -153,7 +153,7 @@ struct StudySolver::State {
             const bool is_done = low_priority_arena().execute([&] { return solve(job, how); });
             lock.lock();
             running = 0;
-            if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // interrupted
+            if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it was interrupted
             changed.notify_all();
         }
     }
@@ -242,7 +242,7 @@ struct StudySolver::State {
         const auto found = surfaces.find(structure);
         return found != surfaces.end() ? found->second : nullptr;
     }
-    /// @pre locked
+    /// Discards the waiting and the running jobs of a structure. @pre `mutex` is locked
     void drop(StudyId structure) {
         std::erase_if(waiting, [&](const Job& job) { return job.structure->id == structure; });
         if (running == structure) is_obsolete = true;

@@ -401,8 +401,8 @@ private:
         return position;
     }
 
-    /// Distance, in index space, by which a vertex on one face is moved away from another face if its layer lies on
-    /// that.
+    /// Distance, in index space, by which a vertex on one face of the clip is moved along `axis` away from another
+    /// face. It is 0 unless the vertex's layer along `axis` lies on that other face.
     [[nodiscard]] double chamfer(int axis, int layer) const {
         if (!clip_.on_face(axis, layer)) return 0;
         const bool upper = clip_.position(axis, layer) == clip_.high[axis];
@@ -440,7 +440,8 @@ private:
                              unsigned(std::popcount(owner.cut[axis][i & 7] & before)));
     }
 
-    /// The allowed apex with the smallest sum of squared lengths of its diagonals.
+    /// The apex from which the loop is divided into triangles: of those in loop.apexes, the one with the smallest sum
+    /// of squared lengths of its diagonals.
     static int best_apex(const CubeLoop& loop, const std::array<std::uint32_t, 12>& ring, const Positions& positions) {
         int best = std::countr_zero(loop.apexes);
         if (loop.size == 3) return best;

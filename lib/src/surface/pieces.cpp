@@ -23,12 +23,12 @@ using detail::DisjointSets;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The 6-connected pieces of the active voxels of one sign. A part is a set of them that is 6-connected within one
-/// leaf.
+/// The 6-connected pieces of the active voxels of one sign. A part is a set of these voxels that is 6-connected within
+/// one leaf.
 class ActivePieces {
 public:
     struct Piece {
-        std::size_t first, last;  // indices of parts
+        std::size_t first, last;  // its parts are [first, last) of parts_
         std::int64_t voxels;
     };
 
@@ -154,8 +154,8 @@ private:
         Label label;
     };
     struct Row {
-        int i, j;                 // of its blocks
-        std::size_t first, last;  // indices of leaves
+        int i, j;                 // position of its blocks, in units of blocks
+        std::size_t first, last;  // its leaves are [first, last) of leaves_
         std::vector<Gap> gaps;
     };
 
@@ -204,8 +204,8 @@ private:
         });
     }
 
-    /// The positions of leaves along an axis, in units of blocks, and one before, after, and in each range between
-    /// them: no surface is there.
+    /// The positions of blocks along an axis, in units of blocks, at which the space is examined: those of leaves, and
+    /// the adjacent ones, which represent the ranges without leaves, in which no surface lies.
     [[nodiscard]] std::vector<int> positions(int axis) const {
         std::vector<int> all;
         for (const Leaf* leaf : leaves_)
@@ -267,7 +267,8 @@ private:
         }
     }
 
-    /// @param upper  the next row along the axis
+    /// Unites the regions of equal sign on both sides of the faces between two rows. @param upper  the next row along
+    /// the axis
     void join_rows(const Row& lower, const Row& upper, int axis) {
         for (std::size_t x = 0, y = 0; x < lower.gaps.size() && y < upper.gaps.size();) {
             const Gap &one = lower.gaps[x], &two = upper.gaps[y];
@@ -369,7 +370,7 @@ private:
     FloatGrid& level_set_;
     std::vector<Leaf*> leaves_;  // sorted by origin
     std::vector<std::array<Label, kVoxels>> labels_;
-    std::vector<Row> rows_;    // for each position along i, those at the positions along j
+    std::vector<Row> rows_;    // for each position along i, the rows at all positions along j
     std::size_t columns_ = 0;  // number of positions along j
     std::vector<Label> parents_;
     std::vector<char> is_inside_;

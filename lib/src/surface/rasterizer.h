@@ -34,7 +34,7 @@ private:
     const ImageGeometry geometry_;
     const Domain domain_;
     const std::optional<Uncut> whole_;
-    const Clip clip_;  // checked in addition, if the grid is not cut off itself
+    const Clip clip_;  // checked for each voxel, if grid() is not cut off by it
     const bool all_within_;
 };
 

@@ -76,7 +76,7 @@ private:
         }
         return static_cast<float>(sum);
     }
-    /// Closes a surface that reaches the rim at half a voxel beyond the last voxel centres. For even `parts`, this is
+    /// If the surface reaches the rim, closes it half a voxel beyond the last voxel centres. For even `parts`, this is
     /// on the rim itself, otherwise halfway between the rim and the adjacent nodes.
     void close_rim() {
         const auto close = [&](int x, int y) {

@@ -35,7 +35,7 @@ public:
         parts_.resize(piece.triangles.size());
         tbb::parallel_for(std::size_t(0), parts_.size(),
                           [&](std::size_t n) { parts_[n] = add(piece, piece.triangles[n]); });
-        // Summed in sequence, as in measure().
+        // Summed in the same order as in measure(), because the rounding of a sum depends on the order.
         for (const Part& part : parts_) {
             sum_.volume += part.volume;
             sum_.area += part.area;
@@ -76,8 +76,8 @@ private:
         return part;
     }
 
-    /// A hash of an edge. In a closed mesh, the sum of the hashes, with a sign for the direction, is 0; in others it is
-    /// 0 with a probability of 2^-64. https://prng.di.unimi.it/splitmix64.c
+    /// A hash of an edge by splitmix64 (https://prng.di.unimi.it/splitmix64.c). The sum of the hashes of all triangles'
+    /// edges, with a sign for the direction, is 0 in a closed mesh; in others it is 0 with a probability of 2^-64.
     static std::uint64_t mixed(std::uint64_t low, std::uint64_t high) {
         std::uint64_t z = (low << 32 | high) + 0x9e3779b97f4a7c15;
         z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;

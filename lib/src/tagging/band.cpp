@@ -26,7 +26,9 @@ using detail::Tagging;
 using detail::Tube;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
-/// A core appears at the D that closes the last gap around it: if one appears just above D, the body leaks at D.
+/// Determines whether the tagged body leaks at D, and the smallest larger distance at which it does not. A core, which
+/// is an enclosed region of {d > D}, appears as soon as D closes the last gap around it: if one appears just above D,
+/// the body leaks at D.
 void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, const std::vector<Coord>& seeds,
                     const RunContext& run, BandReport& report) {
     const double h = tube.domain.voxel_size, tag_distance = tagging.distance;

@@ -22,22 +22,22 @@ using detail::DisjointSets;
 
 constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of the region beyond the tube
 constexpr float kOutsideDomain = -kBeyond;                         ///< d outside the domain
-constexpr double kBucketsPerVoxel = 16;                            ///< of distances
-constexpr std::int32_t kExterior = 0;                              ///< the first component
+constexpr double kBucketsPerVoxel = 16;                            ///< of the histogram of d
+constexpr std::int32_t kExterior = 0;                              ///< number of the exterior component
 
-/// Two components merge once the threshold of d falls below this.
+/// Two components of {d > D} that merge once the threshold D falls below `d`.
 struct Saddle {
     float d;
     std::int32_t first, second;  ///< components; second may be kSeed
 };
-constexpr std::int32_t kSeed = -1;  ///< the first component contains a seed: below this d it is exterior
+constexpr std::int32_t kSeed = -1;  ///< component `first` contains a seed, and is exterior below `d`
 
 /// Components that are merged as d decreases, beginning at their peaks.
 class Merging {
 public:
     static constexpr std::int32_t kNone = -1;
 
-    std::vector<std::int32_t> core_of;  ///< by component: the core of which it was a part, or kNone
+    std::vector<std::int32_t> core_of;  ///< by component: the core that contains it, or kNone
     std::vector<float> saddles, peaks;  ///< by core
 
     explicit Merging(const std::vector<float>& d) : core_of(d.size(), kNone), parts_(d.size()) {
@@ -276,7 +276,8 @@ void CoreFinder::join_beyond() {
     });
 }
 
-/// Assigns to each voxel of the tube its highest neighbour, or itself if it is the highest. Of equal ones, the first.
+/// Assigns to each voxel of the tube the one of itself and its six neighbours that has the largest d, and of several
+/// with equal d the one with the smallest number; next to the region beyond the tube, the component of that region.
 void CoreFinder::climb() {
     for_leaves([&](std::size_t leaf) {
         Heights heights;

@@ -11,7 +11,7 @@ namespace covol::detail {
 /// A component of {d > D}, where d is the distance to the points, that is connected to the exterior only for smaller D.
 /// Lengths are in voxels.
 struct Core {
-    double saddle = 0;  ///< D below which it is connected: the radius of its largest gap
+    double saddle = 0;  ///< D below which it is connected to the exterior: half width of its widest gap
     double peak = 0;    ///< maximum of d in it
     double volume = 0, area = 0;
 

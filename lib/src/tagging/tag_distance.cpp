@@ -45,7 +45,7 @@ MainCores judge(const Cores& analysis) {
         return analysis.cloud_volume(thickness) / (2 * thickness);
     };
     const auto is_significant = [&](const Core& c) {
-        // Gaps below half a voxel are closed by the grid itself.
+        // Gaps with a radius below half a voxel are not resolved by the grid and count as half a voxel.
         const double ratio = c.peak / std::max(c.saddle, 0.5);
         return c.peak >= 1.0 &&
                (ratio >= kCommon.clear_ratio ||
@@ -63,7 +63,7 @@ MainCores judge(const Cores& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    // With less of the cloud's area, the cores are pockets.
+    // If the area of the main cores is only a small fraction of the cloud's area, they are pockets.
     return area < kCommon.minority * cloud_area(verdict.saddle) ? MainCores{} : verdict;
 }
 

@@ -66,7 +66,8 @@ Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seed
             result.enclosed += __builtin_popcountll(tube.inside_domain[leaf][word] & ~exterior);
             result.core += __builtin_popcountll(result.open[leaf][word] & ~exterior);
         }
-    // A run that the flood did not reach does not touch the domain's boundary, so that all of its voxels count.
+    // A run that the flood did not reach does not touch the domain's boundary, so that all its voxels lie in the domain
+    // and count.
     const auto& pieces = tube.columns.pieces();
     for (std::size_t n = 0; n < pieces.size(); ++n) {
         if (pieces[n].leaf >= 0 || result.exterior.pieces[n]) continue;

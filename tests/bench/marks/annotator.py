@@ -8,9 +8,9 @@ import numpy as np
 
 import truth
 
-IMPRECISION = 0.5                                  # voxels
-BETWEEN_MARKS = 4                                  # voxels, along a contour
-CURVE_COUNTS = (10, 15, 20, 25, 30, 40, 50, 60, 80)  # numbers of marks on the annotator's curve
+IMPRECISION = 0.5                                  # maximum error of a mark along each axis, in voxels
+BETWEEN_MARKS = 4                                  # distance of marks along a contour, in voxels
+CURVE_COUNTS = (10, 15, 20, 25, 30, 40, 50, 60, 80)  # numbers of marks at which curve.py measures Dice
 
 
 def generator(*what):

@@ -74,7 +74,7 @@ class Browser:
             try:
                 parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
                 command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-                # Memory that processes share is counted once.
+                # Pss: memory that several processes share is divided among them, so that it is counted once.
                 used = sum(int(line.split()[1]) for line in (entry / "smaps_rollup").read_text().splitlines() if line.startswith("Pss:")) / 1024
             except (OSError, ValueError):
                 continue

@@ -14,7 +14,8 @@ import truth
 from browser import Browser, Program
 from live_client import Live, Page
 
-# structure, number of its marks, number of those that are clicked, and the limits for the first and the refined answer, seconds
+# (structure, number of its marks, number of marks that are clicked, and limits in seconds for the first and for the
+# refined outline)
 JOBS = (("embryo nucleus 2", 20, 14, 0.2, 0.5), ("hippocampus", 60, 20, 0.2, 0.5), ("ventricle", 60, 20, 0.3, 2.0),
         ("spleen", 60, 20, 0.3, 2.0), ("brain", 300, 10, 1.0, 5.0))
 
@@ -44,7 +45,7 @@ def measure(covol, structure, count, clicked):
             index = [float(v) for v in mark]
             index[2] = float(round(index[2]))
             if browser.js("const p = mark.panels[2]; return p.input.markAt(p.spotOf(mark.space.toWorld(arguments[0])), 12) !== null", index):
-                continue  # a press there would drag that mark
+                continue  # pressing the button close to a mark would drag this mark
             sequence = browser.js("return mark.study.seq") + 1
             browser.click(2, index)
             browser.wait("const r = mark.study.structures[0].result; return mark.study.seq === arguments[0] && r.seq === arguments[0] && r.stage === 'refined' && mark.timing.outlines.some((o) => o.seq === r.seq && o.stage === 'refined')", sequence)

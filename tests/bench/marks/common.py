@@ -21,10 +21,10 @@ import truth
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from tables import markdown, provenance  # noqa: E402  (of the folder above)
+from tables import markdown, provenance  # noqa: E402  (tests/bench/tables.py)
 
 
-BELOW_START = 0.003  # tolerated decrease of Dice from the start to the result
+BELOW_START = 0.003  # decrease of Dice from the start to the result that is tolerated
 
 
 # ---- covol ---------------------------------------------------------------------------------------------------------
@@ -177,7 +177,7 @@ class Bench:
                 key, value = json.loads(line)
                 self.known[key] = value
         self.truth_version = version_of(truth, annotator)
-        self.provenance = provenance()  # with the load before the measurements
+        self.provenance = provenance()  # includes the load of the machine before the measurements
         self.begin = time.perf_counter()
         if structures_needed:
             self.structures = list(self._structures())
@@ -213,7 +213,7 @@ class Bench:
         @param what name of the marks; one: the columns of all rows; given: marks or contours"""
         rows = []
         for name, options in (("covol, marks alone", ("--rho", 0)), ("covol, both", ())):
-            # Even without steps the image would move a guess: the start is the result of the marks alone.
+            # --rho 0 as well as --max-steps 0, because the image moves a guess even before the first step of the flow.
             start = self.once((*what, "start"),
                               lambda: self.covol.segment(structure, "--rho", 0, "--max-steps", 0, **given).columns(structure))
             end = self.once((*what, name), lambda: self.covol.segment(structure, *options, **given).columns(structure))

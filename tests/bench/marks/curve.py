@@ -33,7 +33,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 COUNTS = annotator.CURVE_COUNTS
-ENOUGH = (0.95, 0.9)  # Dice
+ENOUGH = (0.95, 0.9)  # levels of Dice; the tables list the numbers of marks that reach them
 OWN, RANDOM, SHAPE = "covol, own suggestions", "covol, random suggestions", "shape-based"
 STYLE = {OWN: ("tab:blue", "o-"), RANDOM: ("tab:blue", "s:"), "variational alone": ("tab:green", "-"), SHAPE: ("tab:orange", "--"),
          "random walker": ("tab:gray", "-"), "grow from seeds": ("tab:gray", "--")}

@@ -24,13 +24,15 @@ from scipy import ndimage
 import bodies
 from common import Bench, markdown, version_of, write_marks
 
-MARKS = 150  # on the whole body
+MARKS = 150  # number of marks on the whole body, of which those in the image are used
 SPACINGS = {"1:1:1": np.array([1.0, 1, 1]), "1:1:5": np.array([1.0, 1, 5])}
 SHAPES = {"sphere": (15, 15, 15), "ellipsoid": (14, 11, 15)}
 CUTS = [(faces, fraction) for faces in ("one", "two ends", "corner") for fraction in (0.2, 0.5, 0.8) if (faces, fraction) != ("corner", 0.8)]
 ON_THE_CUT = ("none", "outline", "all over")
 OPTIONS = {"marks alone": ("--rho", 0), "both": ()}
-END_SLICE, VOLUME, FLAT = 0.03, 0.01, 0.1  # accepted
+# Accepted errors: relative error of the area on the end face; relative error of the volume; height of the surface above
+# an end face or beyond it, in units of the smallest spacing.
+END_SLICE, VOLUME, FLAT = 0.03, 0.01, 0.1
 BRIGHT, DARK, NOISE = 180, 60, 15
 
 
@@ -43,8 +45,10 @@ class Scene:
         around = 6 + 2 * spacing
         sizes = np.ceil(2 * (radii + around) / spacing)
         centre = spacing * ((sizes - 1) / 2 + rng.uniform(-0.5, 0.5, 3))
-        beyond = 2 * radii * fraction + rng.uniform(-0.5, 0.5) * spacing  # of the height
-        self.ends = {"one": [(2, 0)], "two ends": [(2, 0), (2, 1)], "corner": [(2, 0), (0, 0)]}[faces]  # axis, low or high
+        # Length of the body beyond an end of the image, along each axis.
+        beyond = 2 * radii * fraction + rng.uniform(-0.5, 0.5) * spacing
+        # (axis, 0: low end or 1: high end).
+        self.ends = {"one": [(2, 0)], "two ends": [(2, 0), (2, 1)], "corner": [(2, 0), (0, 0)]}[faces]
         if faces == "two ends":
             sizes[2] = max(3, round((2 * radii[2] - beyond[2]) / spacing[2]))
             centre[2] = spacing[2] * (sizes[2] - 1) / 2
@@ -114,7 +118,8 @@ class Scene:
             face = self.high[axis] if high else self.low[axis]
             foot = vertices.copy()
             foot[:, axis] = face
-            deep = self.body.distance(foot) < -2  # well within the section
+            # More than 2 units of length within the section of the body by the end face.
+            deep = self.body.distance(foot) < -2
             for other, other_high in self.ends:
                 if other != axis:
                     deep &= np.abs(vertices[:, other] - (self.high[other] if other_high else self.low[other])) > 2

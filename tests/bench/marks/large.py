@@ -35,7 +35,7 @@ def scroll(browser, axis, slices, pause=0.02):
     end, last = browser.js("return performance.now()"), browser.js("return mark.panels[arguments[0]].at", axis)
     seen = browser.js("return window.seen")
     places = [place for n, (_, place, _) in enumerate(seen) if n == 0 or seen[n - 1][1] != place]
-    # Slices within one voxel of a coarse level have the same picture.
+    # `thick` slices lie in one voxel of a coarse level and have the same picture, so they count as one.
     thick = browser.js("const p = mark.panels[arguments[0]]; return mark.slices.thickness(arguments[0], p.slice.step)", axis)
     seconds = (end - begin) / 1000
     gaps = [b[0] - a[0] for a, b in zip(seen, seen[1:])]
@@ -52,7 +52,8 @@ def mark_ball(browser, count=30, timed=10):
         browser.go(index.tolist())
         browser.js("const p = mark.panels[2]; p.setView({zoom: 8, x: arguments[0][0], y: arguments[0][1]}); p.draw()", index.tolist())
         browser.wait("return mark.slices.underWay.size === 0")
-        sequence = browser.js("return mark.study.seq") + 1 + (n == 0)  # the first click also creates the structure
+        # The first click is two actions: it also creates the structure.
+        sequence = browser.js("return mark.study.seq") + 1 + (n == 0)
         browser.click(2, index.tolist())
         browser.wait("return mark.study.seq >= arguments[0]", sequence)
         if n < count - timed:

@@ -31,14 +31,15 @@ def write_level(folder, level, rng):
     def pack(values):
         return zlib.compress(np.clip(values + rng.normal(0, noise, values.shape), 0, 255).round().astype(np.uint8).tobytes(), 1)
 
-    # A slow wave that is the same in every chunk, so that neighbouring slices differ.
+    # The background varies slowly, so that neighbouring slices differ. It is the same in every chunk, so that chunks
+    # can be hard links to a few files.
     wave = 12 * np.sin(2 * np.pi * (np.arange(CHUNK) + 0.5) / CHUNK)
     background = DARK + (wave[:, None, None] + wave[None, :, None] + wave) / 3
     variants = []
     for n in range(VARIANTS):
         variants.append(folder / f"variant{n}")
         variants[-1].write_bytes(pack(background))
-    for place in itertools.product(range(count), repeat=3):  # x y z
+    for place in itertools.product(range(count), repeat=3):  # index of the chunk along x, y, z
         axes = [factor * (p * CHUNK + np.arange(CHUNK)) + (factor - 1) / 2 for p in place]
         nearest = [np.abs(a - c).min() if not a[0] <= c <= a[-1] else 0 for a, c in zip(axes, CENTRE)]
         name = folder / ".".join(str(p) for p in place[::-1])

@@ -17,7 +17,8 @@ from browser import Browser, Program
 from large import scroll
 from live_client import Live, Page
 
-APART, DEPTH, RADII = 30, 40, (10, 11, 9)  # voxels; x y z
+# voxels: distance of neighbouring centres, depth of the image, half axes along x, y, z.
+APART, DEPTH, RADII = 30, 40, (10, 11, 9)
 
 
 def make_image(path, count, rng):

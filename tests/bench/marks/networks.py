@@ -38,7 +38,7 @@ def read_stl(path):
 def cut(vertices, faces, normal, offset):
     """The loops in the plane normal . x = offset, without vertices that are closer than a thousandth of the extent."""
     height = vertices @ normal - offset
-    height[height == 0] = 1e-12  # so that no vertex lies in the plane
+    height[height == 0] = 1e-12  # every vertex is on one side: no case of a vertex in the plane
     above = height[faces] > 0
     crossed = faces[above.any(1) & ~above.all(1)]
     to = {}
@@ -110,7 +110,7 @@ def on_surface(vertices, faces, count, rng):
 
 
 def reconstruct(options, folder, planes, mesh, rng):
-    from scipy.spatial import cKDTree  # accurate enough between dense samples
+    from scipy.spatial import cKDTree  # distances are measured between dense samples of the surfaces
     vertices, faces = mesh
     cuts = [(normal, offset, cut(vertices, faces, normal, offset)) for normal, offset in planes]
     cuts = [one for one in cuts if one[2]]
@@ -129,7 +129,8 @@ def reconstruct(options, folder, planes, mesh, rng):
     count = 20000
     true, found = on_surface(*mesh, count, rng), on_surface(*read_stl(folder / "s.stl"), count, rng)
     error = (cKDTree(true).query(found)[0].mean() + cKDTree(found).query(true)[0].mean()) / 2
-    floor = cKDTree(true).query(on_surface(*mesh, count, rng))[0].mean()  # mean distance between two samples of one surface
+    # Mean distance between two independent samples of the same surface, which is subtracted.
+    floor = cKDTree(true).query(on_surface(*mesh, count, rng))[0].mean()
     return {"error, %": 100 * max(error - floor, 0) / diagonal, "pieces": surface["components"], "genus": surface["genus"],
             "CPU s": round(seconds, 1)}
 

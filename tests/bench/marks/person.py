@@ -20,12 +20,12 @@ import annotator
 import truth
 from browser import Browser, Program
 
-# structure, number of clicks, number of outlines, each with twelve corners on a slice of its own
+# (structure, number of clicks, number of outlines). Each outline has CORNERS corners and lies on a slice of its own.
 JOBS = (("embryo nucleus 2", 20, 0), ("ventricle", 60, 0), ("spleen", 40, 3))
-FIRST = 9          # marks in three planes before the first outline is displayed
-SLICES = 8         # in each plane, which the person looks at before a click
+FIRST = 9          # number of marks that are set before the first surface is awaited
+SLICES = 8         # number of slices in each plane that the person looks at before a click
 CORNERS = 12
-PIXELS = 4         # of the screen per voxel, by zooming
+PIXELS = 4         # pixels of the screen per voxel that zooming is to reach
 MESH = """
 const mesh = mark.meshes.items.get(mark.study.structures[0].id), bytes = new Uint8Array(Float32Array.from(mesh.positions).buffer);
 let text = ''; for (let n = 0; n < bytes.length; n += 8192) text += String.fromCharCode(...bytes.subarray(n, n + 8192));
@@ -40,7 +40,7 @@ class Person:
         facts = browser.js("return {direction: mark.image.direction, spacing: mark.image.spacing, origin: mark.image.origin}")
         self.to_world = np.array(facts["direction"]) * np.array(facts["spacing"])
         self.origin = np.array(facts["origin"])
-        self.marked = []  # voxels
+        self.marked = []  # positions of all clicks, in voxels
 
     def zoom(self):
         """Shows the structure's middle in each plane, zoomed by Ctrl and the wheel to some pixels per voxel."""
@@ -97,7 +97,7 @@ class Person:
             corners = truth.Lines(structure, [line]).even(CORNERS)
             for corner in corners:
                 self.click(corner, axis, tool=False)
-            self.browser.actions().send_keys("\ue007").perform()  # Enter
+            self.browser.actions().send_keys("\ue007").perform()  # the key Enter, which closes the outline
             self.browser.wait("return !mark.state.get('draft')")
         self.browser.actions().send_keys("s").perform()
 
@@ -119,7 +119,8 @@ class Person:
         places, axes, slices = self.on_slices()
         missed = cKDTree(seen * spacing).query(places * spacing)[0]
         border = cKDTree(places * spacing)
-        # If the largest difference is at an outline far from the border, the person clicks on the nearest point of the border.
+        # The largest difference may be a part of the outline that is far from the border. The person then clicks on the
+        # point of the border that is nearest to this part.
         near = np.any([np.abs(seen[:, axis] - k) < 0.5 for axis, k in slices], axis=0)
         beyond, nearest = self.structure.surface_tree.query(seen[near] * spacing)
         if len(beyond) and beyond.max() > missed.max():
@@ -156,7 +157,7 @@ class Person:
                 n = self.rng.integers(len(places))
                 self.click(places[n], axes[n])
             elif not self.click(*(suggested or self.where_it_differs(seen))):
-                self.browser.actions().send_keys("\ue00c").perform()  # Escape
+                self.browser.actions().send_keys("\ue00c").perform()  # the key Escape
 
 
 def save_mask(browser, folder):

@@ -17,7 +17,9 @@ from skimage.segmentation import random_walker, watershed
 
 from variational import Surface
 
-MANY_VOXELS = 1_500_000  # in the box of the gap; if there are more, these three methods use every second voxel along each axis
+# Voxels in the bounding box of the gap; if it has more, the methods of FROM_SEEDS use every second voxel along each
+# axis.
+MANY_VOXELS = 1_500_000
 
 
 # ---- solids from functions ---------------------------------------------------------------------------------------
@@ -32,7 +34,8 @@ def where_negative(function, structure, margin):
     stride = np.maximum(1, np.round(4 * structure.h / structure.spacing)).astype(int)
     if np.prod(high - low) < 100_000:
         stride[:] = 1
-    lattice = [np.arange(a, b + s, s) for a, b, s in zip(low, high, stride)]  # reaches beyond the end, so that every voxel lies in a cell
+    # Ends at or beyond the last voxel, so that every voxel lies in a cell.
+    lattice = [np.arange(a, b + s, s) for a, b, s in zip(low, high, stride)]
     coarse = _evaluate(function, structure, lattice)
     if (stride == 1).all():
         inside = coarse[:-1, :-1, :-1]
@@ -85,12 +88,12 @@ def convex_hull(structure, marks):
 
 @dataclasses.dataclass
 class Seeds:
-    image: np.ndarray   # within the box, smoothed
-    labels: np.ndarray  # 1 inside, 2 outside, 0 the gap between them
+    image: np.ndarray   # intensities within `box`, smoothed and scaled to 0 to 1
+    labels: np.ndarray  # 1: inside, 2: outside, 0: the gap between them, in which the method decides
     spacing: np.ndarray
-    mask: np.ndarray    # of the whole image: the inside, including that beyond the box
+    mask: np.ndarray    # the voxels of the whole image with label 1, including those beyond the box
     box: tuple
-    step: int           # between the voxels of the box that image and labels contain
+    step: int           # `image` and `labels` contain every step-th voxel of the box along each axis
 
     def solid(self, inside):
         """A mask of the whole image from one with the shape of `labels`."""
@@ -107,7 +110,8 @@ def seeds(structure, marks, guess):
     spacing = structure.spacing[::-1]
     if not guess.any() or guess.all():
         return None
-    # The gap is at most half the depth, which is at most a quarter of the extent: nothing farther out is needed.
+    # The width of the gap is at most half of the maximum depth, and thus at most a quarter of the smallest extent.
+    # Voxels farther than this from the mask are outside, and distances are not computed for them.
     around = ndimage.find_objects(guess)[0]
     room = min((s.stop - s.start) * h for s, h in zip(around, spacing)) / 4 + 3 * structure.h
     around = tuple(slice(max(0, s.start - int(room / h) - 1), s.stop + int(room / h) + 1) for s, h in zip(around, spacing))
@@ -131,7 +135,8 @@ def walk(given):
     """Random walker (Grady 2006) of scikit-image, with its default beta."""
     labels = given.labels.astype(np.int32)
     far = ndimage.minimum_filter(labels, 3) == ndimage.maximum_filter(labels, 3)
-    labels[far & (labels > 0)] = -1  # seeds that do not touch the gap are left out of the system
+    # -1 excludes seeds that do not touch the gap from the linear system, which makes it smaller.
+    labels[far & (labels > 0)] = -1
     won = random_walker(given.image, labels, mode="cg_j", spacing=given.spacing / given.spacing.min(), tol=1e-3)
     return given.solid((won == 1) | (given.labels == 1))
 

@@ -17,7 +17,7 @@ import annotator
 from common import Bench, markdown, version_of
 
 COUNTS = (300, 60, 20)
-RIGHT = 0.8  # Dice
+RIGHT = 0.8  # a result with at least this Dice coefficient counts as correct
 
 
 # ---- mistakes: (structure, marks, rng) -> marks ---------------------------------------------------------------------

@@ -18,7 +18,7 @@ import variational
 from common import Bench, below_start, dice_cell, p95_cell, pivot, summary, version_of
 
 COUNTS = (300, 60, 20)
-WITH_IMAGE_GAINS = ("spleen", "ovule", "embryo")  # structures with real edges
+WITH_IMAGE_GAINS = ("spleen", "ovule", "embryo")  # structures with clear edges, whose results the image must improve
 ENOUGH = 0.96
 
 

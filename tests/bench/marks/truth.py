@@ -23,11 +23,11 @@ from skimage import measure
 class Structure:
     name: str
     image: pathlib.Path
-    truth: np.ndarray           # bool
-    spacing: np.ndarray         # x y z
-    options: tuple = ()         # with which covol can read the image
+    truth: np.ndarray           # bool [z, y, x]: the inside
+    spacing: np.ndarray         # of the voxels along x, y, z
+    options: tuple = ()         # options of covol that the image needs, such as --spacing
     contour_axis: int = 2       # the axis across the slices in which a person draws contours: 0 x, 1 y, 2 z
-    large: bool = False         # if so, fewer draws
+    large: bool = False         # fewer draws of marks are measured
 
     @property
     def h(self):
@@ -53,7 +53,7 @@ class Structure:
     def outlines(self, axis, k):
         """Closed lines around the truth in slice k of an axis, an array of positions each; without parts on end faces."""
         image = np.take(self.truth, k, 2 - axis).astype(np.float32)
-        across = [a for a in (2, 1, 0) if a != axis]  # axes of the rows and columns of the slice
+        across = [a for a in (2, 1, 0) if a != axis]  # axes along the slice's first and second index
         lines = []
         for line in measure.find_contours(np.pad(image, 1), 0.5):
             positions = np.full((len(line), 3), float(k))
@@ -102,7 +102,7 @@ def structures(data):
     """The structures with a known truth, small ones first."""
     images = pathlib.Path(data) / "images"
     nuclei, _ = ndimage.label(read_array(images / "mouse_embryo_8cell_gt_nuclei.tif") > 0)
-    for label in (2, 3, 6):  # the three largest
+    for label in (2, 3, 6):  # the three largest nuclei
         yield Structure(f"embryo nucleus {label}", images / "mouse_embryo_8cell.tif", nuclei == label, np.array([0.8, 0.8, 1.75]),
                         ("--spacing", "0.8,0.8,1.75"))
     image = images / "ovule_nuclei_1135.tif"
@@ -116,7 +116,8 @@ def structures(data):
                         np.array(file.header.get_zooms()[:3], float), (), axis, large)
 
 
-# Name, image, file with labels, labels (empty: all; if they have several parts, only the largest one counts).
+# (Name, image, file with labels, labels of the structure; empty: all labels). If these voxels form several parts, only
+# the largest part is the structure.
 MORE = (("hippocampus", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", ()),
         ("hippocampus, anterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (1,)),
         ("hippocampus, posterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (2,)),

@@ -11,7 +11,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
-LAMBDA = 0.03  # with the marks scaled to a unit ball
+LAMBDA = 0.03  # weight of smoothing against the distances at the marks, after scaling the marks to a unit ball
 
 
 class Surface:
@@ -25,7 +25,8 @@ class Surface:
         self._kernel, self._linear = self._system()
         energy = self._energy()
         values, mixed, gradients = energy[:n, :n], energy[:n, n:], energy[n:, n:]
-        # For given gradients the best values are `follow @ g`; with them the energy is a quadratic form in g alone.
+        # For given gradients g at the marks, the values at the marks that minimise the energy are `follow @ g`. With
+        # these, the energy is a quadratic form of g alone.
         follow = -linalg.solve(np.eye(n) + smoothing * values, smoothing * mixed, assume_a="pos")
         form = gradients + mixed.T @ follow
         normals = self._unit_vectors((form + form.T) / 2)
@@ -62,7 +63,7 @@ class Surface:
         inner = project(project(self._kernel).T)
         scale = np.trace(inner) / len(inner)
         inner += scale * free @ free.T
-        inner[np.diag_indices_from(inner)] += 1e-12 * scale  # marks that coincide
+        inner[np.diag_indices_from(inner)] += 1e-12 * scale  # marks at equal positions would make it singular
         factor, failed = lapack.dpotrf(inner, lower=1, overwrite_a=1)
         if failed:
             raise linalg.LinAlgError("the energy is not positive")

@@ -17,7 +17,7 @@ import truth
 from common import Bench, dice_cell, pivot, summary
 
 COUNTS, FRACTIONS = (60, 300), (0.0, 0.05, 0.1)
-NEAR = 2.5  # voxels
+NEAR = 2.5  # a mark is wrong if its distance from the true surface is larger, in voxels
 MORE = ("hippocampus", "left atrium", "ventricle", "putamen", "iliac arteries", "colon")
 
 

@@ -28,7 +28,7 @@ import shapes
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from bench import Run  # noqa: E402  (the benchmarks of speed lie in the folder above)
+from bench import Run  # noqa: E402  (tests/bench/bench.py, which measures speed)
 from tables import markdown, provenance  # noqa: E402
 
 METHODS = ("covol", "poissonrecon", "poisson", "scale-space", "advancing-front", "alpha-wrap", "wnnc", "ipsr")
@@ -76,9 +76,9 @@ def knobs(steps):
 
 @dataclasses.dataclass
 class Case:
-    columns: dict               # the values that identify it
+    columns: dict               # shape, count, noise and outliers; for a scan, its name
     cloud: pathlib.Path
-    truth: pathlib.Path | None  # None: a scan
+    truth: pathlib.Path | None  # mesh of the true surface; None for a scan, of which it is unknown
 
 
 def truths(options):
@@ -119,7 +119,7 @@ class Made:
     path: pathlib.Path
     cpu: float = 0
     wall: float = 0
-    peak: int = 0  # bytes, of the step that needed most memory
+    peak: int = 0  # bytes; the maximum over the steps
 
 
 class Trial:
@@ -135,7 +135,7 @@ class Trial:
             before = self.make(steps[:-1])
             out = self.folder / f"{len(self.made)}.ply"
             command = [word.replace("{in}", str(before.path)).replace("{out}", str(out)) for word in shlex.split(steps[-1])]
-            # Busy waiting of threads would count as CPU time.
+            # passive: OpenMP's threads otherwise wait in busy loops, which would count as CPU time.
             run = Run(["prlimit", f"--cpu={self.options.timeout}", *command], OMP_WAIT_POLICY="passive")
             if not out.exists():
                 raise RuntimeError("wrote nothing")
@@ -276,7 +276,7 @@ def drawn_in(panels, case, trial, found):
 
 def main():
     options = parsed()
-    head = provenance()  # with the load before the measurements
+    head = provenance()  # includes the load of the machine before the measurements
     chosen, rows = methods(options), []
     panels = picture.Panels()
     for case in (scanned if options.scans else drawn)(options):

@@ -26,7 +26,7 @@ using Triangles = std::vector<Triangle>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 using Neighbours = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<Kernel>>;
-using json = nlohmann::ordered_json;  // keeps the order of the table's columns
+using json = nlohmann::ordered_json;  // keeps the order of the keys, which are the columns of the table
 
 constexpr std::size_t samples = 200'000;
 
@@ -58,7 +58,7 @@ struct Sample {
     Vector normal;
 };
 
-/// Random samples, uniform by area; the same samples for the same triangles.
+/// Random samples, uniform by area. The seed is constant, so that the samples of a mesh are always the same.
 std::vector<Sample> sample(const Triangles& triangles) {
     std::mt19937_64 random(1);
     std::vector<double> area;
@@ -84,7 +84,7 @@ struct OneWay {
     std::vector<double> lengths, angles;
 };
 
-/// Distances from samples of a surface to the triangles of the other one.
+/// Distances from samples of the surface `from` to the surface `to`, and the angles between their normals, in degrees.
 OneWay one_way(const Triangles& from, const Tree& to) {
     OneWay found;
     for (const Sample& s : sample(from)) {
@@ -96,7 +96,7 @@ OneWay one_way(const Triangles& from, const Tree& to) {
     return found;
 }
 
-/// Distances in % of `unit`.
+/// Mean distances in both directions, and the maximum of all distances, in % of `unit`.
 json distances(const std::vector<double>& to, const std::vector<double>& from, double unit) {
     return {{"mean_to", 100 / unit * mean(to)},
             {"mean_from", 100 / unit * mean(from)},
@@ -116,8 +116,9 @@ private:
     std::vector<std::size_t> parent_;
 };
 
-/// Of the triangles, by their indices. The genus follows from V - E + F = 2 components - 2 genus - boundary loops if
-/// the mesh is a manifold (no edge with more than two triangles, no two fans at a vertex).
+/// Topology of the mesh: vertices are equal if their indices are equal. If the mesh is a manifold (no edge with more
+/// than two triangles, no vertex with two separate fans of triangles), its genus follows from
+/// V - E + F = 2 components - 2 genus - boundary loops.
 json topology(const Ply& ply) {
     struct Edge {
         std::uint32_t a, b;              // a < b
@@ -179,7 +180,7 @@ json topology(const Ply& ply) {
 double spacing_of(const Neighbours::Tree& tree) {
     double sum = 0;
     for (const Point& p : tree) {
-        Neighbours search(tree, p, 7);  // the point itself is the first one
+        Neighbours search(tree, p, 7);  // 7: the point itself, which is found first, and 6 neighbours
         double own = 0;
         for (const auto& [q, squared] : search) own += std::sqrt(squared);
         sum += own / 6;

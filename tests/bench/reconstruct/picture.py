@@ -7,10 +7,10 @@ from scipy.spatial import cKDTree
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 
-SIZE = 700           # pixels of a panel, along its longer side
-SAMPLES = 4_000_000  # with which a surface is drawn
+SIZE = 700           # pixels of a panel along its longer side
+SAMPLES = 4_000_000  # number of points that are drawn for a surface
 LIGHT = np.array([0.4, 0.5, 0.77])
-FARTHEST = 0.2       # end of the colour scale, in % of the diagonal
+FARTHEST = 0.2       # distance at the end of the colour scale, in % of the diagonal of the true surface
 
 
 class Panels:
@@ -30,12 +30,13 @@ class Panels:
         row = [(title, grid.draw(cloud @ axes.T, np.full((len(cloud), 3), 0.35)))]
         for name, vertices, triangles in surfaces:
             points, normals = _sampled(vertices, triangles, SAMPLES)
-            # To the plane of the nearest sample, since samples are farther apart than the surfaces.
+            # Distances are to the tangential plane of the nearest true sample, not to the sample itself, because
+            # samples are farther apart than the surfaces.
             distance, nearest = tree.query(points, workers=-1)
             off = np.minimum(distance, np.abs(((points - true_points[nearest]) * true_normals[nearest]).sum(1))) * 100 / diagonal
             colour = pyplot.get_cmap("turbo")(np.clip(off / FARTHEST, 0, 1))[:, :3]
             normals = normals @ axes.T
-            normals[normals[:, 2] < 0] *= -1  # visible surfaces face the viewer, whichever way a mesh is oriented
+            normals[normals[:, 2] < 0] *= -1  # the visible side is lit, even if the mesh is inside out
             shade = 0.25 + 0.75 * np.clip(normals @ LIGHT, 0, 1)
             row.append((f"{name}, {off.mean():.3f} %", grid.draw(points @ axes.T, colour * shade[:, None])))
         self.rows.append(row)
@@ -70,7 +71,7 @@ class _Grid:
         column, row = ((points[:, :2] - self.low[:2]) * self.scale).astype(int).T
         kept = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
         pixel = (self.height - 1 - row[kept]) * self.width + column[kept]
-        order = np.argsort(points[kept, 2])  # the nearest point is written last
+        order = np.argsort(points[kept, 2])  # by depth, so that the point nearest to the viewer is written last
         picture = np.ones((self.height * self.width, 3))
         picture[pixel[order]] = colours[kept][order]
         return picture.reshape(self.height, self.width, 3)

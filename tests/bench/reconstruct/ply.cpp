@@ -14,7 +14,7 @@ const std::map<std::string, int> size_of = {{"char", 1},  {"uchar", 1},  {"short
                                             {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
 
 struct Property {
-    std::string name, type, type_of_count;  // empty type_of_count: a number, otherwise a list
+    std::string name, type, type_of_count;  // a list if type_of_count is given, else a number
 };
 
 struct Element {

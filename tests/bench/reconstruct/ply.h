@@ -1,4 +1,4 @@
-// PLY files, binary little-endian: points with or without normals, triangles.
+// Reads and writes PLY files of points, with or without normals, and triangles.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -13,5 +13,5 @@ struct Ply {
 
 /// @throws std::runtime_error  no such file; not PLY, ASCII or binary little-endian; a face is no triangle
 Ply read_ply(const std::string& path);
-/// Binary, float coordinates.
+/// Writes binary little-endian PLY with single-precision coordinates.
 void write_ply(const std::string& path, const Ply& ply);

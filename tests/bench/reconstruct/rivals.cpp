@@ -1,5 +1,6 @@
-// CGAL's reconstructions, with which covol reconstruct is compared, normals for them, and the measure. `rivals` without
-// arguments prints its usage. Points and meshes are PLY files. Parameters have the values of CGAL's manual as defaults.
+// Methods of CGAL for surfaces from points, with which covol reconstruct is compared; CGAL's normals, which some of
+// them need; and the measurement of a result. Without arguments, the program prints its usage. Points and meshes are
+// PLY files. Parameters have the values of CGAL's manual as defaults.
 #include <CGAL/Advancing_front_surface_reconstruction.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Scale_space_reconstruction_3/Jet_smoother.h>
@@ -128,7 +129,7 @@ Ply alpha_wrap(const Ply& given, const Options& options) {
 
 struct Method {
     Ply (*run)(const Ply&, const Options&);
-    Options options;  // with their defaults
+    Options options;  // {parameter: its default value}
     const char* help;
 };
 

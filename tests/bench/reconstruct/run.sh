@@ -14,4 +14,5 @@ cmake --preset default --log-level=WARNING
 cmake --build --preset default --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
 cmake -S tests/bench/reconstruct -B build/reconstruct -G Ninja --log-level=WARNING
 cmake --build build/reconstruct --parallel "${COVOL_JOBS:-$(nproc)}"
-exec /usr/bin/python3 tests/bench/reconstruct/compare.py "$@"  # Debian's, for its numpy and scikit-image
+# Debian's Python, as numpy and scikit-image are installed for it.
+exec /usr/bin/python3 tests/bench/reconstruct/compare.py "$@"

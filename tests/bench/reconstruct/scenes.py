@@ -30,8 +30,8 @@ class Scene:
 
     def __init__(self, seed=1):
         self.random = np.random.default_rng(seed)
-        self.faces = []  # (area, a function of n that gives points and normals)
-        self.edges = []  # (begin, end), or points
+        self.faces = []  # (area, function that draws n points: n -> positions, normals)
+        self.edges = []  # sharp edges: pairs of end points, or arrays of points
 
     def rectangle(self, corner, u, v, flip=False, holes=()):
         """@param holes  (u0, u1, v0, v1) in fractions of the sides"""
@@ -274,7 +274,8 @@ def measure(mesh, cloud, truth, edges, random):
     row = {"triangles": len(triangles), "spacing": apart}
     row["bare"] = float((cKDTree(cloud).query(found)[0] > 3 * apart).mean())
     if truth is not None:
-        # To the planes of the nearest samples, at points where the true surface is not simply missing.
+        # Distance to the tangential plane of the nearest true sample; to the sample itself if it is farther than 3
+        # spacings, so that the mesh has no counterpart there.
         tree = cKDTree(truth[0])
         away, nearest = tree.query(found)
         offset = np.abs(np.einsum("ij,ij->i", found - truth[0][nearest], truth[1][nearest]))

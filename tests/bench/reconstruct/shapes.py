@@ -10,7 +10,8 @@ from skimage.measure import marching_cubes
 
 import ply
 
-BLOCK = 8         # cells along the edge of a block; f is sampled only in blocks in which it may be 0
+# Cells along the edge of a block. f is evaluated at every node only in blocks that its zero level may cross.
+BLOCK = 8
 
 
 # ---- signed functions: f(p), p an array (..., 3) ---------------------------------------------------------------------
@@ -63,7 +64,8 @@ def head(p):
         horn = bent((side * 0.22, -0.05, 0.36), (side * 0.85, -0.25, 0.7), (side * 0.5, 0.1, 1.35), 16)
         f = union(f, path(p, horn, np.linspace(0.105, 0.014, len(horn))), 0.06)
         ear = bent((side * 0.36, -0.1, 0.1), (side * 0.6, -0.1, 0.2), (side * 0.85, -0.2, 0.05), 6)
-        flat = (p - np.array([0, -0.13, 0], p.dtype)) * np.array([1, 2.2, 1], p.dtype)  # a tube, flattened along y
+        # The ear is a tube in coordinates stretched along y, and thus flat.
+        flat = (p - np.array([0, -0.13, 0], p.dtype)) * np.array([1, 2.2, 1], p.dtype)
         f = union(f, path(flat, ear - [0, -0.13, 0], np.array([0.05, 0.09, 0.12, 0.12, 0.1, 0.07, 0.03])) / 2.2, 0.04)
     return f
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Khronos' glTF validator on covol's .glb files: one structure, several, y up and z up. It is run by hand, because it
-# needs node and, once, the package from npm:
+# Checks covol's .glb files with the glTF validator of Khronos: of one structure and of several, y up and z up. It is
+# run by hand, because it needs node and, the first time, a download from npm:
 #
 #     COVOL=build/bin/covol bash tests/interop/gltf/run.sh
 set -euo pipefail

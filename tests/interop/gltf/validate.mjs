@@ -1,4 +1,4 @@
-// Prints what Khronos' glTF validator says of each file; exit code 1 where it finds an error or a warning.
+// Prints the report of Khronos' glTF validator for each file. The exit code is 1 if a file has an error or a warning.
 import fs from "node:fs";
 import validator from "gltf-validator";
 

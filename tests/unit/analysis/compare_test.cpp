@@ -63,7 +63,8 @@ Solid mask_of(const ImageGeometry& geometry, const std::function<int(const Vec3&
     return solid;
 }
 
-/// Rotated by 30 degrees around z and 40 around x, spacing 0.05 x 0.08 x 0.13.
+/// An image geometry whose axes are rotated (30 degrees around z, 40 degrees around x) and whose spacing differs along
+/// each axis.
 ImageGeometry rotated_geometry() {
     const double c = std::cos(kPi / 6), s = std::sin(kPi / 6), d = std::cos(kPi / 4.5), t = std::sin(kPi / 4.5);
     ImageGeometry geometry;
@@ -85,8 +86,8 @@ TEST_CASE("shifted spheres have the analytic overlap and distances, as level set
     const Solid a = level_set({0, 0, 0}, r, h), b = level_set({shift, 0, 0}, r, h);
     const double whole = 4.0 / 3 * kPi * r * r * r;
     const double common = kPi * (4 * r + shift) * std::pow(2 * r - shift, 2) / 12;
-    // The point of one sphere at angle t from the axis is |sqrt(1 + s^2 - 2 s cos t) - 1| from the other; the mean over
-    // cos t in [-1,1]:
+    // A point of one unit sphere at angle t from the line through the centres is |sqrt(1 + s^2 - 2 s cos t) - 1| from
+    // the other sphere, whose centre is shifted by s. Its mean over all points is the mean over cos t in [-1, 1].
     double mean = 0;
     for (int i = 0; i < 1000; ++i)
         mean += std::abs(std::sqrt(r * r + shift * shift - 2 * shift * r * (-1 + (i + 0.5) / 500)) - r) / 1000;
@@ -114,8 +115,8 @@ TEST_CASE("a solid equals itself, and mesh and level set of one solid agree") {
     CHECK(compare(a, a).dice == 1.0);
     CHECK(compare(a, a).hausdorff < 1e-6);
     CHECK(compare(mesh, mesh).dice == 1.0);
-    // The level set is sampled trilinearly and the mesh is piecewise linear, so they differ only at centres on the
-    // surface.
+    // The value of the level set is interpolated trilinearly and the mesh is piecewise linear. Hence they disagree only
+    // at voxel centres that are close to the surface.
     CHECK(compare(a, mesh).dice > 0.999);
 }
 
@@ -131,7 +132,8 @@ TEST_CASE("a rotated anisotropic mask agrees with the mesh and the level set of 
         const CompareReport report = compare(mask, *other);
         CHECK(report.dice > 0.998);
         CHECK(report.volume_a == Approx(whole).epsilon(0.01));
-        CHECK(report.hausdorff <= 0.13);  // the surface lies between neighbouring centres
+        // Because the surface lies between neighbouring centres, which are at most 0.13 apart.
+        CHECK(report.hausdorff <= 0.13);
         CHECK(report.assd < 0.03);
     }
     const CompareReport swapped = compare(smooth, mask);
@@ -154,7 +156,7 @@ TEST_CASE("what lies outside a mask's image counts as well") {
     geometry.size = {20, 20, 20};
     geometry.spacing = {0.1, 0.1, 0.1};
     geometry.origin = {0.05, 0.05, 0.05};
-    // A full image is the box [0,2]^3; the other one is three times as long.
+    // The mask fills its image, the box [0,2]^3. The image of the other mask is three times as long along x.
     const Solid full = mask_of(geometry, [](const Vec3&) { return 7; });
     geometry.size[0] = 60;
     const Solid longer = mask_of(geometry, [](const Vec3&) { return 1; });
@@ -194,7 +196,9 @@ TEST_CASE("rows through edges and corners are counted once") {
     cube.mesh->triangles = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
                             {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
     const CompareReport report = compare(voxels, cube);
-    CHECK(report.dice == 1.0);  // half-open: 2, 3, 4 and 5 along each axis
+    // The mesh's cube from 2 to 6 contains the rows 2, 3, 4 and 5 along each axis, as the mask does: a row in the lower
+    // face counts as inside, one in the upper face as outside.
+    CHECK(report.dice == 1.0);
     CHECK(report.volume_b == Approx(64));
     cube.mesh->triangles.erase(cube.mesh->triangles.begin());
     CHECK_THROWS_WITH(compare(voxels, cube), Catch::Contains("not closed"));

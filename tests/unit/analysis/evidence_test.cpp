@@ -23,7 +23,7 @@ const FloatGridPtr& sphere() {
     return grid;
 }
 
-/// Slices 0.7 thick and not tilted: slice k lies at z = -10.5 + 0.7 k.
+/// An image geometry with axis-parallel slices at a distance of 0.7: slice k lies at z = -10.5 + 0.7 k.
 ImageGeometry slices() {
     ImageGeometry g;
     g.size = {45, 45, 31};
@@ -32,7 +32,7 @@ ImageGeometry slices() {
     return g;
 }
 
-/// Dense points on the part of the sphere with z <= 0, moved outwards by `off`.
+/// Dense marks on the part of the sphere with z <= 0, moved outwards by `off` world units.
 std::vector<Vec3> lower_half(double off = 0) {
     std::vector<Vec3> marks;
     const int count = 40000;
@@ -46,7 +46,7 @@ std::vector<Vec3> lower_half(double off = 0) {
     return marks;
 }
 
-/// g is 0.2 if `holds`, and 1 elsewhere.
+/// An edge detector g on the sphere's active voxels: 0.2 at positions for which `holds` is true, and 1 at the others.
 template <typename Holds>
 FloatGridPtr edges(Holds holds) {
     FloatGridPtr g = make_grid(space(), 1.0F, "edge");
@@ -56,7 +56,7 @@ FloatGridPtr edges(Holds holds) {
     return g;
 }
 
-// The angle that a chord of length kReach subtends at the centre of the sphere.
+// The angle at the sphere's centre between two positions on the sphere that are kReach apart.
 const double kAngle = 2 * std::asin(kReach / (2 * kR));
 
 }  // namespace
@@ -73,7 +73,8 @@ TEST_CASE("A half without marks is unsupported, but for the rim that the marks r
         const auto& x = mesh.vertices[v];
         const double elevation = std::atan2(x[2], std::hypot(x[0], x[1]));
         const double expected = elevation > 0 ? 2 * kR * std::sin(elevation / 2) : 0;
-        CHECK(e.distance_to_marks[v] == Approx(expected).margin(0.3 * kH));  // the marks lie 0.3 voxel apart
+        // Neighbouring marks are about 0.3 voxel apart.
+        CHECK(e.distance_to_marks[v] == Approx(expected).margin(0.3 * kH));
     }
 }
 
@@ -89,7 +90,8 @@ TEST_CASE("Each slice tells of its own zone of the sphere") {
         marks += s.marks;
         const double z = -10.5 + 0.7 * s.slice;
         if (std::abs(z) < kR - 0.7) {
-            // Archimedes: the area of a zone depends only on its height.
+            // By Archimedes' theorem, the area of the sphere between two parallel planes depends only on their
+            // distance.
             CHECK(s.area == Approx(2 * M_PI * kR * 0.7).epsilon(0.02));
         }
         if (z < -1 && s.marks > 0 && s.area > 0) {
@@ -127,8 +129,8 @@ TEST_CASE("The suggested outline is the one that reaches the most bare surface")
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 20});
     REQUIRE(e.suggestions.size() >= 2);
-    // Marks at elevation t cover t - kAngle to t + kAngle, and the lower half is covered up to kAngle: the lowest
-    // outline without overlap is at 2 kAngle.
+    // Marks at elevation t cover the elevations from t - kAngle to t + kAngle. The given marks cover everything up to
+    // kAngle, so the lowest outline that covers only bare surface is at 2 kAngle.
     const double z = kR * std::sin(2 * kAngle);
     CHECK(std::abs(-10.5 + 0.7 * e.suggestions[0].slice - z) <= 0.7);
     CHECK(e.suggestions[0].area == Approx(2 * M_PI * kR * kR * (std::sin(3 * kAngle) - std::sin(kAngle))).epsilon(0.1));

@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kSide = 40;
 
-/// Values that grow along i, far from 0.
+/// An image of kSide^3 voxels with the values 100000 + i. The large offset makes rounding errors of the standard
+/// deviation visible.
 Image ramp(double spacing) {
     ImageGeometry geometry;
     geometry.size = {kSide, kSide, kSide};
@@ -37,7 +38,7 @@ TEST_CASE("Mean and standard deviation are those of the voxels inside") {
     const IntensityStatistics found = measure_intensity(image, *sphere(5, {10, 10, 10}, 0.25));
     CHECK(double(found.voxels) == Approx(4.0 / 3 * M_PI * 1000).epsilon(0.02));
     CHECK(found.mean == Approx(100020).margin(0.01));
-    // A coordinate in a ball has the variance R^2 / 5; R is 10 voxels.
+    // A coordinate of a random position in a ball of radius R has the variance R^2 / 5; here R is 10 voxels.
     CHECK(found.standard_deviation == Approx(std::sqrt(100.0 / 5)).epsilon(0.02));
     CHECK(count_voxels_around(image, *sphere(5, {10, 10, 10}, 0.25)) >= 20 * 20 * 20);
 }

@@ -50,8 +50,8 @@ TEST_CASE("solids have the volume of their formula, in the labels and, with part
     }));
     const Phantom phantom = make_phantom(options_of(kind));
     INFO(kind);
-    // The faces of the box lie anywhere between voxel centres: each side is off by up to half a voxel of 1/25 at each
-    // end.
+    // Labels are whole voxels, with edges of about 1/25, but the faces of the box lie between voxel centres. Therefore
+    // each side of the labelled box is off by up to half a voxel at each end.
     CHECK(label_volume(phantom) == Approx(volume).epsilon(kind == "box" ? 0.06 : 0.03));
     CHECK(bright_volume(phantom) == Approx(volume).epsilon(0.01));
 }
@@ -77,8 +77,8 @@ TEST_CASE("points lie on the surface that the labels bound") {
 }
 
 TEST_CASE("points cover a solid's surface evenly") {
-    // The mean over a sample that is uniform by area equals the mean over the surface: |z| on a sphere is r/2, z^2 on a
-    // torus r^2 (1/2), x^2 on a box by hand.
+    // The mean of a function over points that are uniform by area equals its mean over the surface: |z| on a sphere has
+    // the mean r/2, z^2 on a torus r^2/2. The mean of x^2 on the box is the area-weighted mean over its faces.
     const int n = 20000;
     const auto mean = [](const Phantom& phantom, auto f) {
         double sum = 0;
@@ -89,8 +89,8 @@ TEST_CASE("points cover a solid's surface evenly") {
           Approx(0.4).margin(0.01));
     CHECK(mean(make_phantom(options_of("torus", 16, n)), [](const Vec3& p) { return p[2] * p[2]; }) ==
           Approx(0.3 * 0.3 / 2).margin(0.001));
-    // Points uniform in the tube's angle would have the mean distance R from the axis; uniform by area it is R + r^2 /
-    // (2R).
+    // If points were uniform in the angle around the tube, their mean distance from the torus's axis would be R. As
+    // they are uniform by area, it is R + r^2 / (2R).
     CHECK(mean(make_phantom(options_of("torus", 16, n)), [](const Vec3& p) { return std::hypot(p[0], p[1]); }) ==
           Approx(0.75 + 0.09 / 1.5).margin(0.005));
     const double x_faces = 0.7 * 0.5, others = 0.9 * (0.7 + 0.5);
@@ -114,7 +114,8 @@ TEST_CASE("the spheres with holes are a thin shell, and the points lie in its ho
         Vec3 pole{0, 0, 0};
         pole[axis] = radius;
         CHECK(value_at(pole) == 0);
-        // The slit on the x axis is long along y, the one on y along z, the one on z along x.
+        // In sphere-slit, the slit at the pole on the x axis is long along y, the one on y along z, and the one on z
+        // along x, so that `side` lies in the slit and `other` beside it.
         Vec3 side = pole, other = pole;
         side[(axis + 1) % 3] = 0.2;
         other[(axis + 2) % 3] = 0.2;
@@ -122,7 +123,8 @@ TEST_CASE("the spheres with holes are a thin shell, and the points lie in its ho
         CHECK(value_at(side) == 0);
         CHECK(value_at(other) == (kind == "sphere-slit" ? 255 : 0));
     }
-    // not (0.5, 0.5, 0.5), which is halfway between voxels: the nearest voxel is outside of the shell
+    // The position is not (0.5, 0.5, 0.5), which is halfway between voxels, so that lround() would choose a voxel
+    // outside of the shell.
     CHECK(value_at({0.52, 0.52, std::sqrt(radius * radius - 2 * 0.52 * 0.52)}) == 255);
     CHECK(value_at({0, 0, 0}) == 0);
 }
@@ -138,8 +140,8 @@ TEST_CASE("the seed decides the points and the noise") {
     const ImageGeometry& g = a.image.geometry();
     double sum = 0, squares = 0;
     int same = 0, count = 0;
-    // Well inside the ball of radius 0.8 the clean value is 255, outside 0, and noise is clipped by the range of a
-    // byte: the clipped part has mean noise / sqrt(2 pi) and mean square noise^2 / 2.
+    // The first four slices lie outside the ball, where the value without noise is 0. Negative values are clipped by
+    // the range of a byte: what remains has the mean noise / sqrt(2 pi) and the mean square noise^2 / 2.
     for (int i = 0; i < 32; ++i)
         for (int j = 0; j < 32; ++j)
             for (int k = 0; k < 4; ++k) {

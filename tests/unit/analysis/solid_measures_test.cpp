@@ -13,7 +13,8 @@ using namespace covol;
 
 namespace {
 
-/// Not a distance, but one along the normal near the surface: |x/a|^2 = 1 scaled by |grad|.
+/// A level set of an ellipsoid with the semi-axes `half`. Its values are f / |grad f| for f = |x / half| - 1, which is
+/// the signed distance to first order near the surface.
 FloatGridPtr ellipsoid(const openvdb::Vec3d& center, const openvdb::Vec3d& half, double voxel) {
     auto grid = std::make_shared<openvdb::FloatGrid>(float(3 * voxel));
     grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
@@ -43,7 +44,8 @@ TEST_CASE("Centroid and extents are those of the body, far finer than a voxel") 
     for (std::size_t a = 0; a < 3; ++a) {
         const auto axis = int(a);
         CHECK(found.centroid[a] == Approx(center[axis]).margin(0.001));
-        // The farthest point lies between voxels: the box is smaller by half a squared voxel over a diameter.
+        // The outermost position of the surface lies between voxels. Therefore the measured box is too small, by about
+        // half a squared voxel over a diameter.
         CHECK(found.box.max[a] - found.box.min[a] == Approx(2 * half[axis]).margin(0.005));
         CHECK((found.box.max[a] + found.box.min[a]) / 2 == Approx(center[axis]).margin(0.003));
     }

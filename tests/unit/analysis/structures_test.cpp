@@ -29,7 +29,7 @@ FloatGridPtr ball(const Ball& b) { return extract_surface(*start_from_sphere(spa
 
 Vec3 to_vec(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// The number of voxels that are inside of both.
+/// The number of voxels that are inside both level sets.
 int common_voxels(const FloatGrid& a, const FloatGrid& b) {
     int count = 0;
     const Domain d = space();
@@ -56,7 +56,8 @@ bool same_bits(const FloatGrid& a, const FloatGrid& b) {
 /// The volume of a cap of height t that a plane cuts from a solid ball.
 double cap_volume(double r, double t) { return M_PI * t * t * (3 * r - t) / 3; }
 
-/// Each vertex lies on its own ball outside of the other one, or on the middle surface between them.
+/// Checks that each vertex lies either on its own ball and outside the other one, or on the middle surface, whose
+/// positions have the same signed distance to both balls.
 void check_vertices(const FloatGrid& surface, const Ball& mine, const Ball& other) {
     int on_middle = 0;
     for (const auto& v : extract_mesh(surface).vertices) {
@@ -84,7 +85,7 @@ TEST_CASE("Overlapping balls of one size part at the plane between them") {
 }
 
 TEST_CASE("A deep overlap parts in its middle too") {
-    // The lens is 14 units (28 voxels) thick, far wider than the narrow bands.
+    // The overlap of the balls is 14 units (28 voxels) thick, far more than the width of the narrow bands.
     const Ball a{{-3, 0, 0}, 10}, b{{3, 0.4, 0}, 10};
     const auto [surfaces, report] = separate({{"a", ball(a)}, {"b", ball(b)}});
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
@@ -110,7 +111,7 @@ TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays")
         CHECK(report.changed == std::vector<bool>{true, true});
         const auto in_a = surfaces[0]->getConstAccessor(), in_b = surfaces[1]->getConstAccessor();
         CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
-        // The two surfaces meet on the line between the centres.
+        // On the line between the centres, both surfaces must cross the middle of the gap.
         const openvdb::Vec3d x = surfaces[0]->transform().worldToIndex(openvdb::Vec3d(gap / 2, 0, 0));
         const openvdb::Coord low(int(std::floor(x[0])), int(std::round(x[1])), int(std::round(x[2])));
         const double t = x[0] - low[0];
@@ -130,11 +131,13 @@ TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays")
 }
 
 TEST_CASE("Walls beside each other close no more than the gap between them") {
-    // Two slabs with a slit of 0.6 voxel; nothing may grow above them.
+    // Two slabs with a slit of 0.6 voxel between them. Both end at z = 4, and the filling of the slit may not extend
+    // above.
     const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-6, -6, -6}, {0, 6, 4}}));
     const FloatGridPtr b = extract_surface(*start_from_box(space(), {{0.6 * kH, -6, -6}, {6, 6, 4}}));
     const auto [surfaces, report] = separate({{"a", a}, {"b", b}});
-    // Each slab grows by half the slit, except for a strip less than a voxel wide along the rim, which is rounded.
+    // Each slab grows by half of the slit's width over the face of 12 x 10 at the slit, except for a strip less than a
+    // voxel wide along its rim, which is rounded.
     const double maximum = 0.3 * kH * 12 * 10, minimum = maximum - 0.3 * kH * 2 * (12 + 10) * kH;
     for (const double growth : {volume(*surfaces[0]) - volume(*a), volume(*surfaces[1]) - volume(*b)}) {
         CHECK(growth < maximum);
@@ -164,7 +167,7 @@ TEST_CASE("Three balls part along a triple line, in any order, with the same bit
             CHECK(std::abs(expected) < 0.3 * kH);
         }
     }
-    // No voxel of the union is lost.
+    // The surfaces contain as many voxels as the union of the given balls.
     int sum = 0, all = 0;
     const Domain d = space();
     for (int i = d.min[0]; i <= d.max[0]; ++i)
@@ -204,7 +207,7 @@ TEST_CASE("A solid inside another is carved out of it, whatever the order") {
 }
 
 TEST_CASE("A solid in another's cavity stays, and the slit between them closes") {
-    // A shell with a cavity of radius 5, and a ball whose radius is 0.4 voxel smaller.
+    // A shell with a cavity of radius 5, and in it a ball whose radius is 0.4 voxel smaller than that of the cavity.
     FloatGridPtr shell = separate({{"shell", ball({{0, 0, 0}, 8})}, {"hole", ball({{0, 0, 0}, 5})}}).surfaces[0];
     const double r = 5 - 0.4 * kH;
     const auto [surfaces, report] = separate({{"shell", shell}, {"ball", ball({{0, 0, 0}, r})}});
@@ -230,7 +233,8 @@ TEST_CASE("separate() says what is wrong with its input") {
 }
 
 TEST_CASE("Labels leave no voxel to two structures, and none out where they touch") {
-    // The middle plane x = 0.1 is a plane of voxel centres, so all of its voxels are ties.
+    // The plane halfway between the overlapping ends of the two solids, x = 0.1, contains voxel centres. They have the
+    // same distance to both solids, so all of them are ties.
     const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
     const FloatGridPtr b = extract_surface(*start_from_box(space(), {{-0.4, -4, -4}, {6.1, 4, 4}}));
     const SeparateResult settled = separate({{"b", b}, {"a", a}});
@@ -247,7 +251,7 @@ TEST_CASE("Labels leave no voxel to two structures, and none out where they touc
                 const bool solid = x[0] > -5.8 && x[0] < 6 && std::abs(x[1]) < 3.9 && std::abs(x[2]) < 3.9;
                 const bool outside = x[0] < -6 || x[0] > 6.2 || std::abs(x[1]) > 4.1 || std::abs(x[2]) > 4.1;
                 const int label = labels[(std::size_t(k) * 40 + j) * 40 + i];
-                // Ties go to the first name in alphabetical order: 'a', label 2.
+                // Ties go to the structure whose name is first in alphabetical order: 'a', which has label 2.
                 if (solid) CHECK(label == (x[0] < 0.1 + 1e-6 ? 2 : 1));
                 if (outside) CHECK(label == 0);
             }

@@ -67,7 +67,8 @@ TEST_CASE("the lattice does not depend on the part that is asked for") {
     CHECK(choose_domain(part, 0.5, {}, {}).origin == Vec3{0, 0, 0});
     CHECK(choose_domain(part, 0.5, {}, {}).min == Index3{4, 6, 8});
     CHECK(choose_domain(other, 0.5, image, Vec3{1, 2, 3}).origin == Vec3{1, 2, 3});
-    // Far from the world's origin, neighbouring domains share a lattice whose leaf keys do not overflow.
+    // At 4e6 world units, indices counted from the world's origin (4e8 voxels) would overflow the keys of leaves. The
+    // lattice then has another origin, which is the same for neighbouring domains.
     const WorldBox far{{4e6, 5e6, 0}, {4e6 + 10, 5e6 + 10, 10}}, beside{{4e6 + 9, 5e6, 0}, {4e6 + 20, 5e6 + 9, 10}};
     const Domain a = choose_domain(far, 0.01, {}, {}), b = choose_domain(beside, 0.01, {}, {});
     CHECK(a.origin == b.origin);

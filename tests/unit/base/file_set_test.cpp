@@ -18,8 +18,8 @@
 using namespace covol;
 namespace fs = std::filesystem;
 
-/// In support/kill_at.cpp: kills this process before the number-th call, counted from here, that puts files in place;
-/// 0: never.
+/// Defined in support/kill_at.cpp: counts, from now on, the calls that put files in place (rename, unlink, fsync, ...),
+/// and kills this process before the number-th of them; 0: never.
 extern "C" void covol_kill_before(long number);
 
 namespace {
@@ -44,7 +44,7 @@ void run_and_kill(const Body& body) {
     REQUIRE(WIFSIGNALED(status));
 }
 
-/// Runs `body` in a separate process. @returns whether it was killed (kill_before())
+/// Runs `body` in a separate process. @returns whether kill_before() killed that process
 template <typename Body>
 bool is_killed(const Body& body) {
     const pid_t child = ::fork();
@@ -160,7 +160,7 @@ TEST_CASE("file_set: the next run clears after one that was killed, and leaves t
     const fs::path root = folder.path("");
     folder.write("a", "old a");
     run_and_kill([&] {
-        FileSet* set = new FileSet;  // never destroyed
+        FileSet* set = new FileSet;  // never destroyed, as in a process that is killed
         write(*set, folder.path("a"), "half of a set");
     });
     CHECK(folder.file_count() == 2);
@@ -198,7 +198,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
             }
             for (const std::string& name : names)
                 if (name != "two/fresh") folder.write(name, "old");
-            // As if written by a server whose clock is ahead.
+            // This file seems to be newer than the set, as if a server whose clock is ahead had written it.
             fs::last_write_time(folder.path("one/c"), fs::file_time_type::clock::now() + std::chrono::hours(1));
             killed = is_killed([&] {
                 FileSet set;
@@ -218,7 +218,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                     CHECK(bytes_of(folder.path(name)) == state);
             }
             (state == "new" ? news : olds) += 1;
-            // The next run in each of the other folders removes what is left over there, and changes nothing else.
+            // The next run in each folder removes the scratch folder that is left there, and changes no other file.
             for (const char* name : {"one", "two"}) {
                 { const ScratchFolder clears(folder.path(name)); }
                 CHECK(scratch_in(folder.path(name)).empty());
@@ -227,7 +227,8 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                 CHECK((bytes_of(folder.path(name)) == state) == fs::exists(folder.path(name)));
         }
     }
-    // All cases occurred: killed before the commit, between the renames and while clearing up.
+    // The set was killed at several calls before it was committed (`olds`), and at several calls during the renames and
+    // while clearing up (`news`).
     CHECK(olds > 2 * 5);
     CHECK(news > 2 * 5);
 }
@@ -281,8 +282,8 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
         }
         met = true;
         folder.write("c", "another's");
-        fs::last_write_time(root / "c",
-                            fs::file_time_type::clock::now() - std::chrono::hours(1));  // for example a copy
+        // Another file than the set's, with an older time of modification, as for example a copy has it.
+        fs::last_write_time(root / "c", fs::file_time_type::clock::now() - std::chrono::hours(1));
         { const ScratchFolder next(root); }
         CHECK(bytes_of(folder.path("b")) == "new");
         CHECK(bytes_of(folder.path("c")) == "another's");
@@ -294,7 +295,8 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
 TEST_CASE("file_set: only what covol made is cleared") {
     const Scratch folder;
     const fs::path root = folder.path("");
-    // Files of a user: names of all kinds, and copies of a folder that covol left behind.
+    // A user's folders whose names resemble those of covol's scratch folders, and copies of a folder that covol left
+    // behind: all of them must stay.
     run_and_kill([&] {
         FileSet* set = new FileSet;
         write(*set, folder.path("a"), "half of a set");
@@ -314,9 +316,10 @@ TEST_CASE("file_set: only what covol made is cleared") {
     std::ofstream(root / "outside/file") << "important";
     fs::create_directory_symlink(root / "outside", root / ".covol-linked");
     std::ofstream(root / ".covol-single") << "a file";
-    fs::create_directory(root / ".covol-empty1");  // as left by a process that is killed at once
+    // As left by a process that is killed right after it has made its folder.
+    fs::create_directory(root / ".covol-empty1");
     fs::create_directory(root / ".covol-empty1.5");
-    // A link in a folder that covol left behind is not followed, and what covol did not list stays.
+    // A link in a folder that covol left behind is not followed, and files there that covol did not list are kept.
     fs::create_directory_symlink(root / "outside", left / "a.zarr");
     std::ofstream(left / "a stranger's") << "important";
     { const ScratchFolder next(root); }
@@ -351,7 +354,8 @@ TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
         { const ScratchFolder clears(folder.path("one")); }
         folder.write("one/a", "old");
     }
-    // Moved into another folder, as may happen in an archive from somebody else.
+    // The folder that covol left behind is copied to another place, as may happen with an archive from somebody else.
+    // The files that it names are not in this place, so they must not be moved.
     const fs::path left = scratch_in(folder.path("one")), moved = fs::path(folder.path("two")) / left.filename();
     fs::copy(left, moved, fs::copy_options::recursive);
     { const ScratchFolder next(folder.path("two")); }
@@ -470,7 +474,7 @@ TEST_CASE("file_set, write_text_file: a link stays, and what it points to is rep
         REQUIRE(::stat(folder.path("file").c_str(), &entry) == 0);
         CHECK(entry.st_uid == 1234);
         CHECK(entry.st_gid == 2345);
-        // A link of another user in a world-writable folder, with the metadata that the kernel gives it.
+        // In a world-writable folder with the sticky bit, as /tmp is, a link of another user is not followed.
         fs::create_directory(root / "tmp");
         ::chmod((root / "tmp").c_str(), 01777);
         fs::create_symlink(root / "file", root / "tmp/link");

@@ -29,7 +29,7 @@ struct DummyOptions {
 
 }  // namespace
 
-// An option needs nothing but a row.
+// To define an option, a row in a table suffices.
 template <>
 inline constexpr auto covol::kWords<Dummy> = std::array{"one", "two"};
 template <>

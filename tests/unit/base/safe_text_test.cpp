@@ -16,8 +16,9 @@ TEST_CASE("what steers a terminal is written as its number") {
     CHECK(safe_text("a\nb\rc\td") == "a\\u000ab\\u000dc\\u0009d");
     CHECK(safe_text(std::string("nul\0end", 7)) == "nul\\u0000end");
     CHECK(safe_text("del\x7f") == "del\\u007f");
+    // U+009B, the control sequence introducer (CSI) of terminals as one character.
     CHECK(safe_text("C1 \xC2\x9B"
-                    "31m") == "C1 \\u009b31m");  // a terminal's CSI as one character
+                    "31m") == "C1 \\u009b31m");
     CHECK(safe_text("vdb.\xE2\x80\xAE"
                     "exe") == "vdb.\\u202eexe");  // reverses the direction of the text after it
     CHECK(safe_text("\xE2\x81\xA6\xE2\x80\x8F") == "\\u2066\\u200f");
@@ -26,9 +27,10 @@ TEST_CASE("what steers a terminal is written as its number") {
 
 TEST_CASE("bytes that are no UTF-8 are written as their numbers") {
     CHECK(safe_text("latin\xE9") == "latin\\xe9");
+    // The byte 0x9B, which is the control sequence introducer (CSI) of 8-bit terminals.
     CHECK(safe_text("\x9b"
-                    "31m") == "\\x9b31m");         // CSI of 8-bit terminals
-    CHECK(safe_text("\xC1\x9B") == "\\xc1\\x9b");  // an overlong form
+                    "31m") == "\\x9b31m");
+    CHECK(safe_text("\xC1\x9B") == "\\xc1\\x9b");  // an overlong form of a character that needs one byte
     CHECK(safe_text("\xE0\x82\x9B") == "\\xe0\\x82\\x9b");
     CHECK(safe_text("\xED\xA0\x80") == "\\xed\\xa0\\x80");           // half of a surrogate pair
     CHECK(safe_text("\xF4\x90\x80\x80") == "\\xf4\\x90\\x80\\x80");  // beyond the last code point

@@ -35,7 +35,8 @@ Image ball_image() {
     return Image::from_values(geometry, values.data());
 }
 
-/// All sweeps, each from the states after the one before. @return number of sweeps
+/// Solves the bricks in sweeps until all seams are within the tolerance. In each sweep, a brick's neighbours have the
+/// states of the previous sweep. @return number of sweeps
 int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridPtr>& states) {
     states.assign(plan.bricks.size(), nullptr);
     for (int sweep = 1;; ++sweep) {
@@ -52,7 +53,8 @@ int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridP
     }
 }
 
-/// Largest difference near both surfaces, in voxels, and the number of voxels compared.
+/// The maximum difference of two level sets, in voxels, at the voxels within one voxel of the first one's surface, and
+/// the number of these voxels.
 struct StateDifference {
     double maximum = 0;
     std::int64_t count = 0;
@@ -112,7 +114,9 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
     options.model = Model::Paper;
-    SegmentOptions from_coarse = options;  // from the tagged start the steady surface is up to 0.06 voxels away
+    // From the tagged start the steady surface is up to 0.06 voxels away from the one that is computed from a coarse
+    // level, as in the bricks.
+    SegmentOptions from_coarse = options;
     from_coarse.coarse_levels = 1;
     const SegmentResult whole = segment(image, points, from_coarse);
     BrickJob job(image, points, options, {});
@@ -131,7 +135,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     const StateDifference difference = apart(*joined.surface, *whole.surface);
     CHECK(difference.count > 20000);
     CHECK(difference.maximum < 0.05);
-    // Errors against the true ball, on the bricks' faces and away from them.
+    // Maximum errors against the true ball: within 2 voxels of the bricks' common faces (`on`), and elsewhere (`off`).
     double on = 0, off = 0;
     for (auto value = joined.surface->cbeginValueOn(); value; ++value) {
         if (std::abs(*value) > 1) continue;
@@ -165,7 +169,8 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     const SegmentResult mesh = with.join(plan, known), lean = without.join(plan, known, true);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.u == nullptr);
-    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);  // rounding: each brick has its own origin
+    // Rounding errors, because each brick has its own origin.
+    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);
     CHECK(lean.report.surface.genus == 0);
     CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
     CHECK(lean.report.fit.mean == Approx(mesh.report.fit.mean).margin(0.01));
@@ -186,7 +191,7 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     CHECK(once.stop_reason == StopReason::Steady);
     CHECK(once.steps > 0);
     CHECK(apart(*once.state, *again.state).maximum == 0);
-    CHECK(measure_seams(plan, 1, none) > 1);  // no states yet
+    CHECK(measure_seams(plan, 1, none) > 1);  // the neighbours have no states yet
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }
 

@@ -1,4 +1,4 @@
-// Free memory as a machine and its control groups report it, on file trees that imitate /proc and /sys.
+// Tests of the free memory that a machine and its control groups report, on file trees that imitate /proc and /sys.
 #include "cli/system/free_memory.h"
 
 #include <sys/resource.h>
@@ -110,8 +110,8 @@ TEST_CASE("control groups, version 1: the memory controller's mount") {
     CHECK(machine.free().where == "this machine");
     machine.v1("sys/fs/cgroup/memory/slurm/uid_1/job_7", mib(400), 350 * kMiB, 250 * kMiB);
     CHECK(machine.free().bytes == 300 * kMiB);
-    machine.v1("sys/fs/cgroup/memory/slurm", mib(1000), 950 * kMiB,
-               0);  // most of it is used by other processes in the group
+    // Other processes in this group use most of its memory.
+    machine.v1("sys/fs/cgroup/memory/slurm", mib(1000), 950 * kMiB, 0);
     CHECK(machine.free().bytes == 50 * kMiB);
     CHECK(machine.free().where == "the control group /sys/fs/cgroup/memory/slurm");
 }
@@ -150,7 +150,7 @@ TEST_CASE("a group outside of the namespace: what is mounted is what is known") 
         machine.group(group);
         CHECK(machine.free().bytes == 200 * kMiB);
     }
-    // the mount was made outside of the namespace, and shows more
+    // This mount was made outside of the namespace, so that it also contains the groups outside of it.
     machine.mounts("30 23 0:26 /../.. /sys/fs/cgroup rw - cgroup2 cgroup2 rw\n").group("0::/../../other/job\n");
     machine.v2("sys/fs/cgroup/other/job", mib(90), "max", 0, 0);
     CHECK(machine.free().bytes == 90 * kMiB);
@@ -194,7 +194,8 @@ TEST_CASE("limits of address space and data bind, less what is in use") {
         }
     };
     FakeMachine machine;
-    machine.write("proc/self/statm", "1000 500 100 10 0 300 0\n");  // pages
+    // In pages; address space is the first number, data the sixth.
+    machine.write("proc/self/statm", "1000 500 100 10 0 300 0\n");
     constexpr std::uint64_t kPage = 4096;
     {
         const Restored space(RLIMIT_AS);

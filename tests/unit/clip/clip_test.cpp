@@ -1,4 +1,4 @@
-// Solids that the end of the image cuts: flat caps on the box of the image, and mesh, mask and level set that agree.
+// Solids that extend beyond the image have flat caps on its box, and mesh, mask and level set of them agree.
 #include "covol/clip.h"
 
 #include <openvdb/openvdb.h>
@@ -61,12 +61,13 @@ struct Scene {
 Scene scene_of(const Cut& cut, const Vec3& radii) {
     Scene scene;
     scene.radii = radii;
-    // The face lies where `fraction` of the extent remains; along other axes, somewhere within a voxel.
+    // Along a cut axis, the image begins so that `fraction` of the body's extent remains. Along the others it begins
+    // about 5 voxels before the body, at some position within a voxel.
     scene.geometry.spacing = cut.spacing;
     const Vec3 off{0.31, -0.22, 0.13};
     for (int a = 0; a < 3; ++a) {
         const bool is_cut = a == 2 || (cut.two && a == 0);
-        // Two deep cuts would leave only a sliver.
+        // If two axes are cut, at least half remains along the second, because two deep cuts would leave only a sliver.
         const double left = a == 2 ? cut.fraction : std::max(cut.fraction, 0.5);
         const double low =
             is_cut ? -radii[a] + 2 * radii[a] * (1 - left) : -radii[a] - 5 * cut.spacing[a] + off[a] * cut.spacing[a];
@@ -86,7 +87,8 @@ struct Truth {
     double volume = 0, cap_area = 0;
 };
 
-/// By fine sampling of the part in the clip; the cap is the one across axis 2.
+/// The volume of the part of the body inside the image, and the area of the cap across axis 2, by sampling on 400^2
+/// columns.
 Truth measure_truth(const Scene& scene) {
     const WorldBox box = scene.geometry.world_box();
     Truth truth;
@@ -162,13 +164,15 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                 }
             const Truth truth = measure_truth(scene);
             const double coarse = cut.h / std::min({radii[0], radii[1], radii[2]});
-            // chords lose volume of a ball, and a larger fraction of its cap
+            // The edges of the triangles are chords, which cut off a part of a ball's volume and a larger fraction of
+            // its cap.
             const double chords = (cut.fraction < 0.5 ? 1.0 : 0.7) * coarse * coarse;
             const double volume = m.volume / truth.volume - 1,
                          cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;
             CHECK(std::abs(volume) < 0.003 + chords);
             CHECK(std::abs(cap) < 0.005 + 2 * chords);
-            // The label image is that of the truth, except for voxels whose centre is close to the surface.
+            // In the slice at the cut, the labels are those of the exact shape, except for voxels whose centre is close
+            // to the surface.
             const auto labels = rasterize(*solid, scene.geometry);
             const auto [ni, nj, nk] = scene.geometry.size;
             double marked = 0, expected = 0;
@@ -182,8 +186,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                     if (std::abs(d) > 0.25 * cut.h) REQUIRE(label == (d < 0));
                 }
             CHECK(std::abs(marked - expected) <= 0.03 * expected);
-            // A level set without the metadata, as other programs read it: only the edge of the cut is rounded, by less
-            // than a voxel.
+            // Other programs read the level set without the metadata of the clip. Then only the edge of the cut is
+            // rounded, by less than a voxel.
             const FloatGridPtr plain = solid->deepCopy();
             set_clip(*plain, {});
             const TriangleMesh rounded = extract_mesh(*plain);

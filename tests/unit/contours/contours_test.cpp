@@ -23,7 +23,7 @@ namespace {
 
 const double kPi = std::acos(-1.0);
 
-/// Lines of marks in voxels of one image.
+/// Builds lines of marks whose coordinates are voxel indices of one image.
 class Drawing {
 public:
     explicit Drawing(ImageGeometry geometry) : geometry_(std::move(geometry)) {
@@ -40,7 +40,7 @@ public:
         cloud_.lines.push_back(line);
         return *this;
     }
-    /// A circle of world radius r around a position in slice k; `axis` is the normal of the slices.
+    /// A circle of world radius r around the voxel position (x, y) in slice k; `axis` is the normal of the slices.
     Drawing& circle(double x, double y, double k, double r, int axis = 2, int count = 96) {
         const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
         std::vector<Vec3> marks;
@@ -70,7 +70,7 @@ private:
     PointCloud cloud_;
 };
 
-/// Size, spacing and origin differ along every axis, and the axes are rotated against the world's.
+/// An image geometry with rotated axes, along each of which size, spacing and origin differ.
 ImageGeometry turned_geometry() {
     ImageGeometry g;
     g.size = {80, 100, 80};
@@ -102,7 +102,7 @@ std::vector<Vec3> all_points(const Contours& c) {
     return points;
 }
 
-/// By a Riemann sum over the box of the body.
+/// The volume by a Riemann sum over the box of the body, with cubes of edge `step`.
 double volume(const ContourSolid& solid, double step) {
     const WorldBox box = solid.box();
     double count = 0;
@@ -112,7 +112,7 @@ double volume(const ContourSolid& solid, double step) {
     return count * step * step * step;
 }
 
-/// The largest distance from a position on the surface to its nearest point. Positions are found on rays from `inside`.
+/// The maximum distance of a position on the surface from the nearest point, on random rays from `inside`.
 double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, const Vec3& inside, double far) {
     std::mt19937 random(5);
     std::normal_distribution<double> normal;
@@ -134,7 +134,7 @@ double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, co
     return widest;
 }
 
-/// The result of a flood fill from outside through {d > D}, with the leak test of tag_interior().
+/// The report of tag_interior(): a flood fill from outside through {d > D}, with a test for leaks.
 BandReport flood(const std::vector<Vec3>& points, double h, double D) {
     const Domain domain = make_domain(bounding_box(points, D + 6 * h), h);
     const FloatGridPtr d = covol::compute_distance(points, domain, {D + 6 * h}).grid;
@@ -304,14 +304,14 @@ TEST_CASE("a cylinder's level is the distance to its wall in all three planes, i
 
 TEST_CASE("steep walls, terraces and caps are closed") {
     Drawing drawing(cube(80));
-    // A cone, and a disc whose neighbour is much smaller.
+    // A cone of radius 30 to 10, and on it a cylinder of radius 4, so that the last slice of the cone is a terrace.
     for (int k = 10; k <= 20; ++k) drawing.circle(40, 40, k, 30 - 2 * (k - 10));
     for (int k = 21; k <= 30; ++k) drawing.circle(40, 40, k, 4);
     const Contours c = drawing.densify(1);
     CHECK(widest_gap(*c.solid, all_points(c), {40, 40, 14}, 60) < 1);
     const BandReport all = flood(all_points(c), 1, 1.5);
     CHECK_FALSE(all.leaks);
-    // The contours alone leak, at least at the caps: the points between the slices close them.
+    // The points of the contours alone leak, at least at the caps. The points between the slices close the gaps.
     CHECK(flood(c.along, 1, 1.5).leaks);
 }
 
@@ -343,7 +343,7 @@ TEST_CASE("between skipped slices an ellipsoid is met closer than by straight li
         }
     CHECK(linear > 0.7);
     CHECK(cubic < 0.5 * linear);
-    // The poles lie 3 beyond the last slices; the area there is linear in w to first order.
+    // The poles lie 3 beyond the last slices. compute_cap_height() finds them, as the area there is linear in w.
     for (const double sign : {-1.0, 1.0}) {
         CHECK(c.solid->level({50, 50, 50 + sign * 29}) < 0);
         CHECK(c.solid->level({50, 50, 50 + sign * 31}) > 0);
@@ -374,11 +374,11 @@ TEST_CASE("a single contour that moves by more than its width is carried along")
     const Contours c = drawing.densify(1, ContourCurve::Lines, warnings.run);
     REQUIRE(warnings.lines.size() == 1);
     CHECK(warnings.lines[0].find("do not overlap") != std::string::npos);
-    // A sheared cylinder: halfway between two slices its centre is halfway between theirs.
+    // The body is a sheared cylinder: halfway between two slices its centre is halfway between those of their circles.
     CHECK(c.solid->level({21, 40, 12.5}) == Approx(-4).margin(0.1));
     CHECK(c.solid->level({25, 40, 12.5}) == Approx(0).margin(0.1));
     CHECK(c.solid->level({15, 40, 14.9}) > 0);
-    // The same if parts cannot be matched unambiguously: they end.
+    // If a slice has several contours and none overlaps the next slice's, the parts end between the slices.
     Drawing several(cube(80));
     several.circle(10, 20, 10, 5).circle(10, 50, 10, 5).circle(40, 20, 15, 5).circle(40, 50, 15, 5);
     Warnings ended;
@@ -395,7 +395,7 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
     const Contours c = drawing.densify(1);
     CHECK(c.slices == at.size());
     for (double k = 10; k < 30.5; k += 0.7) CHECK(c.solid->level({40, 30, k}) == Approx(0).margin(0.02));
-    // Marks of one slice that differ only by rounding belong to one slice.
+    // Contours whose planes differ only by rounding (10 and 10.05) belong to one slice.
     Drawing shaken(cube(60));
     shaken.circle(30, 30, 10, 12).circle(30, 30, 10.05, 6).circle(30, 30, 12, 12);
     const Contours s = shaken.densify(1);
@@ -408,7 +408,7 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
 TEST_CASE("a dome ends where the shrinking section would") {
     // Areas of sections of an ellipsoid near its pole are linear in the height.
     CHECK(compute_cap_height(3, 9, 4, 4) == Approx(2));
-    CHECK(compute_cap_height(3, 4, 4, 4) == 4);  // not beyond the next slice
+    CHECK(compute_cap_height(3, 4, 4, 4) == 4);  // at most the usual distance between slices
     CHECK(compute_cap_height(3, 3, 4, 4) == 4);
     CHECK(compute_cap_height(5, 3, 4, 4) == 4);
     CHECK(compute_cap_height(3, 0, 4, 4) == 4);
@@ -416,7 +416,7 @@ TEST_CASE("a dome ends where the shrinking section would") {
 
 // ---- beyond the image's end -----------------------------------------------------------------------------------------
 
-/// Whether everything inside lies in box(), and may_meet() holds for every ball that the surface crosses.
+/// Checks that the inside lies in box(), and that may_meet() is true for balls that the surface crosses.
 void check_bounds(const ContourSolid& solid, const Vec3& middle, double far) {
     const WorldBox box = solid.box();
     std::mt19937 random(11);
@@ -439,8 +439,8 @@ TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned
         const Contours c = drawing.densify(0.5);
         const auto level = [&](double x, double k) { return c.solid->level(g.index_to_world({x, 45, k})); };
         CHECK(level(40, -0.4) < -5);
-        CHECK(level(40, -3) < 0);   // its wall continues by a band's width beyond the image
-        CHECK(level(40, -40) > 0);  // and then it ends
+        CHECK(level(40, -3) < 0);   // the wall continues beyond the image by the width of a band
+        CHECK(level(40, -40) > 0);  // farther away the body has ended
         CHECK(level(40, -1000) > 0);
         CHECK(c.solid->may_meet(g.index_to_world({40, 45, -1000}), 5) == false);
         check_bounds(*c.solid, g.index_to_world({40, 45, 0}), 60);
@@ -457,17 +457,17 @@ TEST_CASE("a section that widens towards the image's end does not grow for ever"
     };
     CHECK(radius_at(57) == Approx(9).margin(0.2));
     CHECK(radius_at(59.4) > 9.5);
-    CHECK(radius_at(59.4) < 9 + 2.4 + 0.2);  // by at most 45 degrees
+    CHECK(radius_at(59.4) < 9 + 2.4 + 0.2);  // the wall slopes outward by at most 45 degrees
     for (double k = 60; k < 80; k += 1) CHECK(radius_at(k) < 9 + (k - 57) + 0.2);
     check_bounds(*c.solid, {30, 30, 57}, 100);
-    // A narrowing section continues at the same rate.
+    // A section that becomes narrower towards the image's end continues to do so at the same rate.
     const Contours cone = Drawing(cube(60)).circle(30, 30, 54, 20).circle(30, 30, 57, 14).densify(1);
     for (const double k : {58.0, 59.0})
         CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
 }
 
 TEST_CASE("the start from contours in the corner of an image is not inside out") {
-    // Like a nucleus of a worm: two contours of a small body, one of them along the end of the image.
+    // Two contours of a small body in a corner of the image, one of them along the image's end.
     Drawing drawing(cube(60));
     drawing.add({{5, 59, 55}, {1.5, 59, 55}, {0.5, 58, 55}, {4, 57, 55}});
     drawing.add(
@@ -487,7 +487,7 @@ TEST_CASE("one slice makes a lens, two slices a body") {
     const Contours one = Drawing(cube(60)).circle(30, 30, 20, 10).densify(1);
     CHECK(one.slices == 1);
     CHECK(one.slice_distance == 1);
-    // Two paraboloids of height 1: half a cylinder each.
+    // The lens is two paraboloids of height 1, each with half the volume of a cylinder of this height.
     CHECK(volume(*one.solid, 0.2) == Approx(kPi * 100).epsilon(0.03));
     CHECK(widest_gap(*one.solid, all_points(one), {30, 30, 20}, 30) < 1);
     const Contours two = Drawing(cube(60)).circle(30, 30, 20, 10).circle(30, 30, 24, 10).densify(1);
@@ -581,7 +581,7 @@ TEST_CASE("what is no contour is refused, and the message names it") {
 }
 
 TEST_CASE("contours in planes of other directions are a network whose directions point out of the sections") {
-    const auto square = [](double low, double high, double slope) {  // around (20, 20, 20), in planes through it
+    const auto square = [](double low, double high, double slope) {  // in planes through the centre, (20, 20, 20)
         std::vector<Vec3> marks;
         for (const auto& [x, y] : {std::pair{low, low}, {high, low}, {high, high}, {low, high}})
             marks.push_back({x, y, 20 + slope * (x - 20)});
@@ -612,7 +612,7 @@ TEST_CASE("contours in planes of other directions are a network whose directions
     REQUIRE_FALSE((network.inside.empty() || network.outside.empty()));
     for (const Vec3& p : network.inside) CHECK(is_in_ring(p));
     for (const Vec3& p : network.outside) CHECK_FALSE(is_in_ring(p));
-    // Parallel planes have a frame of their own.
+    // Parallel planes that are tilted against the image have a frame of their own, and their contours make a body.
     std::vector<Vec3> other = square(10, 30, 0.5);
     for (Vec3& p : other) p[2] += 6;
     const Contours tilted = Drawing(cube(40)).add(square(10, 30, 0.5)).add(other).densify(1);

@@ -36,7 +36,7 @@ TEST_CASE(
     "the field between planes: inside between sections, linear beyond the last one, and 0 half way to a further "
     "plane") {
     const SectionField field({square(10, 0), square(10, 1)}, 0.1, {0, 0, 0}, {});
-    CHECK(field.plane_distance() == Approx(0.5));  // two planes in a box of height 1
+    CHECK(field.plane_distance() == Approx(0.5));  // the height of the box, 1, divided by the number of planes
     CHECK(value(field, {0, 0, 0.5}) == Approx(-1).margin(1e-3));
     for (const double z : {0.05, 0.1, 0.2, 0.25, 0.3, 0.45}) {
         INFO("beyond by " << z);
@@ -48,13 +48,13 @@ TEST_CASE(
 }
 
 TEST_CASE("the field between planes of two directions: each plane's sides, and no value beyond them") {
-    // A torus about the z axis with radii 3 and 1, cut by planes across z and across x.
+    // The sections of a torus about the z axis with radii 3 and 1, in planes across z and in the plane x = 0.
     std::vector<Section> sections;
     for (const double z : {-0.8, -0.4, 0.0, 0.4, 0.8}) {
         const double r = std::sqrt(1 - z * z);
         sections.push_back({SectionPlane{{0, 0, z}}, {circle(3 + r, {0, 0}), circle(3 - r, {0, 0})}});
     }
-    // Coordinates in the plane x = 0: (y, z).
+    // The coordinates in the plane x = 0 are (y, z).
     sections.push_back(
         {SectionPlane{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}}, {circle(1, {-3, 0}), circle(1, {3, 0})}});
     const SectionField field(sections, 0.1, {0.02, 0, 0.01}, {});
@@ -67,12 +67,12 @@ TEST_CASE("the field between planes of two directions: each plane's sides, and n
                 low = std::min(low, found);
                 high = std::max(high, found);
                 const double off = std::hypot(std::hypot(x, y) - 3, z) - 1;
-                if (std::abs(off) < 0.25) continue;  // two and a half cells
+                if (std::abs(off) < 0.25) continue;  // less than two and a half cells from the torus
                 ++compared;
                 wrong += (found < 0) != (off < 0);
             }
     INFO("wrong " << wrong << " of " << compared);
     CHECK(wrong == 0);
-    // Shifted by the level that is chosen with held-out planes.
+    // Values from -1 to 1 are shifted by a level that is chosen with held-out planes, so only their range is known.
     CHECK(high - low <= 2 + 1e-3);
 }

@@ -35,7 +35,7 @@ TEST_CASE("lines of seeds are scribbles", "[seeds]") {
     line.closed = false;
     cloud.lines = {line};
     const std::vector<Vec3> seeds = collect_seeds(cloud, 1);
-    CHECK(seeds.size() == 9);  // 0..4, then 1..3 along y, and the single one
+    CHECK(seeds.size() == 9);  // x = 0 to 4, then y = 1 to 3, and the single seed
     CHECK(seeds.back() == Vec3{9, 9, 9});
     cloud.lines[0].closed = true;
     CHECK(collect_seeds(cloud, 1).size() == 13);
@@ -45,7 +45,7 @@ TEST_CASE("the surface between two seeds is their middle plane, within half thei
     const FloatGridPtr grid = start_from_seeds(cube(64), {{20, 32, 32}}, {{40, 32, 32}});
     CHECK(value_at(*grid, {30, 32, 32}) == Approx(0).margin(0.05));
     CHECK(value_at(*grid, {29, 32, 32}) == Approx(-1).margin(0.1));
-    CHECK(value_at(*grid, {30, 34, 32}) >= -0.01);  // the plane ends in the ball
+    CHECK(value_at(*grid, {30, 34, 32}) >= -0.01);  // outside of the ball around the seed, within which the plane ends
     CHECK(value_at(*grid, {10, 32, 32}) == Approx(0).margin(0.1));
     CHECK(value_at(*grid, {20, 32, 42}) == Approx(0).margin(0.1));
 }

@@ -12,8 +12,8 @@ using namespace covol::test;
 
 namespace {
 
-/// Every active voxel has the exact distance, and the active voxels are exactly the voxels of the domain within the
-/// tube.
+/// Checks that every active voxel has the exact distance, and that the active voxels are exactly the domain's voxels
+/// within the tube of the given radius.
 void check_against_brute_force(const std::vector<Vec3>& points, const Domain& domain, double radius) {
     const DistanceResult result = compute_distance(points, domain, {radius});
     std::int64_t active = 0;
@@ -35,7 +35,7 @@ void check_against_brute_force(const std::vector<Vec3>& points, const Domain& do
     CHECK(result.grid->background() == float(radius));
 }
 
-const Domain kCube = make_domain({{0, 0, 0}, {10, 10, 10}}, 0.25);  // 40^3
+const Domain kCube = make_domain({{0, 0, 0}, {10, 10, 10}}, 0.25);  // 40^3 voxels
 
 }  // namespace
 
@@ -107,8 +107,8 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
     std::vector<Vec3> moved = points;
     for (Vec3& p : moved) p = {-p[2], p[0], -p[1]};
     const DistanceResult a = compute_distance(points, domain, {3.0}), b = compute_distance(moved, domain, {3.0});
-    // The result depends on the order of the sweeps: in either grid a few voxels may miss their nearest point by
-    // little.
+    // The result depends on the order of the sweeps: each of the two grids may miss the nearest point of a few voxels
+    // and have a slightly larger distance there.
     double worst = 0, sum = 0;
     for (auto value = a.grid->cbeginValueOn(); value; ++value) {
         const openvdb::Coord c = value.getCoord();

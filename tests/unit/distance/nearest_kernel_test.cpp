@@ -1,4 +1,4 @@
-// The kernel on a leaf against plain loops of the same definition.
+// Compares the kernel for the nearest points in a leaf with plain loops that compute the same.
 #include "distance/nearest_kernel.h"
 
 #include <array>
@@ -24,7 +24,7 @@ void set(NearestBlock& block, int i, int j, int k, const Offer& point, int index
     block.index[at] = index;
 }
 
-/// Squared distance from the point that one voxel holds to another voxel.
+/// Squared distance from the point that is stored at the voxel `holder` to the voxel `place`.
 double squared(const NearestBlock& block, const std::array<int, 3>& holder, const std::array<int, 3>& place) {
     const int at = NearestBlock::offset(holder[0], holder[1], holder[2]);
     const double x = block.x[at] - place[0], y = block.y[at] - place[1], z = block.z[at] - place[2];
@@ -39,8 +39,9 @@ std::unique_ptr<NearestBlock> no_points() {
     return block;
 }
 
-/// Face 2a is that of the minimum coordinate on axis a, 2a + 1 that of the maximum. The rows of a face run along the
-/// later one of its axes; a halo voxel considers the face's voxels in the three rows next to it.
+/// Whether a voxel of the halo beyond a face of the block would get a nearer point, at a squared distance of at most
+/// `reach`. Face 2a is at the minimum coordinate along axis a, face 2a + 1 at the maximum. A halo voxel takes points
+/// from three voxels of the face: the one beside it, and that one's neighbours along the axis `across`.
 bool improves_halo(const NearestBlock& block, int face, double reach) {
     const int axis = face / 2, across = axis == 0 ? 1 : 0, along = axis == 2 ? 1 : 2;
     const int own = face % 2 == 0 ? 0 : 7, halo = face % 2 == 0 ? -1 : 8;
@@ -71,7 +72,7 @@ TEST_CASE("the six faces' news are those of a loop over the halo") {
     std::array<int, 6> found_in{}, silent{};
     for (int round = 0; round < 4000; ++round) {
         const auto block = no_points();
-        // One or two points in the block; nearest points are known beyond some of the faces.
+        // One or two points, each at a random voxel of the block or of the halo around it.
         for (int count = 1 + round % 2; count > 0; --count)
             set(*block, voxel(random), voxel(random), voxel(random), {place(random), place(random), place(random)},
                 count);

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kH = 0.5;
 
-/// An image whose voxels are the domain's.
+/// An image on the lattice of the domain, with the value f(x) at the position x.
 Image image_on(const Domain& domain, const Function& f) {
     ImageGeometry geometry;
     geometry.size = size_of(domain);
@@ -52,7 +52,7 @@ EdgeOptions options(double sigma, double k) {
 DenseField reference(const Domain& domain, const Function& f, double sigma, double k) {
     DenseField image = rounded(sample(domain, [&](const Vec3& x) { return std::clamp(f(x), 0.0, 1.0); }));
     const double time = sigma * sigma / 2;
-    const int steps = static_cast<int>(std::ceil(time / (0.5 * kH * kH) - 1e-9));  // none longer than h²/2
+    const int steps = static_cast<int>(std::ceil(time / (0.5 * kH * kH) - 1e-9));  // steps of at most h²/2
     if (steps > 0) dense_heat(image, time, steps);
     return dense_edge(image, k);
 }
@@ -95,7 +95,7 @@ TEST_CASE("every edge option says when it is out of range") {
 
 TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised image") {
     const Domain domain = cube_domain(24, kH, -9);
-    // 200 to 440 over the box of 12, normalised by [100, 500]: s = 240/12/400.
+    // The intensity rises from 200 to 440 over the box of 12 units and is normalised by [100, 500]: s = 240 / 12 / 400.
     const Image image = image_on(domain, [](const Vec3& x) { return 320 + 20 * x[1]; });
     EdgeOptions o;
     o.sigma = kH;
@@ -114,7 +114,7 @@ TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised
 }
 
 TEST_CASE("the edge detector is the dense reference's") {
-    const Domain domain = cube_domain(21, kH, 2);  // ends inside leaves
+    const Domain domain = cube_domain(21, kH, 2);  // the domain ends inside leaves
     const Function waves = random_waves(31, 3.0);
     const Function f = [&](const Vec3& x) { return 0.5 + 0.45 * waves(x); };  // some values are clamped
     const Image image = image_on(domain, f);
@@ -126,7 +126,7 @@ TEST_CASE("the edge detector is the dense reference's") {
         CHECK(largest_difference(domain, *result.grid, expected) < 1e-4);
         double low = 1;
         for (auto v = result.grid->cbeginValueOn(); v; ++v) low = std::min<double>(low, *v);
-        CHECK(low < 0.9);  // otherwise nothing was compared
+        CHECK(low < 0.9);  // otherwise g would be 1 everywhere, and the comparison meaningless
     }
 }
 
@@ -218,9 +218,10 @@ TEST_CASE("detect_edges() refuses what has no edges") {
 
 namespace {
 
-constexpr double kSheetAt = 0.4;  // off the voxels' centres
+constexpr double kSheetAt = 0.4;  // not at the centres of voxels
 
-/// A bright sheet across x, 1.2 wide, on a floor.
+/// The intensity of a bright sheet across x on a darker background: a Gaussian profile with a standard deviation of
+/// 0.6.
 double sheet(const Vec3& x) { return 0.2 + 0.6 * std::exp(-0.5 * (x[0] - kSheetAt) * (x[0] - kSheetAt) / 0.36); }
 
 /// Positions on the sheet, and their normals.
@@ -254,7 +255,7 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     CHECK(std::abs(minimum(dark, EdgeFeature::DarkLine) - kSheetAt) <= kH / 2);
     CHECK(std::abs(minimum(bright, EdgeFeature::Slope) - kSheetAt) > kH / 2);
     CHECK(minimum(bright, EdgeFeature::Automatic) == minimum(bright, EdgeFeature::Slope));
-    // s is the brightness itself.
+    // For a line, s in g = 1 / (1 + K s^2) is the brightness itself, here without smoothing.
     o.feature = EdgeFeature::BrightLine;
     o.sigma = 0;
     const EdgeResult exact = detect_edges(bright, *where, o);
@@ -272,13 +273,14 @@ TEST_CASE("lines take their contrast from a third of the median") {
     o.intensities = {0, 1};
     o.sigma = 0.5;
     o.feature = EdgeFeature::BrightLine;
-    // Oblique to the voxels: otherwise whole layers of voxels would have the median.
+    // The sheet is oblique to the voxels. Otherwise whole layers of voxels would have the median as their value.
     const Image oblique = image_on(domain, [](const Vec3& x) {
         return sheet({x[0] + 0.13 * x[1] + 0.07 * x[2], x[1], x[2]});
     });
     const EdgeResult r = detect_edges(oblique, *where, o);
     std::int64_t above = 0;
-    for (auto v = r.grid->cbeginValueOn(); v; ++v) above += *v < 0.1;  // 1 / (1 + 3^2)
+    // G at the median, which is three times the contrast: 1 / (1 + 3^2).
+    for (auto v = r.grid->cbeginValueOn(); v; ++v) above += *v < 0.1;
     CHECK(double(above) / double(r.grid->activeVoxelCount()) == Approx(0.5).margin(0.01));
 }
 
@@ -294,7 +296,7 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
         feature_on_sheet(image_on(domain, [](const Vec3& x) { return x[0] > kSheetAt ? 0.2 : 0.9; }));
     CHECK(border.feature == EdgeFeature::Slope);
     CHECK(border.step == Approx(-0.35).margin(0.02));
-    // A line on a border counts as a line if it stands out on both sides.
+    // A line at a border counts as a line if it is brighter than both sides.
     const auto both = [](double step) {
         return [step](const Vec3& x) { return sheet(x) + (x[0] > kSheetAt ? step : 0.0); };
     };

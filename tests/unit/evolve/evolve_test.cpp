@@ -187,7 +187,7 @@ TEST_CASE("a value that is not finite is named, and u stays as it was") {
 TEST_CASE("a frozen value that is not finite leaves u at the step before") {
     const Problem p = everything_on(20);
     const FloatGridPtr u = start_of(p);
-    // Next to an active voxel, so that its value enters a row of the system.
+    // The voxel that is not finite lies next to an active voxel, so that its value enters a row of the system.
     openvdb::Coord at = u->cbeginValueOn().getCoord();
     while (u->tree().isValueOn(at)) at.x() -= 1;
     u->tree().setValueOff(at, std::numeric_limits<float>::quiet_NaN());
@@ -253,7 +253,7 @@ TEST_CASE("it stops when it is steady, and says so") {
 }
 
 TEST_CASE("an automatic step grows by its ratio while the surface hardly moves") {
-    // A plane under a constant slope of g moves by slope x step.
+    // In a field g of constant slope, a plane moves by slope x step in each step.
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
     set_distance(p, [](const Vec3& x) { return 10 - 0.02 * x[0]; });
     EvolveOptions o = evolve_options(p.options, 6);
@@ -266,7 +266,7 @@ TEST_CASE("an automatic step grows by its ratio while the surface hardly moves")
 }
 
 TEST_CASE("inactive leaves leave the surface where it would be") {
-    // The sphere of the points touches the start on one side, which is steady long before the other side arrives.
+    // The sphere of the points touches the start on one side. This side is steady long before the opposite one arrives.
     const Vec3 target{4, 0, 0};
     Problem p = whole_cube(48, kH, [](const Vec3& x) { return clamp_to(length(x) - 9.5, 3 * kH); });
     set_distance(p, [&](const Vec3& x) { return std::abs(length({x[0] - target[0], x[1], x[2]}) - 5.5); });
@@ -276,10 +276,10 @@ TEST_CASE("inactive leaves leave the surface where it would be") {
         EvolveOptions o = evolve_options(p.options, 60);
         o.follow = follow;
         o.solver_tolerance = EvolveOptions{}.solver_tolerance;
-        o.tolerance = 4e-3;  // a tolerance at which some become inactive
+        o.tolerance = 4e-3;  // a tolerance at which some leaves become inactive
         const FloatGridPtr some_active = start_of(p), all_active = start_of(p);
         const EvolveReport some = evolve(*some_active, Fields(p).get(), o);
-        o.tolerance = 0;  // none ever becomes inactive
+        o.tolerance = 0;  // no leaf ever becomes inactive
         o.max_steps = some.steps;
         const EvolveReport all = evolve(*all_active, Fields(p).get(), o);
         if (follow) CHECK(some.leaf_visits < all.leaf_visits);
@@ -330,7 +330,7 @@ TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
         const auto crossings = zero_crossings(p.domain, to_dense(p.domain, *u));
         REQUIRE(crossings.size() > 100);
         for (const Crossing& c : crossings) CHECK(length(c.position) == Approx(kRadius).margin(0.1 * kH));
-        // without the obstacle the surface vanishes
+        // Without the obstacle the surface vanishes.
         CHECK(evolve(*start_of(p), {}, o).stop_reason == StopReason::Vanished);
     }
 }
@@ -400,7 +400,7 @@ TEST_CASE("cancelled between steps, u holds the last whole one") {
 
 TEST_CASE("Neumann: a plane that meets the boundary stays a plane") {
     for (int axis = 0; axis < 3; ++axis) {
-        // 13 voxels: the domain ends inside leaves.
+        // A domain of 13 voxels along each axis ends inside leaves.
         Problem p = whole_cube(
             13, kH, [&](const Vec3& x) { return clamp_to(x[axis] - 0.3, 3 * kH); }, 3);
         set_distance(p, [&](const Vec3& x) { return std::abs(x[axis] - 1.1); });

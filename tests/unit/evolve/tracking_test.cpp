@@ -19,7 +19,7 @@ namespace {
 constexpr double kH = 0.5, kClamp = 3;
 const Domain kDomain = make_domain({{-12, -12, -12}, {12, 9, 12}}, kH);  // the domain's end cuts the second ball
 
-/// Two balls, given by the sign of a distance and a multiple of it, in leaves up to `reach` from the surface.
+/// The level set of two balls: the signed distance in voxels within `reach` of the surface, multiplied by `scale`.
 FloatGridPtr two_balls(double reach, float scale) {
     FloatGridPtr u = make_grid(kDomain, float(scale * reach * kH), "u");
     auto values = u->getAccessor();
@@ -45,8 +45,9 @@ struct Difference {
     int signs = 0, apart = 0;
 };
 
-/// Differences of two bands: values up to the clamp in voxels, positions at which their surfaces cut voxel edges,
-/// signs, and voxels that only one has.
+/// Differences of two bands: the maximum difference of values up to the clamp, in voxels; that of the positions at
+/// which the surfaces cut voxel edges; the numbers of voxels with different signs, and of voxels active in only one
+/// band.
 Difference difference(const FloatGrid& one, const FloatGrid& other) {
     Difference result;
     const openvdb::CoordBBox box({kDomain.min[0], kDomain.min[1], kDomain.min[2]},
@@ -81,7 +82,7 @@ TEST_CASE("a band is tracked to first order as by exact distances, from whatever
     detail::track_surface(*fast, kDomain, kClamp);
     const Difference apart = difference(*fast, *exact);
     CHECK(apart.signs == 0);
-    // Neither may move the surface; the only difference is in the groove between the balls.
+    // Neither method may move the surface. Only in the groove between the balls do the two results differ.
     CHECK(difference(*fast, *before).crossing <= difference(*exact, *before).crossing);
     CHECK(difference(*exact, *before).crossing < 0.03);
     CHECK(apart.largest < 0.25);
@@ -121,7 +122,7 @@ TEST_CASE("a free surface stays where it is, and its band holds the distance") {
     for (auto value = u->cbeginValueOn(); value; ++value)
         maximum = std::max(maximum, std::abs(double(*value) - level(world_of(kDomain, value.getCoord()))) / kH);
     CHECK(maximum < 1.0 / kRadius);
-    // Also beyond the band, which the stencil still reaches.
+    // The values are right also at inactive voxels just beyond the band, which stencils still reach.
     const auto values = u->getConstAccessor();
     const Vec3 beyond = kDomain.world_to_index({-0.1, 0.2, (kRadius + detail::kFreeWidth + 0.6) * kH});
     const openvdb::Coord corner(int(std::lround(beyond[0])), int(std::lround(beyond[1])), int(std::lround(beyond[2])));

@@ -10,7 +10,9 @@ using namespace covol::detail;
 
 TEST_CASE("a leaf's neighbours are those of a plain search, near the origin and where keys begin again") {
     const int center = GENERATE(0, 1 << 23, -(1 << 23), (1 << 23) - 8);
-    const int width = GENERATE(2, 6, 40);  // leaves: all present, some gaps, far apart
+    // Leaves are drawn at random within this many leaves of the centre. With 2 all of them are present, with 6 there
+    // are some gaps, and with 40 they are far apart.
+    const int width = GENERATE(2, 6, 40);
     INFO("around " << center << ", " << width);
     std::mt19937_64 random(5);
     std::uniform_int_distribution<int> step(-width, width - 1);

@@ -64,7 +64,7 @@ TEST_CASE("the corrected surface passes a mark, near or far, outside or inside",
         CHECK(correction.report().after_max < 0.5);
         const FloatGridPtr start = correction.start();
         CHECK(std::abs(value_at(*start, mark)) < 0.6);
-        // The opposite side is unchanged.
+        // The opposite side of the ball is unchanged.
         CHECK(value_at(*start, at(kRadius, 1.1 + 3.1, 0.4)) == Approx(0).margin(0.05));
         CHECK(correction.shift(at(kRadius, 1.1 + 3.1, 0.4)) == 0);
     }
@@ -72,14 +72,15 @@ TEST_CASE("the corrected surface passes a mark, near or far, outside or inside",
 
 TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[guess]") {
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
-    const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 apart along the ball
+    const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 voxels apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
-    // One bump of the minimum radius, 12 voxels, times more than 2.2; d: from mark to mark.
+    // The shift is a bump around the mark. Its radius is 12 voxels, the minimum, since 2.2 times the offset of 5 is
+    // less. d is the distance from mark to mark.
     const GuessCorrection one = correct_guess(guess, {off}, {}, {});
     const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)),
                  t = d / 12;
-    CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1))
-                               .epsilon(0.05));  // and a narrower one for the remainder
+    // The tolerance allows for a second, narrower bump that corrects the remainder.
+    CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1)).epsilon(0.05));
     const GuessCorrection both = correct_guess(guess, {on, off}, {}, {});
     CHECK(both.report().after_max < 0.5);
     CHECK(std::abs(both.shift(on)) < 0.5);
@@ -163,7 +164,7 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
 }
 
 TEST_CASE("voxels beyond the marks' reach keep their value to the bit", "[guess]") {
-    const Image mask = ball_mask(kRadius, 200, 2);  // and a plane of another label
+    const Image mask = ball_mask(kRadius, 200, 2);  // the mask also contains a plane of another label
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const GuessCorrection correction = correct_guess(guess, {at(kRadius + 4, 0.7, 2), at(kRadius - 3, 2.2, 5)}, {}, {});
     const CorrectedMask corrected = correction.apply(mask, 200);

@@ -23,7 +23,7 @@ struct Shape {
     Function distance;
     double volume;
     double bias_of_50 = 0.05,
-           volume_of_50 = 0.005;  ///< 50 random points leave gaps as wide as the thickness of the ring
+           volume_of_50 = 0.005;  ///< tolerances for 50 points, whose gaps are as wide as the ring is thick
 };
 
 Vec3 random_direction(std::mt19937& random) {
@@ -108,7 +108,8 @@ TEST_CASE("exact points are met without bias, however few") {
 }
 
 TEST_CASE("rough marks in thick slices enclose a body") {
-    // A bumpy body: by energy alone, many surfaces through such marks run to infinity and do not close.
+    // The marks are scattered, so that the body is bumpy. By bending energy alone, many surfaces through such marks run
+    // to infinity and do not close.
     const Shape shape = ellipsoid("ellipsoid", {18, 13, 16});
     const Vec3 spacing{0.8, 0.8, 6.5};
     int held = 0;
@@ -145,7 +146,7 @@ TEST_CASE("what encloses nothing is refused with a reason") {
 TEST_CASE("a guess does not depend on the number of threads, nor on where the world begins") {
     const Shape shape = ellipsoid("ellipsoid", {18, 12, 10});
     const Domain domain = cube_domain(56, 1.0);
-    const std::vector<Vec3> marks = draw(shape, 500, 5);  // also parts
+    const std::vector<Vec3> marks = draw(shape, 500, 5);  // so many that the surface is computed in patches
     RunContext one, four;
     one.threads = 1;
     four.threads = 4;
@@ -184,7 +185,7 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
 }
 
 TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
-    // A thick shell with marks on both walls. Without a seed the cavity may be taken for part of the body.
+    // A thick shell with marks on both walls. Without a seed, the cavity may be taken for part of the body.
     std::vector<Vec3> marks = draw(ellipsoid("outer", {22, 22, 22}), 120, 11);
     const std::vector<Vec3> inner = draw(ellipsoid("inner", {10, 10, 10}), 40, 12);
     marks.insert(marks.end(), inner.begin(), inner.end());

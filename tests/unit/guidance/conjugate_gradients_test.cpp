@@ -14,7 +14,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// 1 + L, with the Laplacian L of a ring with some chords: symmetric, positive definite.
+/// The identity plus the Laplacian of a graph, a ring with some chords. This matrix is symmetric and positive definite.
 Sparse half_of(int n) {
     std::mt19937_64 random(7);
     std::vector<Eigen::Triplet<double>> entries;

@@ -49,9 +49,10 @@ TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guid
         maximum = std::max(maximum, std::abs(double(*value) - (x.length() - kRadius * h)) / h);
         ++count;
     }
-    // No foot point is farther than sqrt(3) / 2 from a vertex, and distances below 2.5 are not measured to vertices.
+    // Distances above 2.5 voxels are measured to the vertices of the surface. Every position on it is within sqrt(3) /
+    // 2 voxels of a vertex, which limits the error.
     CHECK(maximum < std::hypot(2.5, 0.5 * std::sqrt(3.0)) - 2.5 + 0.03);
-    // All voxels within the width are there, on both sides.
+    // The band contains all voxels within its width, on both sides of the surface.
     const double shell = 4.0 / 3 * M_PI * (std::pow(kRadius + kWidth, 3) - std::pow(kRadius - kWidth, 3));
     CHECK(double(count) == Approx(shell).epsilon(0.02));
     const auto accessor = wide.grid()->getConstAccessor();
@@ -173,12 +174,14 @@ TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows
             const std::uint32_t v = patches.members[n];
             ++met[v];
             CHECK(patches.patch[v] == i);
-            // Members of a patch lie in one cell of four voxels: at most its diagonal apart.
+            // The members of a patch lie in one cell with an edge of four voxels (2.0), so they are at most its
+            // diagonal apart.
             CHECK(length({patches.places[v][0] - patches.centers[i][0], patches.places[v][1] - patches.centers[i][1],
                           patches.places[v][2] - patches.centers[i][2]}) < 2.0 * std::sqrt(3.0));
         }
         area += patches.area[i];
-        // The direction is close to the mean normal of a part of a sphere.
+        // The surface is a sphere around the origin, so a patch's direction, its mean normal, is close to that of its
+        // centre.
         const Vec3& c = patches.centers[i];
         const double along =
             (c[0] * patches.directions[i][0] + c[1] * patches.directions[i][1] + c[2] * patches.directions[i][2]) /

@@ -23,7 +23,7 @@ namespace {
 constexpr int kSize = 56;
 constexpr double kRadius = 14;
 
-/// Voxels of edge 1 (or longer along z), centred on the origin.
+/// The geometry of an image centred on the origin, whose voxels have edges of 1, but of `along_z` along z.
 ImageGeometry lattice(double along_z = 1) {
     ImageGeometry g;
     g.size = {kSize, kSize, std::int32_t(std::lround(kSize / along_z))};
@@ -46,10 +46,10 @@ Image picture(const ImageGeometry& g, const std::function<double(const Vec3&)>& 
     return Image::from_values(g, values.data());
 }
 
-/// 0 inside, 1 outside, over about a voxel.
+/// A step from 0 inside to 1 outside, over about a voxel.
 double step_at(double signed_distance) { return 0.5 * (1 + std::tanh(2 * signed_distance)); }
 
-/// Evenly spread on a sphere, each moved by up to half a voxel along each axis.
+/// Marks that are spread evenly on a sphere, each moved by up to `jitter` along each axis.
 std::vector<Vec3> marks_on_sphere(int count, double radius, double jitter = 0.5, unsigned seed = 7) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(-jitter, jitter);
@@ -81,7 +81,7 @@ struct Radius {
     double mean, rms, largest;
 };
 
-/// Of the distances of the surface from the origin, minus `radius`: mean, root mean square, largest deviation.
+/// The mean, root mean square and largest absolute value of |x| - `radius` over the vertices x of the surface.
 Radius radius_of(const FloatGrid& grid, double radius) {
     const TriangleMesh mesh = extract_mesh(*extract_surface(grid));
     Radius r{0, 0, 0};
@@ -178,7 +178,7 @@ TEST_CASE("A stained membrane is found, bright or dark, whatever lies beside it"
 }
 
 TEST_CASE("The border is where the marks have it, not where the slope is steepest") {
-    // The marks lie one and a half voxels outside of the ball's border.
+    // The slope of the image is steepest one and a half voxels inside of the sphere on which the marks lie.
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at((length(x) - kRadius + 1.5) / 2); }, 5);
@@ -191,7 +191,7 @@ TEST_CASE("The border is where the marks have it, not where the slope is steepes
 
 TEST_CASE("A second structure nearby does not draw the surface to itself") {
     const ImageGeometry g = lattice();
-    // A brighter ball, two voxels away from the marked one.
+    // Beside the marked ball, two voxels away, there is a second, brighter one.
     const double other = 8;
     const Vec3 at{kRadius + 2 + other, 0, 0};
     const Image image = picture(
@@ -249,8 +249,8 @@ TEST_CASE("the precision of marks is their standard deviation, as segment() mean
     GuidanceOptions options;
     const GuidanceReport automatic = guide(*guess, marks, image, options).report;
     REQUIRE(automatic.used);
-    options.mark_precision =
-        kUniformDeviation * g.spacing[0];  // the standard deviation of a uniform distribution over a voxel
+    // The automatic precision: the standard deviation of a uniform distribution over a voxel.
+    options.mark_precision = kUniformDeviation * g.spacing[0];
     const GuidanceReport stated = guide(*guess, marks, image, options).report;
     CHECK(stated.gain == Approx(automatic.gain));
     CHECK(stated.image_error == Approx(automatic.image_error));

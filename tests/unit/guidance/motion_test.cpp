@@ -20,7 +20,8 @@ namespace {
 constexpr int kSize = 44;
 const Vec3 kMiddle{21.3, 22.1, 20.7};
 
-/// A body without symmetry: an ellipsoid with a bump. @param grown  outward, voxels
+/// The level set of a body without symmetry, an ellipsoid with a bump. @param grown  how far its surface is moved
+/// outward, voxels
 double level(const Vec3& p, const Vec3& shift, double grown) {
     Vec3 q;
     for (int a = 0; a < 3; ++a) q[a] = p[a] - kMiddle[a] - shift[a];
@@ -44,7 +45,7 @@ Image frame(const Appearance& look) {
         for (int j = 0; j < kSize; ++j)
             for (int i = 0; i < kSize; ++i) {
                 const double d = level({double(i), double(j), double(k)}, look.shift, look.grown);
-                // Brightness gradients within the body and around it.
+                // The brightness has gradients of its own within the body and around it.
                 const double inside = 1 + 0.02 * i, outside = 0.01 * j;
                 const double edge = 1 / (1 + std::exp(d / 0.7));
                 values.push_back(
@@ -95,7 +96,7 @@ TEST_CASE("A surface follows what moves and grows, whatever the lamp does") {
     CHECK(followed.report.mean_offset == Approx(now.grown).margin(0.3));
     CHECK(followed.report.correlation > 0.9);
     CHECK(apart(followed.u, body(now)).assd < 0.3);
-    CHECK(apart(before, body(now)).assd > 1.2);  // error of a surface that does not follow
+    CHECK(apart(before, body(now)).assd > 1.2);  // the error if the surface did not follow
 }
 
 TEST_CASE("The surface that follows does not depend on threads") {
@@ -115,7 +116,7 @@ TEST_CASE("A static time-lapse keeps its surface to a tenth of a voxel over ten 
     Marks marks;
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;
-    while (marks.points.size() < 60) {  // on the surface, in random directions
+    while (marks.points.size() < 60) {  // random directions from the middle of the body
         Vec3 d{normal(random), normal(random), normal(random)};
         const double length = std::hypot(d[0], d[1], d[2]);
         double low = 0, high = 20;

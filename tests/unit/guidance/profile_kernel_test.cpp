@@ -1,4 +1,4 @@
-// The kernels on profiles against plain loops of the same definition.
+// Compares the kernels on profiles with plain loops that compute the same.
 #include "guidance/profile_kernel.h"
 
 #include <catch2/catch.hpp>

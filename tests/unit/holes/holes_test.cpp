@@ -20,7 +20,7 @@ namespace {
 
 const double kPi = std::acos(-1.0);
 
-/// An octahedron, subdivided and projected onto the unit sphere.
+/// The unit sphere: an octahedron whose triangles are subdivided, with the vertices projected onto the sphere.
 TriangleMesh sphere_mesh(int subdivisions) {
     TriangleMesh mesh{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
                       {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
@@ -68,7 +68,7 @@ double narrowest_angle(const TriangleMesh& mesh) {
     return minimum * 180 / kPi;
 }
 
-/// Points of the unit sphere for which keep(point) holds.
+/// Random points of the unit sphere, of which those are kept for which keep(point) is true.
 template <typename Keep>
 std::vector<Vec3> sphere_points(int count, unsigned seed, Keep keep) {
     std::vector<Vec3> points;
@@ -129,7 +129,7 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
 }
 
 TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
-    // A square of four triangles around a centre; two opposite ones are kept.
+    // A square of four triangles around a centre. Only two opposite triangles are kept, which meet in the centre alone.
     const TriangleMesh square{{{0, 0, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}},
                               {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}}};
     const TriangleMesh part = holes::kept_part({square, {1, 0, 1, 0}});
@@ -141,7 +141,7 @@ TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
 }
 
 TEST_CASE("the membrane between two rings is a catenoid, over a flat rim a plane") {
-    // Rings of radius cosh(0.5) at z = -0.5 and 0.5: r = cosh z.
+    // Two rings of radius cosh(0.5) at z = -0.5 and 0.5. The minimal surface between them is the catenoid r = cosh z.
     constexpr int kAround = 96, kAlong = 40;
     TriangleMesh tube;
     std::vector<char> fixed;
@@ -178,7 +178,8 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
     const TriangleMesh sphere = sphere_mesh(6);
     for (unsigned seed = 1; seed <= 5; ++seed)
         for (const double level : {0.0, 0.5, 0.85}) {
-            // Points below the level: a hole of radius sqrt(1 - level^2) above it.
+            // There are points only below z = level, so that a hole with a rim of radius sqrt(1 - level^2) remains
+            // above.
             const std::vector<Vec3> points = sphere_points(8000, seed, [&](const Vec3& p) { return p[2] < level; });
             const double spacing = std::sqrt(4 * kPi / 8000), rim = 2 * kPi * std::sqrt(1 - level * level);
             const TreatedHoles open = treat(trim_holes, sphere, points);
@@ -256,7 +257,8 @@ TEST_CASE("distances to points are those of brute force; the share is that of a 
         const auto& p = sphere.vertices[v];
         CHECK(distances[v] == Approx(test::brute_force_distance(points, {p[0], p[1], p[2]})).epsilon(1e-5));
     }
-    // Within a chord d of the pole: a cap of height d^2 / 2.
+    // The positions within a chord d of the pole form a cap of height d^2 / 2, which for d = 1 is a quarter of the
+    // sphere.
     const std::vector<float> from_pole = measure_distances(sphere, {{0, 0, 1}});
     CHECK(measure_fraction_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
 }
@@ -295,6 +297,6 @@ TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set
     CHECK(flat.distance_to_points.size() == flat.mesh.vertices.size());
 
     options.holes.policy = Holes::Open;
-    options.holes.distance = 3;  // farther than any position: no hole
+    options.holes.distance = 3;  // no position is farther from the points, so there is no hole
     CHECK(reconstruct(points, options).report.surface.closed);
 }

@@ -12,7 +12,7 @@ using detail::StrongestBorder;
 
 namespace {
 
-/// 48^3 voxels of edge 0.5 with the values value(x in voxels), plus noise.
+/// An image of 48^3 voxels of edge 0.5, with the values value(x), x in voxels, plus noise.
 Image slab(const std::function<double(double)>& value, double noise = 0.05) {
     ImageGeometry geometry;
     geometry.size = {48, 48, 48};
@@ -26,7 +26,7 @@ Image slab(const std::function<double(double)>& value, double noise = 0.05) {
     return Image::from_values(geometry, values.data());
 }
 
-/// For marks in the plane x, with normal +-x.
+/// The strongest border for 60 marks in the plane x = `x_voxels`, whose normals are (`normal`, 0, 0).
 StrongestBorder border_at(const Image& image, double x_voxels, double normal = 1, BorderKind kind = BorderKind::Slope) {
     std::vector<Vec3> places, normals;
     for (int n = 0; n < 60; ++n) {
@@ -73,12 +73,12 @@ TEST_CASE("The steeper of two borders is found, and how much less steep the own 
 TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 18); });
-        CHECK(border_at(image, 22).fraction < 0.7);  // judged as a slope
+        CHECK(border_at(image, 22).fraction < 0.7);  // if the line is judged as a slope
         CHECK(border_at(image, 22, 1, BorderKind::Line).fraction == 1);
         const StrongestBorder beside = border_at(image, 28, 1, BorderKind::Line);
         CHECK(std::abs(beside.at + 6) <= 1);
         CHECK(beside.fraction < 0.5);
-        CHECK(beside.errors > 4);  // as the warning requires
+        CHECK(beside.errors > 4);  // more than the warning about such marks requires
     }
 }
 

@@ -22,7 +22,7 @@ ImageGeometry geometry(const Index3& size, const Vec3& spacing) {
 
 Lattice cube(int n, const Vec3& spacing = {1, 1, 1}) { return {{n, n, n}, {0, 0, 0}, spacing}; }
 
-/// Sum of weight |grad u| + cost u, with forward differences in double precision.
+/// The energy of u: the sum of weight |grad u| + cost u over all nodes, with forward differences in double precision.
 double energy(const Lattice& l, const Field& weight, const Field& cost, const Field& u) {
     double sum = 0;
     for (int k = 0; k < l.size[2]; ++k)
@@ -120,8 +120,8 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
     minimize_surface(l, weight, cost, 300, u, {});
     for (std::size_t n = 0; n < u.size(); ++n) REQUIRE(u[n] == (n % 3 == 0 ? 1.0F : 0.0F));
 
-    // A ball of cost -a in a ball of radius R: the minimiser is the ball if a R > 3 (cost -a 4/3 pi R^3 against surface
-    // 4 pi R^2).
+    // The cost is -a in a ball of radius R and 1 elsewhere. The minimiser is this ball if a R > 3, because its cost -a
+    // 4/3 pi R^3 then outweighs its surface 4 pi R^2; otherwise it is empty.
     const double radius = 10;
     for (const double gain : {0.2, 0.6}) {
         for (std::size_t n = 0; n < cost.size(); ++n) {
@@ -138,7 +138,7 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
             CHECK(volume == 0);
         else
             CHECK(volume == Approx(4.0 / 3 * M_PI * radius * radius * radius).epsilon(0.05));
-        // No body with another radius has a smaller energy.
+        // No ball of another radius has a smaller energy.
         const double minimum = energy(l, weight, cost, u);
         for (double r = 0; r < 14; r += 1) {
             Field ball(l.count());
@@ -161,8 +161,8 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
             for (float& v : s.at) v = normal(random);
             s.inside = n % 2 == 0;
             s.fold = n % kFolds;
-            // Inside is a layer of brightness between darker and brighter voxels outside: no linear rule separates
-            // them.
+            // Voxels inside have a brightness between those of darker and brighter voxels outside, so that no linear
+            // rule separates inside from outside.
             if (!s.inside)
                 s.at[0] = (n % 4 == 1 ? apart : -apart) + 0.2F * normal(random);
             else
@@ -177,7 +177,8 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
     const Appearance appearance(learnt);
     Features middle{}, off{}, far{};
     off[0] = 2;
-    far[0] = 100;  // beyond the range of the samples the slope at its end continues
+    // Beyond the range of the samples, the log odds continue with the slope that they have at its end.
+    far[0] = 100;
     CHECK(appearance.log_odds(middle) > 1);
     CHECK(appearance.log_odds(off) < -1);
     CHECK(appearance.log_odds(far) < -1);

@@ -36,7 +36,7 @@ ImageGeometry geometry() {
 
 using Body = double (*)(const Vec3&);
 
-/// Brighter inside by `contrast`, plus noise.
+/// The values of an image of a body that is brighter inside by `contrast`, plus noise.
 std::vector<float> picture(Body body, double contrast, double noise) {
     std::mt19937 random(1);
     std::normal_distribution<double> normal(0, noise);
@@ -182,7 +182,7 @@ TEST_CASE("An image of noise, or of nothing, does not make a surface worse") {
 TEST_CASE("Places that are known to be outside are outside") {
     const Case c = horn_case();
     const std::vector<Vec3> middle{{18, 0, 0}};
-    // A seed makes the middle of the horn's thick part an outside region: it is then a hole, whatever the image shows.
+    // The seed states that the middle of the horn's thick part is outside. If the result is used, it has a hole there.
     const Inferred inferred = infer(*c.guess, c.marks, c.image, {{}, middle});
     if (inferred.report.used) CHECK(detail::levels_at(*inferred.u, middle)[0] > 0);
     const Inferred right = infer(*c.guess, c.marks, c.image, {middle, {{0, 0, 0}}});

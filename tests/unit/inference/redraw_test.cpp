@@ -19,7 +19,7 @@ constexpr double kRadius = 11;
 
 double away(const Vec3& p) { return std::hypot(p[0] - kMiddle[0], p[1] - kMiddle[1], p[2] - kMiddle[2]); }
 bool in_truth(const Vec3& p) { return away(p) < kRadius; }
-/// The result of another tool, which lacks everything beyond a plane.
+/// The guess is the result of another tool, which lacks everything beyond a plane.
 bool in_guess(const Vec3& p) { return in_truth(p) && p[0] < kMiddle[0] + 4; }
 
 ImageGeometry geometry() {
@@ -28,7 +28,7 @@ ImageGeometry geometry() {
     return g;
 }
 
-/// @param contrast  between inside and outside, in standard deviations of the noise
+/// The image of the ball. @param contrast  between inside and outside, in standard deviations of the noise
 Image picture(double contrast) {
     std::mt19937_64 random(3);
     std::normal_distribution<double> normal;
@@ -117,7 +117,7 @@ TEST_CASE("An image that does not tell the sides of a guess does not redraw it, 
 }
 
 TEST_CASE("What hangs on nothing does not come") {
-    // A second ball, equally bright, near the missing part but separate from it.
+    // A second, equally bright ball, which is near the missing part but separate from it, must not be added.
     const Vec3 other{kMiddle[0] + kRadius + 4, kMiddle[1], kMiddle[2]};
     std::vector<float> values;
     for (int k = 0; k < kSize; ++k)

@@ -45,7 +45,7 @@ TEST_CASE("A program's result comes back, and nothing of it stays open") {
         std::memcpy(&beside, results.data() + 4, sizeof beside);
         CHECK(written == kTask);
         CHECK(beside == 0);
-        CHECK(ftruncate(results.descriptor(), 1) != 0);  // the program may not shrink the memory either
+        CHECK(ftruncate(results.descriptor(), 1) != 0);  // nobody may shrink the shared memory, not even the program
     }
     CHECK(open_descriptors() == before);
 }

@@ -16,7 +16,7 @@ namespace {
 constexpr Index3 kSize{6, 5, 4};
 constexpr std::array<hsize_t, 3> kShape{4, 5, 6}, kChunk{2, 2, 4};
 
-/// Voxels of an image, i fastest, all values different.
+/// The voxels of an image, i fastest, with values that count up from `first`.
 std::vector<std::uint16_t> ramp(const std::vector<hsize_t>& shape, std::uint16_t first = 0) {
     const auto count = std::accumulate(shape.begin(), shape.end(), hsize_t(1), std::multiplies<>());
     std::vector<std::uint16_t> values(static_cast<std::size_t>(count));
@@ -40,7 +40,7 @@ public:
 
     [[nodiscard]] hid_t id() const { return file_; }
 
-    /// `edit` changes the creation properties; an empty `values` writes no data.
+    /// `edit` changes the properties with which the dataset is created. If `values` is empty, no data is written.
     template <typename T>
     void dataset(
         const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const std::vector<T>& values,
@@ -62,7 +62,7 @@ public:
     void group(const std::string& name) const {
         H5Gclose(H5Gcreate2(file_, name.c_str(), links_, H5P_DEFAULT, H5P_DEFAULT));
     }
-    /// As one string, or as in Imaris files: one character per element.
+    /// Writes a text attribute as one string or, if `letters`, as in Imaris files: one character per element.
     void text(const std::string& object, const std::string& name, const std::string& value, bool letters) const {
         const hid_t type = H5Tcopy(H5T_C_S1);
         const hsize_t count = letters ? value.size() : 1;
@@ -126,7 +126,8 @@ std::string imaris(const Scratch& scratch) {
         for (int channel = 0; channel < 2; ++channel) {
             const std::string group =
                 "/DataSet/ResolutionLevel " + std::to_string(level) + "/TimePoint 0/Channel " + std::to_string(channel);
-            // padded to whole chunks; the size is in the attributes
+            // The dataset may be padded to whole chunks. The size of the image is given by the attributes ImageSizeX, Y
+            // and Z.
             file.image(group + "/Data", std::uint16_t(1000 * channel + 100 * level),
                        level == 0 ? std::vector<hsize_t>{4, 5, 6} : std::vector<hsize_t>{2, 2, 3});
             for (int a = 0; a < 3; ++a)
@@ -167,7 +168,7 @@ TEST_CASE("Imaris: levels, channels, extent and names", "[hdf5]") {
     CHECK(info.format == "Imaris");
     CHECK(info.geometry.size == kSize);
     CHECK(info.geometry.spacing == Vec3{1, 1, 1});
-    CHECK(info.geometry.origin == Vec3{0.5, 10.5, 20.5});  // ExtMin is the outer corner
+    CHECK(info.geometry.origin == Vec3{0.5, 10.5, 20.5});  // ExtMin is the outer corner of the first voxel
     CHECK(info.geometry.unit == "um");
     CHECK(info.channel_names == std::vector<std::string>{"red", "green"});
     CHECK(info.levels.size() == 2);
@@ -199,7 +200,7 @@ TEST_CASE("BigDataViewer: setups, levels and the sizes of the XML beside it", "[
     check_ramp(path + ":/t00000/s01/1", 1100);
     const ImageGeometry coarse = read_image_geometry(path + ":/t00000/s01/1/cells");
     CHECK(coarse.spacing == Vec3{1, 1, 4});
-    CHECK(coarse.origin == Vec3{0.25, 0.25, 1});  // means of two voxels
+    CHECK(coarse.origin == Vec3{0.25, 0.25, 1});  // coarse voxels are means of two voxels along each axis
     is_refused(path + ":/t00000/s00/2", "no such dataset");
     scratch.write("b.xml", "<SpimData><ViewSetup><id>0</id><voxelSize><size>1 1</size></voxelSize></ViewSetup>");
     CHECK(read_image_info(path).spacing_known == std::array<bool, 3>{false, false, false});

@@ -35,7 +35,7 @@ TEST_CASE("the same grids make the same bytes, others another number of the file
         std::ifstream file(path, std::ios::binary);
         return std::string{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     };
-    constexpr std::size_t kUuid = 21, kLength = 36;  // OpenVDB's header
+    constexpr std::size_t kUuid = 21, kLength = 36;  // position and length of the UUID in the header of a .vdb file
     const std::string one = bytes_of("a.vdb", 1, "x");
     CHECK(bytes_of("b.vdb", 1, "x") == one);
     CHECK(bytes_of("c.vdb", 1, "y").substr(kUuid, kLength) != one.substr(kUuid, kLength));

@@ -28,7 +28,7 @@ Image labels(const std::function<int(int, int, int)>& label) {
 
 bool in_ball(int i, int j, int k, double x, double r) { return std::hypot(i - x, j - 11.5, k - 11.5) < r; }
 
-/// Discs on every fourth slice, and two specks on adjacent slices that are not tips of a body.
+/// Label 1 on discs in every fourth slice, and on two specks in adjacent slices that are not tips of a body.
 int discs(int i, int j, int k) {
     if (k % 4 == 0 && in_ball(i, j, k, 11.5, 8)) return 1;
     return (k == 1 || k == 2) && (i == 11 || i == 12) && (j == 11 || j == 12) ? 1 : 0;
@@ -149,7 +149,7 @@ TEST_CASE("Painted slices become contours, other paint seeds that are counted as
     CHECK(input.options.inside.size() == 9);
     CHECK(input.options.painted_seeds == 8);
     CHECK(input.paint.at(0).second.label == 1);
-    CHECK(input.contour_rules.empty());  // not written to any file
+    CHECK(input.contour_rules.empty());  // the rules are empty because the contours are not written to any file
 }
 
 TEST_CASE("Paint of one structure is outside of the others, and the outside label of all") {
@@ -183,7 +183,7 @@ TEST_CASE("What a structure adds to the options of all") {
     CHECK(input.options.evolve.delta == 0.25);
     options.evolve.delta = 0.5;
     CHECK(prepare_marks({marks}, lattice(), options).at(0).options.evolve.delta == 0.5);
-    options.tag_distance = 6.9;  // the box measures 6.93
+    options.tag_distance = 6.9;  // the diagonal of the box of the marks is 6.93
     CHECK_NOTHROW(prepare_marks({marks}, lattice(), options));
     options.tag_distance = 7;
     CHECK_THROWS_WITH(prepare_marks({marks}, lattice(), options),

@@ -25,7 +25,7 @@ TriangleMesh cube(float edge, float x0 = 0) {
     return mesh;
 }
 
-/// n x m quads around a torus.
+/// A torus of n x m quads, each in two triangles.
 TriangleMesh torus(int n, int m) {
     TriangleMesh mesh;
     const double pi = std::acos(-1.0);
@@ -101,8 +101,8 @@ TEST_CASE("normals are unit length, weighted by angle and point outward") {
     const TriangleMesh mesh = cube(1);
     const auto normals = compute_vertex_normals(mesh);
     REQUIRE(normals.size() == 8);
-    for (int c = 0; c < 8;
-         ++c)  // weighted by angle and not by number of triangles, they lie exactly along the diagonals
+    // The normals lie exactly along the diagonals, because they are weighted by angle and not by number of triangles.
+    for (int c = 0; c < 8; ++c)
         for (int a = 0; a < 3; ++a)
             CHECK(normals[c][a] == Approx((c >> (2 - a) & 1 ? 1 : -1) / std::sqrt(3.0)).epsilon(1e-6));
 }
@@ -124,7 +124,7 @@ TEST_CASE("sets united by many threads are those united one by one, known by the
     std::mt19937 random(3);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs(kCount * 3 / 4);
     for (auto& [a, b] : pairs) a = std::uint32_t(random() % kCount), b = std::uint32_t(random() % kCount);
-    // By relabelling, in the order of the minimum members.
+    // The expected result, by a flood fill from each number in ascending order: a set is known by its minimum member.
     std::vector<std::vector<std::uint32_t>> beside(kCount);
     for (const auto& [a, b] : pairs) {
         beside[a].push_back(b);

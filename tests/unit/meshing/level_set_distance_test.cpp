@@ -26,7 +26,7 @@ TEST_CASE("distances to a level set beyond its band: of a few points those of ma
     for (std::size_t n = 0; n < few; ++n) CHECK(of_few[n] == of_many[n]);
     for (std::size_t n = 0; n < points.size(); ++n) {
         const double exact = std::abs(std::hypot(points[n][0] - 0.1, points[n][1] + 0.2, points[n][2] - 0.05) - radius);
-        // Beyond the band it is the distance to the points at which edges of the lattice cut the surface.
+        // Beyond the band, the distance is that to the nearest point at which an edge of the lattice cuts the surface.
         REQUIRE(of_many[n] > exact - 0.05 * h);
         REQUIRE(of_many[n] < exact + 0.12 * h);
     }
@@ -36,7 +36,8 @@ TEST_CASE("a change of sign that is no cut edge does not stand for the surface")
     const double h = 0.25;
     const Domain domain = make_domain({{-6, -6, -6}, {6, 6, 6}}, h);
     const FloatGridPtr surface = extract_surface(*start_from_sphere(domain, {0, 0, 0}, 4));
-    const openvdb::Coord apart(80, 80, 80);  // as at the cut end of a body: a voxel deep inside next to one outside
+    // At the cut end of a body, a voxel deep inside may be next to one outside. This change of sign is no cut edge.
+    const openvdb::Coord apart(80, 80, 80);
     surface->tree().setValueOn(apart, float(-2.5 * h));
     const openvdb::Vec3d at = surface->indexToWorld(apart + openvdb::Coord(2, 3, 1));
     std::vector<Vec3> points{{at[0], at[1], at[2]}};

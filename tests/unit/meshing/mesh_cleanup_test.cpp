@@ -58,15 +58,15 @@ TEST_CASE("self-intersections are counted in pairs, contact in shared corners an
     CHECK(count_self_intersections(sphere(8, 1)) == 0);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, -1}, {0.5F, 0.6F, 1}, {0.6F, 0.5F, 1})) == 1);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, 1}, {0.5F, 0.6F, 2}, {0.6F, 0.5F, 2})) == 0);
-    TriangleMesh corner =
-        two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});  // passes through the first one, starting at its corner 0
+    // The second triangle starts at corner 0 of the first one and passes through it.
+    TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});
     corner.triangles[1][0] = 0;
     CHECK(count_self_intersections(corner) == 1);
     corner.vertices[4] = {-1, 1, 1};
     corner.vertices[5] = {-1, 1, -1};
     CHECK(count_self_intersections(corner) == 0);
-    TriangleMesh side =
-        two_triangles({0, 0, 0}, {0, 0, 0}, {1, 1, 0});  // in one plane, on the same side of the edge 0-1
+    // Two triangles in one plane, on the same side of their common edge 0-1.
+    TriangleMesh side = two_triangles({0, 0, 0}, {0, 0, 0}, {1, 1, 0});
     side.triangles[1] = {1, 0, 5};
     CHECK(count_self_intersections(side) == 1);
     side.vertices[5] = {1, -1, 0};
@@ -83,7 +83,7 @@ TEST_CASE("crossings of pieces with each other are told from those with themselv
     CHECK(crossed.within == 0);
     CHECK(crossed.between > 0);
     CHECK(count_self_intersections(both) == crossed.between);
-    // A third piece that intersects itself: two triangles through each other, joined at a corner.
+    // A third piece intersects itself: it consists of two triangles that are joined at a corner and cross each other.
     TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});
     corner.triangles[1][0] = 0;
     for (auto& v : corner.vertices) v[0] += 10;
@@ -163,7 +163,7 @@ TEST_CASE("smoothing takes noise away and keeps the volume") {
     std::uniform_real_distribution<float> noise(-0.005F, 0.005F);
     for (auto& v : mesh.vertices)
         for (float& c : v) c += noise(random);
-    const auto roughness = [&] {  // root mean square distance from the sphere
+    const auto roughness = [&] {  // root mean square distance of the vertices from the sphere
         double sum = 0;
         for (const auto& v : mesh.vertices) sum += std::pow(std::hypot(v[0], v[1], v[2]) - 1, 2);
         return std::sqrt(sum / double(mesh.vertices.size()));
@@ -196,7 +196,7 @@ TEST_CASE("a wall is as thick as the solid between two faces") {
     REQUIRE(measure(slab).volume == Approx(4));
     CHECK(measure_wall(slab) == Approx(0.25));
     CHECK(measure_wall({}) < 0);
-    // A single triangle has nothing opposite.
+    // A single triangle has no wall, because nothing lies opposite to it.
     TriangleMesh open = slab;
     open.triangles.resize(1);
     CHECK(measure_wall(open) < 0);

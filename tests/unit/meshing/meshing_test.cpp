@@ -1,4 +1,4 @@
-// The parts of relaxation and decimation: adjacency, contacts, moves that are undone.
+// Tests of the parts of relaxation and decimation: adjacency, contacts, and moves that are undone.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -19,7 +19,7 @@ namespace {
 
 TriangleMesh solid_mesh(unsigned seed) { return extract_mesh(*test::random_solid(seed).level_set); }
 
-/// Compares with opposite corners that are computed from scratch.
+/// Compares the table's opposite corners with those that are computed anew from the triangles that are left.
 void check_table(const CornerTable& table, std::vector<Triangle> triangles) {
     std::vector<std::size_t> numbers;
     std::vector<Triangle> kept;
@@ -126,16 +126,16 @@ TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
     for (const unsigned seed : {0U, 1U, 7U}) {
         TriangleMesh mesh = solid_mesh(seed);
         INFO("seed " << seed);
-        // extracted triangles can be smaller than rounding errors
+        // At most two contacts may be reported, because extracted triangles can be smaller than rounding errors.
         CHECK(ContactFinder(mesh.vertices, mesh.triangles).contacts(false).size() <= 2);
         std::mt19937 random(seed);
         std::normal_distribution<float> shift(
             0, float(std::sqrt(measure(mesh).area / double(mesh.triangles.size()))) * 0.4F);
         for (auto& v : mesh.vertices)
             for (float& c : v) c += shift(random);
+        // The result is the same if no triangle is skipped for being part of a simple sheet (`true`).
         const auto contacts = ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
-        CHECK(contacts == ContactFinder(mesh.vertices, mesh.triangles)
-                              .contacts(true));  // no triangle is skipped as part of a simple sheet
+        CHECK(contacts == ContactFinder(mesh.vertices, mesh.triangles).contacts(true));
         int touching = 0;
         for (const auto& [s, t] : contacts) {
             TriangleMesh pair{mesh.vertices, {mesh.triangles[s], mesh.triangles[t]}};

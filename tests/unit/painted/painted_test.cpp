@@ -88,7 +88,7 @@ TEST_CASE("the outline of a disc lies on its circle", "[painted]") {
         }
         INFO("radius " << r);
         CHECK(std::abs(mean / count) < 0.03);
-        // The staircase itself is off by 0.235.
+        // Without smoothing, the root mean square distance of the staircase from the circle would be 0.235 voxels.
         CHECK(std::sqrt(square / count) < (r < 5 ? 0.21 : 0.14));
         CHECK(worst < 0.55);
     }
@@ -100,7 +100,7 @@ TEST_CASE("a staircase becomes a straight line", "[painted]") {
         double worst = 0;
         for (const Polygon& line : painted::outlines(half, {true, true, true, true}))
             for (const auto& p : line) {
-                if (p[1] < 0 || p[0] < 0 || p[0] > 59) continue;  // at the cut by the image's end
+                if (p[1] < 0 || p[0] < 0 || p[0] > 59) continue;  // at the image's end, where the outline is cut
                 worst = std::max(worst, std::abs(p[1] - 20.3 - slope * p[0]) / std::hypot(1, slope));
             }
         INFO("slope " << slope);
@@ -140,7 +140,7 @@ TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last ce
     double left = 1e9;
     for (const auto& p : cut[0]) left = std::min(left, p[0]);
     CHECK(left == -0.5);
-    CHECK(signed_area(cut[0]) == Approx(kPi * 50).epsilon(0.01));  // corners are kept
+    CHECK(signed_area(cut[0]) == Approx(kPi * 50).epsilon(0.01));  // the corners at the image's end are kept
     // Without the image's end, the corners of the same painting are rounded.
     CHECK(signed_area(painted::outlines(half, {})[0]) < kPi * 50 * 0.998);
 }
@@ -218,7 +218,7 @@ TEST_CASE("paint in places is a scribble", "[painted]") {
         slices.as = PaintedAs::Slices;
         CHECK(understood(image, slices).labels[0].views.size() == 1);
     }
-    // Only a shell of the ball: the voxels deeper inside add no information.
+    // Only voxels in a shell of the ball become seeds, because those deeper inside add no information.
     CHECK(understood(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
     PaintedOptions scribbles;
     scribbles.as = PaintedAs::Scribbles;

@@ -26,7 +26,7 @@ TEST_CASE("A cloud in one piece is one part") {
 TEST_CASE("Parts that are far apart are measured one by one, by repeated division") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 2);
     const double side = longest_side(bounding_box(ball));
-    // Two pairs: within the first division each pair is one part.
+    // Two pairs of balls. After the first division, each pair is one part; it is divided into its balls later.
     std::vector<Vec3> cloud = joined(ball, test::sphere_cloud(3000, 0.9, 3, {500, 0, 0}));
     cloud = joined(cloud, test::sphere_cloud(3000, 0.8, 4, {1e5, 2e5, 0}));
     cloud = joined(cloud, test::sphere_cloud(3000, 0.7, 5, {1e5, 2e5, 300}));
@@ -38,7 +38,8 @@ TEST_CASE("Parts whose gaps are narrower than a cell, or that are hardly smaller
     const std::vector<Vec3> beside = joined(ball, test::sphere_cloud(3000, 1, 3, {3, 0, 0}));
     CHECK(largest_part_side(beside, 192, 0.5) == longest_side(bounding_box(beside)));
     const std::vector<Vec3> close = joined(ball, test::sphere_cloud(3000, 1, 3, {2.5, 0, 0}));
-    // Without the ratio, the side would be that of a ball.
+    // The small ball is not separated, because the other part would be hardly smaller than the whole. Otherwise the
+    // side would be that of the large ball, 4.
     CHECK(largest_part_side(joined(test::sphere_cloud(9000, 2, 5), test::sphere_cloud(300, 0.1, 6, {3, 0, 0})), 192,
                             0.01) > 4.9);
     CHECK(largest_part_side(close, 8, 0.01) == longest_side(bounding_box(close)));

@@ -32,7 +32,7 @@ std::vector<Named> clouds(int count, unsigned seed) {
         flat[n][2] = 0.7;
         line[n][0] = line[n][2] = -3;
     }
-    // On the borders of cells.
+    // Points on the borders of cells with an edge of 0.25.
     std::vector<Vec3> lattice;
     for (int n = 0; n < count; ++n) lattice.push_back({0.25 * (n % 8), 0.25 * (n / 8 % 8), 0.25 * (n / 64)});
     return {{"spread", spread},   {"clustered", clustered},
@@ -53,7 +53,7 @@ double squared(const Vec3& a, const Vec3& b) {
     return d2;
 }
 
-/// A box within slightly more than the bounding box of the points; some are flat or a single position.
+/// A random box within slightly more than the bounding box of the points. Some boxes are flat or a single position.
 WorldBox random_box(const std::vector<Vec3>& points, std::mt19937& random) {
     const WorldBox whole = bounding_box(points, 0.3);
     const auto uniform = [&] { return random() / 4294967296.0; };
@@ -186,7 +186,7 @@ TEST_CASE("the nearest neighbours are brute force's") {
 TEST_CASE("neighbours are looked for within 40 spacings at least, not without end") {
     std::vector<Vec3> points;
     for (int n = 0; n < 20; ++n) points.push_back({0.1 * n, 0, 0});
-    points.push_back({1.9 + 3.9, 0, 0});  // 39 spacings from the last
+    points.push_back({1.9 + 3.9, 0, 0});  // 39 spacings from the last of the points above
     points.push_back({-1000, 0, 0});
     const PointCells cells(points, 0.2);
     std::vector<std::vector<Neighbour>> found(points.size());

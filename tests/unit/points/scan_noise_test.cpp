@@ -26,7 +26,8 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
     for (Vec3& p : plane) p = {x(random), x(random), 0};
     CHECK(measure_layer_thickness(plane, 0.1) < 1e-9);
     const std::vector<Vec3> block = test::box_cloud(40000, {{0, 0, 0}, {1, 1, 1}}, 5);
-    // Less than 3/8, since the least-squares plane fits best and balls extend beyond the block, but not by much.
+    // The least-squares plane fits better than others, and balls extend beyond the block. Therefore the result is less
+    // than 3/8 of the radius, but not by much.
     CHECK(measure_layer_thickness(block, 0.1) < 0.0375);
     CHECK(measure_layer_thickness(block, 0.1) > 0.75 * 0.0375);
     CHECK(measure_layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
@@ -35,14 +36,14 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
 }
 
 TEST_CASE("average_layers brings two layers of one sphere together between them, and keeps a thin one") {
-    // Radii 0.98 and 1.02: 0.04 apart, four times the spacing.
+    // The radii are 0.98 and 1.02, so that the layers are 0.04 apart, more than twice the spacing of their points.
     std::vector<Vec3> points = test::sphere_cloud(40000, 0.98, 1);
     const std::vector<Vec3> outer = test::sphere_cloud(40000, 1.02, 2);
     points.insert(points.end(), outer.begin(), outer.end());
     const std::vector<Vec3> averaged = average_layers(points, 0.15);
     REQUIRE(averaged.size() == points.size());
     CHECK(mean_off_sphere(points, 1) == Approx(0.02));
-    // A plane lies below the cap to which it is fitted: by radius^2 / 8 with these weights, in each of two passes.
+    // A plane that is fitted to a cap lies below it: with these weights by radius^2 / 8, in each of two passes.
     const double sag = 0.15 * 0.15 / 4;
     CHECK(mean_off_sphere(averaged, 1) < 1.15 * sag);
     const std::vector<Vec3> thin = test::sphere_cloud(40000, 1, 3);
@@ -50,7 +51,8 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
 }
 
 TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
-    // 2.5 voxels of 5.7 spacings cover the whole sphere, or a large part of it.
+    // At voxels of 5.7 spacings, neighbourhoods of 2.5 voxels contain the whole sphere or a large part of it. Its bend
+    // must not be taken for noise.
     for (const int count : {50, 100, 300, 1000}) {
         const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
         const double spacing = 6 * std::sqrt(M_PI / count);
@@ -64,8 +66,8 @@ TEST_CASE("choose_scan_voxel_size: two sides of a plate are no noise, points tha
     const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
     plate.insert(plate.end(), above.begin(), above.end());
     CHECK(choose_scan_voxel_size(plate, 1).voxel_size == Approx(1));
-    // If the plate is filled, the mean distance of points from its middle plane is 5/4: 4 is the first power of the
-    // square root of 2 of which 0.35 voxels exceed it.
+    // If the plate is filled, the mean distance of points from its middle plane is 5/4. The voxel size is the first
+    // power of the square root of 2 of which 0.35 is more than this distance: 4.
     const std::vector<Vec3> filled = test::box_cloud(50000, {{0, 0, 0}, {100, 100, 5}}, 7);
     CHECK(choose_scan_voxel_size(filled, 1).voxel_size == Approx(4));
 }
@@ -84,7 +86,8 @@ TEST_CASE("choose_scan_voxel_size: the spacing for a clean scan, coarser than th
     const ScanVoxelSize choice = choose_scan_voxel_size(noisy, spacing);
     CHECK(choice.voxel_size > 2 * spacing);
     CHECK(choice.voxel_size < 5 * spacing);
-    // The mean distance of a normal distribution, 0.8 sigma, less what the fitted plane absorbs.
+    // For normally distributed noise the mean distance from the surface is 0.8 sigma. A part of it is absorbed by the
+    // fitted plane.
     CHECK(choice.thickness == Approx(0.8 * 0.02).epsilon(0.25));
     CHECK(choice.thickness <= 0.35 * choice.voxel_size);
 }

@@ -32,7 +32,7 @@ bool is_ink(const std::array<int, 3>& c) { return c[0] < 40 && c[1] < 40 && c[2]
 /// Orange, the colour of a single structure: much more red than blue.
 bool is_warm(const std::array<int, 3>& c) { return c[0] > c[2] + 30; }
 
-/// Bounds of the pixels for which `is` holds, in a part of the picture.
+/// The number and the bounds of the pixels for which `is` is true, in a part of the picture.
 struct Bounds {
     int count = 0, left = 1 << 20, right = -1, top = 1 << 20, bottom = -1;
 };
@@ -63,7 +63,7 @@ RenderStructure structure(const FloatGridPtr& surface, const std::string& name =
     return s;
 }
 
-/// An image whose voxels have the value of `value` at their world position.
+/// An image whose voxels have the values value(world position).
 Image make_image(const ImageGeometry& geometry, const std::function<float(const Vec3&)>& value) {
     std::vector<float> values;
     for (int k = 0; k < geometry.size[2]; ++k)
@@ -84,8 +84,8 @@ RenderOptions sized(int width, int height, FigureKind kind) {
 }  // namespace
 
 TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
-    // Ten voxels from the centre to the surface. With normals that are constant in each voxel, they would be off by up
-    // to 0.05 rad, and the shading by 0.03.
+    // The radius is ten voxels. If normals were constant in each voxel, they would be off by up to 0.05 rad, and the
+    // shading by 0.03.
     const double h = 0.1, radius = 1 - h * h / 3;  // radius of the smoothed field
     const FloatGridPtr ball = make_ball({0.03, -0.02, 0.01}, 1, h);
     figure::Camera camera;
@@ -96,7 +96,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
     const Color base{0.8F, 0.5F, 0.2F};
     const figure::Layer layer = figure::cast_surfaces({{ball.get(), base, 1}}, camera, {});
     const auto unit = [](const Vec3& v) { return Vec3{v[0] / length(v), v[1] / length(v), v[2] / length(v)}; };
-    // In the camera's axes: right, up, towards the eye.
+    // The directions of the lights, in the camera's axes: right, up, towards the eye.
     const Vec3 key = unit({-0.55, 0.75, 1}), fill = unit({1, -0.1, 0.7}), half = unit({key[0], key[1], key[2] + 1});
     const auto dot = [](const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
     double worst = 0, off_disc = 0;
@@ -119,7 +119,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
         }
     CHECK(lit > 25000);
     CHECK(worst < 0.008);
-    CHECK(off_disc < 0.35);  // of a pixel: the outline is a circle
+    CHECK(off_disc < 0.35);  // pixels by which the outline differs from a circle
 }
 
 TEST_CASE("a scale bar is as long as it says") {
@@ -204,7 +204,7 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     geometry.size = {20, 24, 16};
     geometry.direction = {{{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     geometry.origin = {19, 0, 0};
-    const Vec3 left_place{15, 12, 8};  // left of the patient's midline
+    const Vec3 left_place{15, 12, 8};  // a position left of the patient's midline
     const Image image = make_image(geometry, [&](const Vec3& at) {
         return std::abs(at[0] - left_place[0]) + std::abs(at[1] - left_place[1]) < 2 ? 200.0F : 0.0F;
     });
@@ -237,8 +237,8 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     figure::draw_slice(canvas, canvas.whole(), axial, region, scene, style, {});
     const Picture picture = canvas.picture();
     const auto bright = [](const std::array<int, 3>& c) { return c[0] > 200 && c[2] > 200; };
-    // The bright block; then the letters, next to which the picture is dark: an L has ink at its foot, an R at its top
-    // right.
+    // The bright block is on the right. Beside the letters the picture is dark; an L has ink at its foot, an R also at
+    // its top right.
     CHECK(find(picture, {135, 115, 40, 20}, bright).count > 150);
     CHECK(find(picture, {25, 115, 40, 20}, bright).count == 0);
     const Bounds r = find(picture, {0, 105, 24, 30}, bright), l = find(picture, {178, 105, 22, 30}, bright);
@@ -267,12 +267,12 @@ TEST_CASE("marked slices are found and chosen") {
     CHECK(figure::spread_slices(2, 3, boxes, marked, geometry) == std::vector<int>{9, 15, 22});
     CHECK(figure::spread_slices(2, 3, boxes, {}, geometry) == std::vector<int>{7, 13, 19});
     CHECK(figure::middle_slice(0, boxes, marked, geometry) == 50);
-    // If two structures have only one slice in common, that slice.
+    // If two structures have only a few slices in common, one of these is chosen: both meet z = 33 to 42.
     const std::vector<WorldBox> two{{{0, 0, 0}, {10, 10, 42}}, {{0, 0, 33}, {10, 10, 87}}};
     const int both = figure::middle_slice(2, two, {}, geometry);
     CHECK(both >= 13);
     CHECK(both <= 14);
-    // A cloud has no slices.
+    // The marks of a cloud lie on no slices.
     for (std::size_t n = 0; n < marks.size(); ++n) marks[n][2] += 0.37 * double(n % 7);
     CHECK(figure::find_marked_slices(marks, geometry).axis == -1);
 }
@@ -292,7 +292,7 @@ TEST_CASE("structures have their own colours, and those around others let them b
     CHECK(find(picture, below_legend, blue).right < 200);
     CHECK(find(picture, below_legend, red).left >= 200);
     CHECK(find(picture, below_legend, blue).count > 8000);
-    CHECK(find(picture, {0, 0, 30, 50}, blue).count > 20);  // the legend's patches
+    CHECK(find(picture, {0, 0, 30, 50}, blue).count > 20);  // the patches of colour in the legend
     CHECK(find(picture, {0, 0, 30, 50}, red).count > 20);
 
     const FloatGridPtr around = make_ball({0, 0, 0}, 12, 0.6), inner = make_ball({0, 0, 0}, 4, 0.4);
@@ -325,7 +325,7 @@ TEST_CASE("frames of a turn differ and have one scale") {
             for (int x = 150; x < 300; ++x)
                 for (const int c : pixel(picture, x, y)) bar.push_back(std::uint8_t(c));
         bars.insert(bar);
-        // Nothing reaches the edge of the picture.
+        // Neither the surface nor the bar reaches the edge of the picture.
         for (int x = 0; x < 300; ++x) CHECK(is_white(pixel(picture, x, 2)));
         for (int y = 60; y < 180; ++y) CHECK((is_white(pixel(picture, 1, y)) && is_white(pixel(picture, 298, y))));
     }
@@ -351,7 +351,7 @@ TEST_CASE("a composed figure is filled, shows slices with marks, and is the same
     scene.unit = "um";
     RenderOptions options = sized(600, 400, FigureKind::Composed);
     const Picture picture = render(scene, options);
-    // Neither a column nor a half of the picture is empty.
+    // No quarter of the picture is empty.
     for (const Rect& part :
          {Rect{0, 0, 300, 200}, Rect{300, 0, 300, 200}, Rect{0, 200, 300, 200}, Rect{300, 200, 300, 200}})
         CHECK(find(picture, part, [](const auto& c) { return !is_white(c); }).count > 300 * 200 / 8);
@@ -400,13 +400,13 @@ TEST_CASE("text stands where it is asked to, and what the font lacks is shown as
     CHECK(ink.left > 100 - figure::text_width("HH", 20));
     CHECK(figure::text_width("HH", 20) == Approx(2 * figure::text_width("H", 20)));
     CHECK(figure::text_width("\xc3\xa9", 20) == Approx(figure::text_width("e", 20)).epsilon(0.05));
-    CHECK(figure::text_width("\xe4\xb8\xad", 20) ==
-          figure::text_width("\xff", 20));  // an unsupported character, invalid UTF-8
+    // Characters that the font lacks, and invalid UTF-8, are drawn as the same replacement.
+    CHECK(figure::text_width("\xe4\xb8\xad", 20) == figure::text_width("\xff", 20));
 }
 
 TEST_CASE("views by name and by angles") {
     CHECK(parse_view("right", false).azimuth == 90);
-    CHECK(parse_view("left", true).azimuth == 90);  // the patient's left is +x
+    CHECK(parse_view("left", true).azimuth == 90);  // for patients, the left is in the direction +x
     CHECK(parse_view("-30,45.5", false).elevation == 45.5);
     for (const char* bad : {"", "behind", "1", "1,", ",1", "1,2,3", "1,95", "nan,0", "1e999,0"})
         CHECK_THROWS_AS(parse_view(bad, false), Error);

@@ -36,7 +36,7 @@ double away(const std::array<float, 3>& v) {
     return std::hypot(v[0] - kCenter[0], v[1] - kCenter[1], v[2] - kCenter[2]);
 }
 
-/// A box of voxels whose values grow along k.
+/// An image of voxels whose values equal their index k.
 Image ramp(const Index3& size) {
     ImageGeometry geometry;
     geometry.size = size;
@@ -108,9 +108,9 @@ TEST_CASE("a coded mesh is the mesh, within half a step of its lattice") {
     for (std::size_t v = 0; v < back.vertices.size(); ++v)
         for (int a = 0; a < 3; ++a)
             maximum = std::max(maximum, std::abs(double(back.vertices[v][a]) - mesh.vertices[coded.from[v]][a]));
-    CHECK(maximum <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // plus the rounding of floats near 100
+    CHECK(maximum <= 0.5 * 2 * kRadius / 65535 + 1e-5);  // half a step of 16 bits, plus the rounding of floats near 100
     CHECK(maximum > 0);
-    // Neighbouring triangles share vertices: three corners take little more than three bytes.
+    // As neighbouring triangles share vertices, the three corners of a triangle take little more than three bytes.
     CHECK(coded.corners.size() < 6 * mesh.triangles.size());
 }
 
@@ -170,7 +170,7 @@ TEST_CASE("slices: all of a small image, the part around the places of a large o
     CHECK(part.region.min == Index3{18, 18, 9});
     CHECK(part.region.max == Index3{32, 27, 12});
     const detail::SlicePlan thin = detail::plan_slices(geometry, all, {}, 60 * 40 * 20 / 4);
-    CHECK(thin.step == Index3{2, 2, 1});  // k is already the coarsest axis
+    CHECK(thin.step == Index3{2, 2, 1});  // not along k, whose spacing is already the largest
     CHECK(thin.size == Index3{30, 20, 20});
 }
 
@@ -182,7 +182,8 @@ TEST_CASE("coded slices know where their voxels lie in the world") {
     plan.size = {8, 4, 3};
     const detail::CodedSlices coded = detail::encode_slices(image, plan, 90, {});
     REQUIRE(coded.jpegs.size() == 3);
-    CHECK(coded.geometry.origin == Vec3{0.5, 0.5, 3.5});  // means of two voxels; the second of three slices
+    // Means of two voxels along i and j; the second of three slices.
+    CHECK(coded.geometry.origin == Vec3{0.5, 0.5, 3.5});
     CHECK(coded.geometry.spacing == Vec3{2, 2, 10.5});
     CHECK(coded.black == Approx(0).margin(0.1));
     CHECK(coded.white == Approx(8).margin(0.1));

@@ -1,4 +1,4 @@
-// The vectorised kernels against the formulas of the scheme, implemented plainly in double precision.
+// Compares the vectorised kernels with the formulas of the scheme, implemented plainly in double precision.
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
@@ -35,10 +35,11 @@ struct Rows {
     double sum = 0.0;
 };
 
-// Row (i,j,k) from the definitions: each face's four tetrahedra p, q, two vertices.
+// Row (i,j,l) of the system by definition: from the four tetrahedra of each face, whose corners are the voxels p and q
+// and two vertices of the face.
 Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const SchemeConstants& k, int i, int j, int l) {
     const auto at = [](const Padded& f, int a, int b, int c) { return double(f[padded(a, b, c)]); };
-    // the vertex at half-integer position, each s = +-1
+    // The value at the voxel's vertex in the direction (si, sj, sk), each +-1: the mean of the eight voxels around it.
     const auto vertex = [&](int si, int sj, int sk) {
         double sum = 0.0;
         for (int a = 0; a < 2; ++a)
@@ -52,7 +53,8 @@ Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const Scheme
         const int axis = f / 2, sign = f % 2 == 0 ? -1 : 1, e1 = (axis + 1) % 3, e2 = (axis + 2) % 3;
         const double p = at(u, i, j, l), q = at(u, i + kSteps[f][0], j + kSteps[f][1], l + kSteps[f][2]);
         for (int t = 0; t < 4; ++t) {
-            // the edge along `along`, at side s of `beside`
+            // Edge t of the face runs along the axis `along`; it lies at the side s of the face along the axis
+            // `beside`.
             const int along = t < 2 ? e1 : e2, beside = t < 2 ? e2 : e1, s = t % 2 == 0 ? -1 : 1;
             int corner[3] = {0, 0, 0};
             corner[axis] = sign, corner[beside] = s;
@@ -84,7 +86,7 @@ Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const Scheme
     return row;
 }
 
-/// The rows of a leaf from the kernel, as fractions.
+/// The rows of a leaf as the kernel stores them, as integers in units of 1 / kFractionUnit.
 struct LeafRows {
     std::vector<Fraction> fractions = std::vector<Fraction>(6 * 512);
     [[nodiscard]] double operator()(int f, int n) const { return double(fractions[fraction_at(f, n)]) / kFractionUnit; }
@@ -180,7 +182,8 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
             if (!is_closed) kept += open(f, n);
             if (is_closed || !on) REQUIRE(closed(f, n) == 0.0F);
         }
-        // undo the division by the diagonal 1 + S: S = c/(1-Σc), and the part of S that is kept is the same in both
+        // The kernel divides coefficients by the diagonal 1 + S, so that S = Σc / (1 - Σc). Before the division, the
+        // coefficients of open faces are the same in both.
         if (on && j <= 6)
             REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
     }
@@ -188,12 +191,13 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
 
 namespace {
 
-/// A padded buffer as seven blocks; the six around it hold the halo's values at the positions that are read.
+/// A padded buffer as seven blocks: the leaf, and its six neighbours, which hold only those values of the halo that are
+/// read.
 struct Blocks {
     std::array<std::vector<float>, 7> values;
     explicit Blocks(const Padded& from) {
         for (int n = 0; n < 7; ++n) {
-            values[n].assign(512, -1e30F);  // other values must not be read
+            values[n].assign(512, -1e30F);  // the values at other positions must not be read
             const int step[3] = {n < 6 ? kSteps[n][0] : 0, n < 6 ? kSteps[n][1] : 0, n < 6 ? kSteps[n][2] : 0};
             for (int p = 0; p < 512; ++p) {
                 const int at[3] = {(p >> 6) + 8 * step[0], (p >> 3 & 7) + 8 * step[1], (p & 7) + 8 * step[2]};
@@ -300,7 +304,8 @@ TEST_CASE("the mean of a wave's neighbours is its exact multiple") {
 }
 
 TEST_CASE("a plane's distance is found exactly from where it comes") {
-    // Differences of a linear function are exact, whether its front moves along one, two or three axes.
+    // The distance to a plane is linear, so its differences are exact, whether the front arrives along one, two or
+    // three axes.
     const std::array<double, 3> normals[] = {{1, 0, 0},
                                              {0, -1, 0},
                                              {0, 0, 1},

@@ -11,7 +11,7 @@
 #include "support/dense_reference.h"
 #include "support/shapes.h"
 
-// The kernels on one leaf against the dense reference with the same values, on every instruction set.
+// Compares the kernels on one leaf, on every instruction set, with the dense reference for the same values.
 
 using namespace covol;
 using namespace covol::test;
@@ -19,14 +19,14 @@ using detail::kLeafSize;
 
 namespace {
 
-/// The order of the kernel's coefficients among the faces of the reference.
+/// Coefficient f of the kernel belongs to the face kReferenceFace[f] of the reference.
 constexpr std::array<int, 6> kReferenceFace = {1, 0, 3, 2, 5, 4};
 
 struct Buffer {
     alignas(64) std::array<float, detail::kPaddedSize> values{};
 };
 
-/// 10^3 voxels: the leaf is the inner 8^3.
+/// Copies a field of 10^3 voxels into a padded buffer. The leaf is the inner 8^3 voxels.
 Buffer padded_copy(const DenseField& field) {
     Buffer buffer;
     for (int i = -1; i <= 8; ++i)
@@ -81,7 +81,7 @@ Rows assemble_leaf(const detail::SchemeKernels& kernels, const DenseField& u, co
     return rows;
 }
 
-/// In the form of the kernel's rows: -a_pq / (1 - Σ a), zero rows for inactive voxels.
+/// The rows of the reference in the form of the kernel's: -a_pq / (1 - Σ a), and rows of zeros for inactive voxels.
 std::vector<double> reference_rows(const DenseField& u, const DenseField* d, const DenseField* g, const DenseOptions& o,
                                    const detail::LeafMask& mask) {
     const DenseSystem system = assemble(u, inner_active(u, mask), {d, g}, o);
@@ -189,7 +189,7 @@ TEST_CASE("a leaf's rows are the reference's") {
     }
     SECTION("a flat u") {
         const DenseField flat(10, 10, 10, 1.0, -3.0);
-        const double s = o.tau * o.delta;  // M W = ε / ε
+        const double s = o.tau * o.delta;  // since M W = ε / ε = 1 for a flat u
         for (const detail::SchemeKernels* kernels : detail::available_kernels())
             for (const float c : assemble_leaf(*kernels, flat, nullptr, nullptr, o, every_voxel()).c)
                 CHECK(std::abs(c - s / (1 + 6 * s)) < 0.5 / detail::kFractionUnit + 1e-6);

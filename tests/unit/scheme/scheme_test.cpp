@@ -7,8 +7,8 @@
 #include "support/dense_reference.h"
 #include "support/shapes.h"
 
-// The scheme of docs/method.md on the dense reference: closed forms, and for each erratum of the printed paper
-// an identity that the corrected form and evolve() satisfy and the printed form violates.
+// Tests of the scheme of docs/method.md, as implemented by the dense reference: closed forms, and for each erratum of
+// the printed paper an identity that the corrected form and evolve() satisfy and the printed form violates.
 
 using namespace covol;
 using namespace covol::test;
@@ -19,14 +19,14 @@ constexpr double kH = 0.5;
 
 double signed_sphere(const Vec3& x, double radius) { return length(x) - radius; }
 
-/// A closed surface without any symmetry.
+/// The level set of a closed surface without any symmetry.
 double lopsided(const Vec3& x) {
     return std::sqrt(x[0] * x[0] + 1.7 * x[1] * x[1] + 0.6 * x[2] * x[2] + 0.4 * x[0] * x[2]) - 1.9 +
            0.3 * std::sin(2 * x[1]);
 }
 
-/// Largest |S(u)| mirrored back - |S|, where S starts from the mirrored fields: 0 for a scheme without a preferred
-/// side.
+/// The maximum of |mirror(S(mirror(u))) - S(u)| in voxels, where S is the solver's result after two steps. It is 0 for
+/// a scheme that prefers no side.
 double mirror_defect(const Problem& p, const Solver& solver, int axis) {
     const Symmetry flip = mirror(axis);
     Problem mirrored = p;
@@ -143,7 +143,8 @@ TEST_CASE("v_pq: points that are not known do not pull, a frozen voxel keeps its
         double sum = 0;
         for (int q = 0; q < 6; ++q) sum += system.a[6 * row + q];
         const int i = static_cast<int>(system.voxel[row] / 100) - 1;  // 10 x 10 padded voxels in a slice
-        // The flow is along +x at unit speed, so that -x is upwind; i = 0 has its mirror image there, i = 4 is unknown.
+        // The flow is along +x at unit speed, so that -x is upwind. At i = 0 the upwind neighbour is the voxel's own
+        // mirror image, and at i = 4 the distance is unknown.
         CHECK(sum == Approx(i >= 1 && i <= 3 ? -p.options.tau / kH : 0.0).margin(1e-6));
     }
     const DenseField after = run_dense(p, 1);
@@ -152,14 +153,15 @@ TEST_CASE("v_pq: points that are not known do not pull, a frozen voxel keeps its
 }
 
 TEST_CASE("the image term has unit speed on a slope and fades where the slope is below epsilon") {
-    for (const double slope : {0.2, 1e-3, 1e-6}) {  // of g per voxel
+    for (const double slope : {0.2, 1e-3, 1e-6}) {  // slope of g per voxel
         Problem p = whole_cube(8, kH, [](const Vec3& x) { return x[1]; });
         p.edge = sample(p.domain, [&](const Vec3& x) { return 0.5 + slope * x[1] / kH; });
         p.options.rho = 1;
         const DenseSystem system = assemble(p.u, p.active, {nullptr, &p.edge}, p.options);
         const std::size_t row = (3 * 8 + 3) * 8 + 3;
         const double speed = slope / std::sqrt(1e-6 + slope * slope);
-        for (int q = 0; q < 6; ++q)  // -∇g points to -y: +y is upwind
+        // -∇g points to -y, so that +y is upwind.
+        for (int q = 0; q < 6; ++q)
             CHECK(system.a[6 * row + q] == Approx(q == 2 ? -p.options.tau / kH * speed : 0.0).margin(1e-12));
     }
 }
@@ -269,7 +271,7 @@ TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outru
             }
         return n > 0 ? mean / n : NAN;
     };
-    // The values on the inflow side are fixed; their effect on the plane is about 2e-3 h by then.
+    // The values on the inflow side are fixed. After two steps, this changes the plane's position by only about 2e-3 h.
     CHECK(travelled(p, run_dense) == Approx(2 * p.options.tau).margin(0.02 * kH));
     CHECK(travelled(p, by_evolve) == Approx(travelled(p, run_dense)).margin(1e-4 * kH));
     p.options.printed.neighbours = true;
@@ -277,7 +279,7 @@ TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outru
 }
 
 TEST_CASE("erratum 5: with epsilon twice a nearly flat u does not follow the heat equation") {
-    // |∇u| << ε: M W = ε / ε, and one step is one of backward Euler for u_t = δ Δu.
+    // As |∇u| is far below ε, M W = ε / ε = 1, and one step is a step of backward Euler for u_t = δ Δu.
     constexpr double amplitude = 0.01;
     Problem p = whole_cube(12, kH, [](const Vec3& x) { return amplitude * std::cos(M_PI * (x[2] / (12 * kH) + 0.5)); });
     p.options.delta = 0.5;

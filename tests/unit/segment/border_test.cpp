@@ -22,7 +22,7 @@ Image blank_image() {
     return Image::from_values(geometry, values.data());
 }
 
-/// The complement of a small ball, in a corner of the image or elsewhere.
+/// A level set whose outside, as far as the image extends, is a small ball.
 FloatGridPtr inverted_ball(const Image& image, const Vec3& center, double radius) {
     const FloatGridPtr u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, radius);
     for (auto value = u->beginValueAll(); value; ++value) value.setValue(-*value);

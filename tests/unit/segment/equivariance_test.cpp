@@ -14,9 +14,9 @@ using namespace covol;
 
 namespace {
 
-constexpr double kMaxDice = 0.002;  // largest difference
-// Forward differences of the minimal surface, the cells of patches and the directions of the hull have no mirror
-// symmetry.
+constexpr double kMaxDice = 0.002;  // maximum difference of two Dice coefficients
+// The same for views with flipped or exchanged axes. It is larger, because the forward differences of the minimal
+// surface, the cells of patches and the directions of the hull have no mirror symmetry.
 constexpr double kMaxDiceOfTurned = 0.01;
 
 /// Three quarters of a ring that tapers to its ends: thin, curved, with ends. Negative inside.
@@ -50,7 +50,7 @@ struct View {
 constexpr std::array kSizes{52, 52, 28};  // of the scene
 
 double noise_at(const Vec3& q) {
-    // Made from the scene's own voxel, so that noise is the same in every view.
+    // The random number is derived from the position in the scene, so that the noise is the same in every view.
     std::uint64_t key = 0;
     for (int a = 0; a < 3; ++a) key = key * 1000003 + std::uint64_t(std::llround(2 * q[a]) + 500);
     std::mt19937_64 random(key);

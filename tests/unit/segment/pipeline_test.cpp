@@ -108,7 +108,7 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     options.start = SphereStart{{0, 0, 0}, kRadius + 4};
     options.margin = 8;
     options.evolve.attraction_range = 0;
-    // the points are a voxel apart: with a larger delta, curvature would dominate between them
+    // The points are a voxel apart. With a larger delta, curvature would dominate between them.
     options.evolve.delta = 0.1 * h;
     const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
@@ -117,7 +117,7 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
 
 namespace {
 
-/// 80^3 voxels of 1: an ellipsoid, bright inside.
+/// An image of 80^3 voxels with edges of 1: an ellipsoid with the value 1 inside and 0 outside.
 Image ellipsoid_image(const Vec3& semi_axes) {
     ImageGeometry geometry;
     geometry.size = {80, 80, 80};
@@ -132,7 +132,8 @@ Image ellipsoid_image(const Vec3& semi_axes) {
                     r2 += w[a] * w[a] / (semi_axes[a] * semi_axes[a]);
                     slope2 += w[a] * w[a] / std::pow(semi_axes[a], 4);
                 }
-                const double depth = slope2 > 0 ? (1 - r2) / (2 * std::sqrt(slope2)) : 1;  // first order in voxels
+                // Signed distance in voxels, to first order.
+                const double depth = slope2 > 0 ? (1 - r2) / (2 * std::sqrt(slope2)) : 1;
                 values.push_back(static_cast<float>(std::clamp(depth + 0.5, 0.0, 1.0)));
             }
     return Image::from_values(geometry, values.data());
@@ -173,7 +174,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
     CHECK(lean.edge == nullptr);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.surface->tree().hasSameTopology(whole.surface->tree()));
-    // Relaxation collapses slivers, two triangles at a time.
+    // A mesh that is not kept is not relaxed. Relaxation collapses slivers, which removes two triangles each time.
     CHECK(lean.report.mesh.triangles == whole.report.mesh.triangles + 2 * whole.report.mesh.collapses);
     CHECK(lean.report.surface.volume == Approx(whole.report.surface.volume).epsilon(3e-4));  // not relaxed
     CHECK(lean.report.surface.genus == 0);
@@ -182,7 +183,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
 }
 
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
-    // A plate three voxels thick: one and a half at twice the voxel size.
+    // A plate three voxels thick, which is one and a half voxels at the coarse level with twice the voxel size.
     const Image image = ellipsoid_image({24, 24, 2});
     const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
     CHECK(both.report.surface.closed);
@@ -254,7 +255,8 @@ TEST_CASE("points are tagged, or guessed from") {
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(image).voxel_size == 2.0);
-    // Three distinct points: as many voxels as for 4,000 points, or a thousand that are tagged.
+    // The voxel size for three distinct points with a spacing of 3 is that of 4,000 points on the same surface, or of a
+    // thousand points if they are tagged.
     const std::vector<Vec3> three{{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}};
     CHECK(choose_voxel_size(three).voxel_size == Approx(3 * std::sqrt(3.0 / 4000)));
     CHECK(choose_voxel_size(three, true).voxel_size == Approx(3 * std::sqrt(3.0 / 1000)));

@@ -1,4 +1,4 @@
-// WebSockets of a running server.
+// Tests of the WebSockets of a running server.
 #include <catch2/catch.hpp>
 #include <future>
 #include <thread>
@@ -166,7 +166,7 @@ TEST_CASE("a client that is sent texts all the while is told, too, why it is clo
     Live live(echo.site());
     CHECK(live.receive() == "hello");
     std::jthread talker([&] {
-        for (int n = 0; n < 50; ++n) {  // before and after the server has sent the reason
+        for (int n = 0; n < 50; ++n) {  // some before and some after the server has sent the reason
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
             (void)echo.site().server.send(echo.last(), "x");
         }

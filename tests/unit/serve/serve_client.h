@@ -39,7 +39,7 @@ inline bool becomes_true(const std::function<bool()>& is_true) {
     return false;
 }
 
-/// The calls of handlers.
+/// Records the calls of handlers as lines of text.
 class CallRecorder {
 public:
     void add(const std::string& text) {
@@ -68,7 +68,7 @@ public:
         socket_.connect({asio::ip::address_v4::loopback(), port});
     }
     void send(const std::string& bytes) { asio::write(socket_, asio::buffer(bytes)); }
-    /// The next answer. @param is_head  without a body
+    /// Receives the next answer. @param is_head  the request is a HEAD, so that the answer has no body
     Answer receive(bool is_head = false) {
         http::response_parser<http::string_body> parser;
         parser.body_limit(std::uint64_t(1) << 30);

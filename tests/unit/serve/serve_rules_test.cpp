@@ -1,4 +1,4 @@
-// Which requests are accepted, and the headers of answers: without sockets.
+// Tests, without sockets, of which requests are accepted, and of the headers of answers.
 #include <catch2/catch.hpp>
 #include <set>
 
@@ -28,7 +28,7 @@ Rules rules() {
     return made;
 }
 
-/// A request that is accepted; tests change one part of it.
+/// The head of a request that is accepted. Tests change one part of it.
 RequestHead good_head(std::string_view target = "/image") {
     return {"GET", target, {{"Host", "127.0.0.1:8000"}, {"Cookie", kCookieField}}, false};
 }
@@ -249,7 +249,7 @@ TEST_CASE("a POST is answered where files are taken, from the page itself, and w
     two.fields.emplace_back("content-length", "1000");
     CHECK(judged(two) == 411);
     CHECK(judged(with(good, "Transfer-Encoding", "chunked")) == 400);
-    // Forms and scripts of other pages, whose origin a browser states.
+    // Forms and scripts of other pages are refused; browsers state their origin.
     CHECK(judged(without(good, "Origin")) == 403);
     CHECK(judged(with(good, "Origin", "null")) == 403);
     CHECK(judged(with(good, "Origin", "http://127.0.0.1:8001")) == 403);

@@ -1,4 +1,4 @@
-// A running server: which requests it answers, and how.
+// Tests of a running server: which requests it answers, and how.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -34,7 +34,7 @@ Handlers pages() {
     return handlers;
 }
 
-/// Handlers that wait until they are released.
+/// Lets handlers wait until open() is called.
 class Gate {
 public:
     ~Gate() { open(); }
@@ -268,7 +268,7 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
     CHECK(second.receive().result_int() == 503);
     may_answer = true;
     CHECK(first.receive().body() == "234");
-    // A client that stops halfway frees its place.
+    // A client that disconnects halfway through a POST does not block the next one.
     {
         HttpConnection cut(site.port);
         cut.send(head(1000) + "half");

@@ -1,4 +1,4 @@
-// Starts inside an object, or around one: which of them grow, and to what size.
+// Tests of starts inside an object or around one: which of them grow, and to what size.
 #include "start/grow.h"
 
 #include <openvdb/openvdb.h>
@@ -15,7 +15,8 @@ using namespace covol;
 
 namespace {
 
-/// An image of n^3 voxels of 1: 100 outside, `inside` where the shape is negative, a soft border of a voxel, and noise.
+/// An image of n^3 voxels with edges of 1: 100 outside, `inside` where the shape is negative, a soft border as wide as
+/// a voxel, and noise.
 Image image_of(int n, const std::function<double(const Vec3&)>& shape, double inside, double noise, unsigned seed) {
     ImageGeometry geometry;
     geometry.size = {n, n, n};

@@ -1,4 +1,4 @@
-// LevelSet against closed forms for balls.
+// Compares LevelSet with closed forms for balls.
 #include "covol/level_set.h"
 
 #include <openvdb/openvdb.h>
@@ -24,7 +24,7 @@ LevelSet ball(const Vec3& center, double radius, const Domain& domain = kDomain)
 
 double volume_of(double radius) { return 4 * std::numbers::pi / 3 * std::pow(radius, 3); }
 
-/// Volume of the intersection of two balls of that radius.
+/// The volume of the intersection of two balls of the given radius whose centres are `apart`.
 double lens(double radius, double apart) {
     return std::numbers::pi * (4 * radius + apart) * std::pow(2 * radius - apart, 2) / 12;
 }
@@ -46,7 +46,7 @@ TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the 
     const LevelSet surface = ball({0.1, 0, -0.2}, 3);
     for (const double distance : {-2.0, -0.4, 0.0, 0.4, 2.0}) {
         const LevelSet moved = surface.offset(distance);
-        // A tenth of a voxel: distances far from the surface are measured to its triangles.
+        // The tolerance is a tenth of a voxel, because distances far from the surface are measured to its triangles.
         const double error = 0.1 * kH, radius = 3 + distance;
         CHECK(std::abs(moved.measure().volume - volume_of(radius)) < volume_of(radius + error) - volume_of(radius));
         CHECK(std::abs(moved.sample({0.1 + radius, 0, -0.2})) < error);
@@ -59,7 +59,7 @@ TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the 
 TEST_CASE("LevelSet: unions, intersections and differences have their volumes, and are distances") {
     const double apart = 3;
     const LevelSet a = ball({-1.5, 0, 0}, 2.5), b = ball({1.5, 0, 0}, 2.5);
-    // On another lattice: the other level set is resampled.
+    // The second ball on another lattice, so that its level set must be resampled.
     const LevelSet other = ball({1.5, 0, 0}, 2.5, make_domain({{-5, -5, -5}, {5, 5, 5}}, 0.2));
     const double shared = lens(2.5, apart), one = volume_of(2.5);
     // Along the circle of radius 2 where the surfaces cross, triangles round the edge by less than half a voxel each
@@ -71,8 +71,8 @@ TEST_CASE("LevelSet: unions, intersections and differences have their volumes, a
         CHECK(std::abs(a.without(second).measure().volume - (one - shared)) < error);
         CHECK(a.united(second).domain() == a.domain());
     }
-    // Inside the waist of a union the distance is that to the seam, and not to the part of a ball's surface that is
-    // within the other ball.
+    // Inside the waist of the union, the distance is that to the seam of the two balls. The parts of a ball's surface
+    // that lie within the other ball do not count.
     CHECK(a.united(b).sample({0, 1.5, 0}) == Approx(-0.5).margin(0.4 * kH));
     CHECK_THROWS_AS(ball({-4, 0, 0}, 1).intersected(ball({4, 0, 0}, 1)), Error);
 }

@@ -1,4 +1,4 @@
-// A level set on another lattice against OpenVDB's own interpolation.
+// Compares a level set on another lattice with OpenVDB's own interpolation.
 #include "start/other_lattice.h"
 
 #include <openvdb/tools/Interpolation.h>

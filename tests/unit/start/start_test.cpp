@@ -1,4 +1,4 @@
-// The starts of band.h that are made from a given surface.
+// Tests of the starts that are made from a given surface (band.h).
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
@@ -20,7 +20,8 @@ double sphere_distance(const Vec3& x) {
     return std::hypot(x[0] - kCenter[0], x[1] - kCenter[1], x[2] - kCenter[2]) - kRadius;
 }
 
-/// Largest difference from the clamped distance; voxels must be active exactly if it is below the clamp.
+/// The maximum difference from the distance, clamped to three voxels. Checks that voxels are active exactly if their
+/// value is below this clamp.
 double worst_error(const FloatGrid& grid, const Domain& domain, const std::function<double(const Vec3&)>& distance) {
     const double clamp = 3 * domain.voxel_size;
     double worst = 0;
@@ -91,7 +92,7 @@ TEST_CASE("a mesh's start is the distance to it") {
 TEST_CASE("another grid's surface is taken over on a finer lattice") {
     Domain coarse = make_domain({{-11, -12, -13}, {11, 12, 13}}, 0.8);
     const FloatGridPtr grid = start_from_grid(kDomain, *start_from_sphere(coarse, kCenter, kRadius));
-    CHECK(worst_error(*grid, kDomain, sphere_distance) < 0.12);  // error of the coarse grid's linear interpolation
+    CHECK(worst_error(*grid, kDomain, sphere_distance) < 0.12);  // the error of the coarse grid's linear interpolation
 }
 
 TEST_CASE("redistancing keeps a plane exact, whatever the slope of the field") {
@@ -104,7 +105,7 @@ TEST_CASE("redistancing keeps a plane exact, whatever the slope of the field") {
                 steep->tree().setValue({i, j, k}, float(7.0 * distance(world_of(kDomain, {i, j, k}))));
     const FloatGridPtr grid = start_from_grid(kDomain, *steep);
     double worst = 0;
-    // The plane ends near the domain's end.
+    // Voxels near the domain's end are left out, because the plane ends there.
     for (int i = kDomain.min[0] + 6; i <= kDomain.max[0] - 6; ++i)
         for (int j = kDomain.min[1] + 6; j <= kDomain.max[1] - 6; ++j)
             for (int k = kDomain.min[2] + 6; k <= kDomain.max[2] - 6; ++k) {

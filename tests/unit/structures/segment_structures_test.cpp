@@ -16,7 +16,7 @@ namespace {
 constexpr int kSize = 40;
 constexpr double kRadius = 8;
 
-/// Two balls that overlap by 6 voxels, symmetric about the plane x = 20 shifted by `shift`.
+/// The centres of two balls of radius kRadius, which overlap by 6 voxels and are symmetric about the plane x = 20.
 const Vec3 kLeft{15, 20, 20}, kRight{25, 20, 20};
 
 double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }

@@ -92,7 +92,7 @@ TEST_CASE("What is known is made again when nothing else is left to do, and with
     solver.confirm(ball(2, 24), 5);
     solver.confirm(ball(3, 23), 5);
     solver.solve(ball(4, 22), 6);
-    solver.solve(ball(3, 22), 7);  // no longer known
+    solver.solve(ball(3, 22), 7);  // replaces the confirmed state of structure 3
     solver.wait();
     CHECK(listener.of(1, Stage::First).empty());
     REQUIRE(listener.of(1, Stage::Refined).size() == 1);

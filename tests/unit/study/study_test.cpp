@@ -48,7 +48,8 @@ bool is_same(const StudyState& a, const StudyState& b) {
 /// A random action, sensible or not.
 StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
     const auto below = [&](std::size_t n) { return std::size_t(rng() % n); };
-    const auto place = [&] { return Vec3{double(below(20)), double(below(20)), double(below(22))}; };  // some outside
+    // Some of the positions lie outside of the image.
+    const auto place = [&] { return Vec3{double(below(20)), double(below(20)), double(below(22))}; };
     StudyId structure = 1 + StudyId(below(5)), to = structure, mark = 1;
     if (!history.state().empty() && below(10) > 0) {
         const StudyStructure& s = *history.state()[below(history.state().size())];
@@ -145,7 +146,7 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     CHECK(states.size() > 100);
     StudyHistory again(image_of());
     for (const StudyAction& action : carried_out)
-        again.apply(parse_study_action(to_json({"", action})).action);  // by way of its text in the journal
+        again.apply(parse_study_action(to_json({"", action})).action);  // written as text and parsed, as in the journal
     CHECK(is_same(again.state(), history.state()));
     CHECK(again.options() == history.options());
 }
@@ -244,7 +245,7 @@ TEST_CASE("Marks of a file are one action, of every kind and with its lines") {
     (void)history.apply(act::AddStructure{"one", {}});
     const StudyOutline line{0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 6, 4}}};
     const act::AddMarks marks{1, MarkKind::Surface, {{1, 2, 3}}, {{4, 5, 6}}, {{7, 8, 9}, {1, 1, 1}}, {line}};
-    // By way of its line in the journal.
+    // The action is written as its line in the journal, and parsed from it.
     const KeyedAction again = parse_study_action(to_json({"k", marks}));
     (void)history.apply(again.action);
     const StudyStructure& one = *history.state().front();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Values clamp(f, -3h, 3h) in every voxel of [-n, n]^3, in leaves; elsewhere the background, with signed tiles.
+/// A grid with the values clamp(f, -3h, 3h) in all voxels of [-n, n]^3, in leaves; elsewhere it has the background 3h.
 FloatGridPtr dense_grid(int n, double h, const Vec3& origin, const std::function<double(const Vec3&)>& f) {
     Domain domain;
     domain.voxel_size = h;
@@ -100,7 +100,8 @@ TEST_CASE("inside is 6-connected: voxels that touch in an edge or a corner stay 
     CHECK(measure(mesh).components == 3);
 }
 
-TEST_CASE("a sphere has its volume, area and genus, and its vertices lie on it") {  // chords cut off O((h/r)^2)
+// The edges of triangles are chords, which cut off a fraction of O((h/r)^2) of the volume.
+TEST_CASE("a sphere has its volume, area and genus, and its vertices lie on it") {
     const double r = 1.0, h = 0.1;
     const Vec3 centre{5.03, -2.01, 0.02};
     const auto grid = dense_grid(14, h, {5, -2, 0}, [&](const Vec3& p) {
@@ -189,7 +190,7 @@ TEST_CASE("grids that have no closed surface are refused, an empty one gives an 
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface")).empty());
     CHECK_THROWS_AS(extract_mesh(*make_grid({}, -1.0F, "surface")), Error);
     ExtractOptions options;
-    options.min_component_volume = 0.5;  // no component was there to be too small
+    options.min_component_volume = 0.5;  // there is no component that could be too small
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface"), options).empty());
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     grid->tree().setValue({0, 0, 0}, -1.0F);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kVoxel = 0.05;
 constexpr double kSmall = 0.12;  // radius of the small balls: thinner than the band
-const Vec3 kBeside{1.1, 0, 0};   // the bands of both balls meet
+const Vec3 kBeside{1.1, 0, 0};   // the bands of the large ball and a small ball here meet
 const Vec3 kFar{1.6, 0, 0};      // the bands do not meet
 const Vec3 kCavity{0, 0.3, 0};
 

@@ -13,7 +13,7 @@ using namespace covol;
 
 namespace {
 
-/// Rotated about two axes, with pixels that are not square.
+/// A lattice that is rotated about two axes and has pixels that are not square.
 ImageGeometry turned_lattice() {
     ImageGeometry g;
     g.size = {50, 44, 20};

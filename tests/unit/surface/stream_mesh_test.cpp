@@ -15,7 +15,7 @@ using namespace covol;
 
 namespace {
 
-/// The streamed file and the measures are the same as with write_mesh() and extract_mesh().
+/// Checks that the streamed file and the measures equal those of write_mesh() and extract_mesh().
 void check_same(const FloatGrid& surface, double isovalue, const WriteMeshOptions& options = {}) {
     const Scratch scratch;
     const TriangleMesh mesh = extract_mesh(surface, {isovalue});
@@ -90,7 +90,7 @@ TEST_CASE("a mesh in pieces of a solid that the image's faces cut") {
 }
 
 TEST_CASE("meshes of many layers of leaves go in more than one piece") {
-    // 8192 leaves are processed as one piece.
+    // 8192 leaves are processed as one piece, so that this sphere takes several pieces.
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(150.F, {0.3F, -0.4F, 0.1F}, 1.F);
     REQUIRE(grid->tree().leafCount() > 9000);
     check_same(*grid, 0);

@@ -1,4 +1,4 @@
-// The surface step: distances to the zero level set, fog, label images.
+// Tests of the surface step: distances to the zero level set, fog, label images.
 #include "covol/surface.h"
 
 #include <openvdb/openvdb.h>
@@ -30,7 +30,7 @@ FloatGridPtr field(const Domain& domain, const std::function<double(const Vec3&)
     return u;
 }
 
-/// Waves of about six voxels: sheets, necks and separate pieces.
+/// A field of waves of about six voxels. Its zero level set has sheets, necks and separate pieces.
 FloatGridPtr waves(const Domain& domain, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> phase(0, 6.28);
@@ -96,7 +96,7 @@ TEST_CASE("a plane's surface is its distance, whatever the slope of u") {
     CHECK(grid->background() == float(kHalfWidth));
     CHECK(domain_of(*grid) == kDomain);
     openvdb::CoordBBox inner = box_of(kDomain);
-    inner.expand(-8);  // the solid is closed at the domain's end
+    inner.expand(-8);  // the domain's end is left out, because the solid is closed there
     double worst = 0;
     for (auto at = inner.begin(); at; ++at) {
         const double exact = std::clamp(distance(world_of(kDomain, *at)), -kHalfWidth, kHalfWidth);
@@ -180,7 +180,7 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
             const detail::PatchHit hit = detail::nearest_on(fan, arm);
             REQUIRE(std::sqrt(hit.squared) == Approx(std::sqrt(exact)).margin(1e-4));
             const bool above = std::sqrt(exact) < 2.99 && hit.is_interior;
-            if (above) {  // within the patch, and therefore in the cylinder
+            if (above) {  // within the patch, and therefore in the patch's cylinder
                 ++reached;
                 REQUIRE(patch[std::size_t(p)] == 7);
             }

@@ -20,7 +20,7 @@ FloatGridPtr tube(const std::vector<Vec3>& points, const Domain& domain, double 
     return compute_distance(points, domain, {radius}).grid;
 }
 
-/// Points of a sphere without those above z.
+/// The points without those above z.
 std::vector<Vec3> without_cap(std::vector<Vec3> points, double z) {
     points.erase(std::remove_if(points.begin(), points.end(), [z](const Vec3& p) { return p[2] > z; }), points.end());
     return points;
@@ -141,7 +141,7 @@ TEST_CASE("a leak is reported with the distance that holds") {
 }
 
 TEST_CASE("a solid body without a core does not leak") {
-    // D is larger than the sphere's radius: a smaller D still finds the core.
+    // D is larger than the sphere's radius, so that no core remains. A smaller D still finds the core.
     const std::vector<Vec3> points = sphere_cloud(3000, 4, 1);
     const BandResult result = tag_interior(*tube(points, kDomain, 9), {5.0, {}});
     CHECK(result.report.core_volume == 0);
@@ -215,7 +215,7 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         CHECK_FALSE(leaks_with(points, choice));
     }
     SECTION("a missing cap: its radius") {
-        // sqrt(20^2 - 16^2) = 12
+        // The radius of the hole is sqrt(20^2 - 16^2) = 12.
         const std::vector<Vec3> points = without_cap(sphere_cloud(40000, 20, 3), 16);
         const TagDistanceChoice choice = choose_tag_distance(points, kDomain, {});
         CHECK(choice.tag_distance > 10.5);

@@ -41,7 +41,8 @@ TEST_CASE("the closing of a tagged cloud touches its points and stays near the b
     const FitStatistics fit = measure_fit(points, mesh);
     CHECK(fit.max < h);
     CHECK(fit.mean < 0.5 * h);
-    // Between its contact points the ball intrudes by at most its sagitta over the gap, D - sqrt(D^2 - gap^2).
+    // Between the points that it touches, the closing ball of radius D dips inward by at most its sagitta, D - sqrt(D^2
+    // - gap^2), where gap is half of the distance between these points.
     const double gap = 0.5 * 3.545 / std::sqrt(120.0) * std::sqrt(2.0), dip = D - std::sqrt(D * D - gap * gap);
     for (const auto& v : mesh.vertices) {
         const double r = std::hypot(v[0], v[1], v[2]);

@@ -105,7 +105,8 @@ std::vector<Vec3> points_on_balls(const std::vector<std::array<double, 4>>& ball
 }  // namespace
 
 TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with runs between leaves and without") {
-    // The second ball is cut by the domain's end; the radius leaves a large part beyond the tube, or nothing.
+    // The domain's end cuts the second ball. Depending on `radius`, a large part of the balls lies beyond the tube, or
+    // nothing.
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
     const double radius = GENERATE(6.0, 9.5, 40.0);
     const bool has_seed = GENERATE(false, true);
@@ -136,15 +137,16 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
         };
         const auto above = Flooded(*d, radius, core.saddle, seed_voxel).enclosed();
         CHECK(std::any_of(above.begin(), above.end(), is_it));
-        // Slightly below the saddle it has an opening: no enclosed component contains that peak. Components beyond the
-        // tube have no peak of their own.
+        // Slightly below its saddle the core has an opening: no enclosed component contains its peak. Components beyond
+        // the tube have no peak of their own and are not tested.
         if (core.peak == radius) continue;
         const auto below = Flooded(*d, radius, std::nextafter(float(core.saddle), 0.0F), seed_voxel).enclosed();
         CHECK(std::none_of(below.begin(), below.end(), [&](const Flooded::Component& c) {
             return double(c.voxels) >= core.volume && std::abs(c.peak - core.peak) < 1e-6;
         }));
     }
-    // At the level at which the largest core opens, no larger one is enclosed, unless a seed opened it.
+    // At the level at which the largest core opens, no larger component is enclosed, unless a seed opened that
+    // component.
     if (has_seed) return;
     for (const auto& c : Flooded(*d, radius, cores.front().saddle, seed_voxel).enclosed())
         CHECK(double(c.voxels) <= main);

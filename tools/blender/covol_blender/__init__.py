@@ -18,11 +18,12 @@ bl_info = {
     "description": "Surfaces in 3D images and of point clouds from a few marks",
     "category": "Import-Export",
 }
-ROLE = "covol_role"  # role of an object below the space: "surface" or "volume"
-MESHES = "covol_meshes"  # names of a surface's meshes, one for each frame
-START = "covol_start"    # frame of Blender that shows the first of them
+# Custom properties of objects:
+ROLE = "covol_role"  # role of a child of the space: "surface" or "volume"
+MESHES = "covol_meshes"  # names of a surface's meshes, one for each frame of a time-lapse
+START = "covol_start"    # frame of Blender that shows the first of these meshes
 FIGURES = ("volume", "area", "genus")
-TICK = 0.1           # seconds between two checks of a run
+TICK = 0.1           # seconds between two checks whether the running program has sent events
 
 
 def is_marks(_, candidate):
@@ -115,7 +116,7 @@ def meshes_of(surface, count):
     kept = [mesh for mesh in (bpy.data.meshes.get(name) for name in surface.get(MESHES, "").splitlines()) if mesh is not None] or [shown]
     made = kept[:count] + [shown.copy() for _ in range(count - len(kept))]
     for mesh in made:
-        mesh.use_fake_user = count > 1  # meshes of other frames are saved, too
+        mesh.use_fake_user = count > 1  # Blender then also saves the meshes of frames that are not visible
         if mesh is not shown:
             mesh.materials.clear()
             for material in shown.materials:
@@ -156,12 +157,12 @@ def show(context, space, run, found):
     before = volume.get("covol_files", "").splitlines()
     data, first = volume.data, run.at(run.vdb, next(n for n, each in enumerate(found) if each is not None))
     data.filepath, data.is_sequence = str(first), run.is_lapse
-    if run.is_lapse:  # files are numbered from 0, Blender's frames of a sequence from 1
+    if run.is_lapse:  # the files are numbered from 0, but Blender numbers the frames of a sequence from 1
         data.frame_start, data.frame_duration, data.frame_offset, data.sequence_mode = start, len(found), -1, "EXTEND"
     if not data.grids.load():
         raise _process.Failed(4, f"{first}: {data.grids.error_message}")
     volume["covol_files"] = "\n".join(map(str, run.files()))
-    for path in before:  # files of the last result, which are not used any more
+    for path in before:  # files of the previous result, to which no object refers any more
         if os.path.exists(path):
             os.remove(path)
     show_frame(context.scene)

@@ -11,7 +11,7 @@ import numpy as np
 from . import _files, _process
 
 
-FRAME = "_{frame:04}"  # in file names of a time-lapse: a pattern of the program, and of Python's format()
+FRAME = "_{frame:04}"  # pattern for the number of the frame in file names, for the program covol and for Python's format()
 
 
 class Job:

@@ -42,7 +42,9 @@ bool parse_whole(const std::string& text, Number& value) {
     return error == std::errc() && end == text.data() + text.size();
 }
 
-/// Reads the job from a plan. Plans may come from untrusted sources: only settings and inputs are accepted.
+/// Reads the job from a plan, which may come from an untrusted source: a job with an output option, which could
+/// overwrite any file, is refused.
+/// @param command  is set to the job's command, segment or reconstruct
 JobOptions job_of_plan(const std::string& folder, const CLI::App& program, const CLI::App*& command) {
     const std::string path = plan_file(folder);
     const Json plan = read_plan_file(folder);
@@ -104,7 +106,7 @@ BrickCall join_call(Words& words, const CLI::App& program) {
     if (output.empty()) throw UsageError("brick join: expected -o OUT.vdb");
     const CLI::App* command = nullptr;
     JobOptions job = job_of_plan(call.folder, program, command);
-    // Options of the current command line replace those of the plan.
+    // An option of the current command line replaces the same option of the plan.
     for (const std::string& word : words) {
         const CLI::Option* option = is_option(word) ? command->get_option_no_throw(name_of(word)) : nullptr;
         if (option == nullptr) continue;

@@ -15,7 +15,7 @@ struct BrickCall {
     enum class Step { Plan, Run, Join } step = Step::Plan;
     std::string folder;
     std::vector<std::size_t> bricks;  ///< bricks to solve, for run; empty: all
-    int sweep = 0;                    ///< number of the sweep, for run; 0: the first for given bricks, otherwise all
+    int sweep = 0;                    ///< number of the sweep, for run; 0: sweep 1 if bricks are given, else all sweeps
 };
 
 /// Removes the arguments of `brick` from `words`, the arguments after the program's name. The remaining ones are the

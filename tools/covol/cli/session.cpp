@@ -42,7 +42,7 @@ std::vector<std::string> words_of_help(std::vector<std::string> words, const CLI
 }
 
 constexpr int kReportSchema = 1;   // is incremented when a field of the report is removed or changes its meaning
-constexpr int kMaxThreads = 1024;  // TBB cannot allocate the stacks of far more threads
+constexpr int kMaxThreads = 1024;  // maximum of --threads; TBB cannot allocate the stacks of far more
 
 }  // namespace
 
@@ -115,7 +115,7 @@ int Session::run_command_line(int argc, char** argv) {
     catch_file_signals();
     keep_standard_streams();
     if (const std::string few = too_few_files(); !few.empty()) return fail(exit_code_of(Errc::Io), few);
-    // The arguments after `plan` and `brick` are a complete command line, with the options of its command.
+    // `plan` and `brick plan` precede a complete command line of segment or reconstruct, which remains in `words`.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
     for (const std::string& word : words) command_line_ += " " + shell_quoted(word);
@@ -172,7 +172,8 @@ int Session::execute() {
             ScratchFolder::remove_all();
             ::_exit(code);
         });
-        const ThreadCount threads = limit_threads(threads_);  // after the guard has created its thread
+        // Called after the guard has created its thread, so that this thread is not counted as available for TBB.
+        const ThreadCount threads = limit_threads(threads_);
         provenance_.emplace(*command_, inputs_of(*command_), report_);
         outputs_.protect(provenance_->inputs());
         outputs_.protect(app_.get_config_ptr()->results());
@@ -221,7 +222,7 @@ void Session::finish() {
         });
     outputs_.write_queued();
     add_seconds("write", watch.seconds());
-    report_["seconds"].erase("total");  // moved to the end, and measured over the whole run
+    report_["seconds"].erase("total");  // added again as the last entry, for the whole run
     add_seconds("total", since_start_.seconds());
     report_["peak_rss_bytes"] = peak_rss();
     write_report();
@@ -284,7 +285,7 @@ void Session::print(const std::string& line) {
 
 void Session::warn(const std::string& message) {
     const std::string line = outputs_.shown(with_flags(message));
-    // The same warning is printed once only: a file may be opened several times.
+    // The same warning is printed only once. A file that is opened several times causes its warnings each time.
     for (const Json& warning : report_["warnings"])
         if (warning == line) return;
     progress_->line("covol: warning: " + one_line(line));

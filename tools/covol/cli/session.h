@@ -86,14 +86,15 @@ public:
     void keep_states(std::shared_ptr<Checkpoints> checkpoints) { run_.checkpoints = std::move(checkpoints); }
     /// The subcommand with that name; null if there is none.
     [[nodiscard]] const CLI::App* command(const std::string& name) const;
-    /// To be called before memory is allocated. @throws Error InvalidOptions if `what` needs `bytes`, and they exceed
-    /// --memory-limit or, without it, the usable fraction of the free memory.
+    /// To be called before memory is allocated. @param what  names in the message what needs the memory
+    /// @throws Error InvalidOptions if `bytes` exceed --memory-limit or, if it is not given, the bound that
+    /// choose_memory_bound() derives from the free memory.
     void require_memory(double bytes, const std::string& what) const;
     /// Adds a duration to seconds.<name> of the report. The report also has seconds.total for the whole run.
     void add_seconds(const std::string& name, double seconds);
     /// Whether the command was preceded by `covol plan`: then its cost is estimated, and no output is written.
     [[nodiscard]] bool is_planning() const noexcept { return planning_; }
-    /// The arguments of `covol brick` if the command was preceded by it, otherwise nullopt.
+    /// The step and arguments of `covol brick plan`, `run` or `join`; nullopt for other commands.
     [[nodiscard]] const std::optional<BrickCall>& brick() const noexcept { return brick_; }
     /// --memory-limit, bytes; nullopt if it was not given.
     [[nodiscard]] std::optional<std::uint64_t> memory_limit() const;
@@ -138,7 +139,7 @@ private:
     Stopwatch since_start_;
     int exit_code_ = kDone;
     std::atomic_flag
-        is_reporting_end_;  ///< a run prints one error only: from its own thread or from the memory guard's
+        is_reporting_end_;  ///< set by the thread that prints the error that ends the run: main thread or memory guard
 };
 
 }  // namespace covol::tool

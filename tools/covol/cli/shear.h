@@ -7,8 +7,8 @@
 
 namespace covol::tool {
 
-/// Maximum deviation of the angles between an image's axes from 90 degrees, in degrees; 0 if it is within the rounding
-/// of file formats.
+/// Maximum deviation of the angles between an image's axes from 90 degrees, in degrees. It is 0 if no cosine of these
+/// angles exceeds 0.001, because the numbers in image files are rounded.
 [[nodiscard]] inline double shear_of(const ImageGeometry& geometry) {
     constexpr double kRounding = 1e-3;
     const Matrix3& d = geometry.direction;

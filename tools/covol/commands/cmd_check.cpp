@@ -17,10 +17,10 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kLargeScene = 10000;  // extent in units above which Blender's default clipping hides an object
-constexpr double kSmallScene = 0.01;   // extent in units below which the default view shows only a dot
+constexpr double kLargeScene = 10000;  // world units; Blender's default clipping hides larger objects
+constexpr double kSmallScene = 0.01;   // world units; the default view shows smaller objects as a dot
 constexpr double kFlatVoxels = 3;      // ratio of spacings above which an image is mostly interpolated along one axis
-constexpr double kFarPoint = 20;       // a point is an outlier if its nearest neighbour is farther, in medians
+constexpr double kFarPoint = 20;       // distance of an outlier from its nearest neighbour, divided by the median
 
 /// Collects what a file would cause in other programs: problems, which fail the check, and remarks, which do not.
 class Findings {
@@ -28,7 +28,7 @@ public:
     Findings(Session& session, Program program) : facts{}, session_(session), program_(program) {
         session.report()["findings"] = Json::array();
     }
-    FileFacts facts;  ///< properties of the file, for advice_for() one program
+    FileFacts facts;  ///< properties of the file, by which advice_for() chooses its advice
     [[nodiscard]] Program program() const { return program_; }
     /// Whether no program was chosen. For a chosen program, its own rules replace the remarks on programs in general.
     [[nodiscard]] bool in_general() const { return program_ == Program::Any; }
@@ -137,7 +137,7 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
 
 /// Whether ImageJ would show the voxels of an image: it shows labels as black if the file states no display range.
 bool has_display_range(const std::string& path, const FileFacts& facts, double maximum) {
-    constexpr double kLabels = 32;  // if the maximum is larger, the voxels are taken for grey values
+    constexpr double kLabels = 32;  // an image with a larger maximum contains grey values, not labels
     return facts.format != "ImageJ TIFF" || maximum > kLabels || header_holds(path, "\nmax=");
 }
 
@@ -156,7 +156,7 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool of_chunks = chunks && chunks->read < chunks->total;
-    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of mapped files, some slices are read
+    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of mapped files, only some slices
     if (of_chunks)
         findings.remark(std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
                         " chunks were read: problems of the others are found only when these are read");
@@ -178,7 +178,7 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
 void check_mesh_file(const std::string& path, const RunContext& run, Findings& findings) {
     const TriangleMesh mesh = read_mesh(path);
     const std::string unit = word_in_header(path, "covol_unit");
-    if (unit != "not") findings.facts.unit = unit;  // "not stated"
+    if (unit != "not") findings.facts.unit = unit;  // "not" is the first word of "not stated"
     check_measures(mesh, "the mesh", findings);
     // In formats that hold several meshes, each mesh is a separate solid: crossings between two of them are not
     // self-intersections.

@@ -44,7 +44,7 @@ public:
     }
 
 private:
-    /// Converts values through floats, for types whose values fit into a float.
+    /// Converts values through floats, for types whose values a float represents exactly.
     template <typename T>
     void fill_through_floats(const VoxelBox& box, T* out) const {
         const Index3 n = box.size();
@@ -67,7 +67,7 @@ struct ConvertJob {
     Length voxel_size;
     ImageFlags image;
     MeshFlags mesh;
-    PointFlags points;  ///< only its options are used
+    PointFlags points;  ///< only its options for reading files are used, not its paths
     CloudFlags cloud_flags;
     VdbFlags vdb;
 
@@ -124,7 +124,7 @@ struct ConvertJob {
         if (is_nanovdb_name(output))
             return session.outputs().add(output, [grids](const std::string& path) { write_nvdb(path, grids); });
         session.outputs().add(output, [grids, write = vdb.options](const std::string& path) {
-            write_vdb(path, grids, write);  // the grids keep the provenance in their metadata
+            write_vdb(path, grids, write);  // the metadata of the grids, with their provenance, is kept
         });
     }
 

@@ -8,7 +8,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr int kTubeVoxels = 10;  // default radius of the tube around the points
+constexpr int kTubeVoxels = 10;  // voxels; default radius of the tube around the points
 
 struct DistanceJob {
     PointFlags points;

@@ -85,7 +85,7 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
 }
 
 void describe_image(const std::string& path, const ImageFlags& flags, Session& session) {
-    constexpr int kMaxChannels = 16;  // up to this number of channels, pixels are read to find their ranges
+    constexpr int kMaxChannels = 16;  // ranges of values are computed for this many channels only
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;

@@ -39,11 +39,12 @@ std::string policy_of(const std::string& page) {
     return page.substr(begin, page.find('"', begin) - begin);
 }
 
-/// Maximum size of the decoded chunks in the cache for slices. For example, a slice through 2048 x 2048 x 2048 voxels
-/// of 8 bits in chunks of 128 needs 128 MiB if two voxels are combined into one pixel.
+/// Maximum size, in bytes, of the decoded chunks in the cache for slices. For example, an image of 2048^3 voxels of 8
+/// bits has 1024^3 voxels at the level with half the resolution. A slice of that level, in chunks of 128^3 voxels,
+/// passes through 8 x 8 chunks, or 128 MiB.
 constexpr std::uint64_t kMaxSliceBytes = std::uint64_t(512) << 20;
 
-/// Maximum size of the decoded chunks that are kept for computing surfaces; see BoundedImage.
+/// Maximum size, in bytes, of the decoded chunks that are kept for computing surfaces; see BoundedImage.
 constexpr std::uint64_t kMaxJobBytes = std::uint64_t(768) << 20;
 
 /// Removes the slash at the end of a path: "scan.nii.gz/" becomes "scan.nii.gz".
@@ -111,7 +112,8 @@ struct MarkJob {
         options.frame_origins = frame_origins;
         options.page_policy = policy_of(view.page);
         options.max_body_bytes = kMaxFileBytes;
-        // A page that reconnects sends its pending actions without pauses. Storing one takes at most a millisecond.
+        // A page that reconnects sends its pending actions without pauses, and must not exceed these limits by this. It
+        // takes at most a millisecond to store an action.
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
@@ -123,7 +125,8 @@ struct MarkJob {
         auto seen =
             std::make_unique<PageImage>(levels, view.title, is_anatomical(image_path, image.options, session.run()),
                                         channels(info, session), quiet(session.run()));
-        // Declared before `mark`, and so destroyed after it: its solver uses the server until its thread has ended.
+        // Declared before `mark`, and so destroyed after it: the solver of `mark` uses the server until the solver's
+        // thread has ended.
         std::unique_ptr<serve::WebServer> server;
         MarkSession mark(
             std::move(opened), std::move(seen), [&] { return for_jobs.get(); }, std::move(view), session.run());
@@ -153,12 +156,13 @@ struct MarkJob {
         if (!link || !link->open()) std::cout << "open " << server->url() << std::endl;
         session.note("the study is " + folder + "; every action is saved immediately. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        server->stop();  // the interrupt has cancelled its requests
+        server->stop();  // before the flag is cleared, which cancels requests in progress
         accept_interrupt();
     }
 
 private:
-    /// The channels of the image. Channels other than the marked one are read when a page requests them.
+    /// The channels of the image; empty for an image with one channel. Channels other than the one in which marks are
+    /// set are read when a page requests them.
     [[nodiscard]] PageChannels channels(const ImageInfo& info, Session& session) const {
         PageChannels all;
         if (info.channels < 2) return all;
@@ -178,7 +182,8 @@ private:
         return all;
     }
 
-    /// Identifies the file, the options it is read with, and the program version that computes surfaces.
+    /// A text that changes with the content of the image file, with the options with which it is read, and with the
+    /// version of covol.
     [[nodiscard]] std::string identity_of_image() const {
         const ReadImageOptions& how = image.options;
         std::string identity = digest_of(image_path) + " " + version() + " channel " +

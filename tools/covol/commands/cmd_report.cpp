@@ -17,7 +17,8 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kReachVoxels = 2 * kHalfWidthVoxels;  // reach of marks as evidence: their automatic attraction range
+// [voxels] Distance up to which a mark supports the surface, as large as the automatic attraction range of a run.
+constexpr double kReachVoxels = 2 * kHalfWidthVoxels;
 
 /// One level set of the file, and the marks and evidence that it is compared with.
 struct Shown {

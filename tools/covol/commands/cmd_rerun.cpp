@@ -51,8 +51,8 @@ Words values_of(const std::string& path, const std::string& name, const Json& va
     return words;
 }
 
-/// Whether it is a file name without a folder. Names that look like options are accepted, because in the command line a
-/// name always follows a folder or `--name=`.
+/// Whether `name` is a file name without a folder. Names that look like options are accepted, because in the command
+/// line a name always follows a folder or `--name=`.
 bool is_file_name(const std::string& name) {
     return !name.empty() && name != "." && name != ".." &&
            name.find_first_of(std::string("/\0", 2)) == std::string::npos;
@@ -101,7 +101,8 @@ public:
         for (const auto& [name, digest] : run.inputs) found_.emplace_back(name, find(name, digest));
     }
 
-    /// The value of an option, with the current path instead of the file name. @throws Error if the file is no input
+    /// The value of an option, with the current path of the input instead of its file name.
+    /// @throws Error if the value names a file that is not an input of the run
     [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
         if (value == "-") refuse(source_, "an input of that run came through a pipe");
         const std::size_t begin = path_within(value).first;
@@ -125,7 +126,8 @@ public:
     }
 
 private:
-    /// Whether the text after a file name is empty, or the name of a grid, the path of a dataset, or a slash.
+    /// Whether `rest`, the text after a file name, is empty, a slash, or a colon with the name of a grid or the path of
+    /// a dataset.
     static bool is_within_file(const std::string& rest) {
         return rest.empty() || rest == "/" || (rest.front() == ':' && rest.find("..") == std::string::npos);
     }
@@ -293,7 +295,7 @@ private:
         if (session.run().threads > 0) words.push_back("--threads=" + std::to_string(session.run().threads));
         if (const auto limit = session.memory_limit()) {
             words.push_back("--memory-limit=" + std::to_string(*limit));
-            // the run must not switch to bricks, because the result would not be bitwise identical
+            // The repeated run must not be divided into bricks, because its result would not be bitwise identical.
             const bool given = std::any_of(job.values.begin(), job.values.end(),
                                            [](const auto& option) { return option.first == "brick-voxels"; });
             if (!given && command.get_option_no_throw("--brick-voxels") != nullptr)

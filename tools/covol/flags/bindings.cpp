@@ -90,7 +90,7 @@ ImageGeometry ImageFlags::read_geometry(const std::string& path, const RunContex
 }
 
 WorldBox sampled_box(const WorldBox& box, double h) {
-    constexpr double kReach = 9;  // up to 7 voxels to complete a leaf, 1 for rounding the box to voxels, and 1 more
+    constexpr double kReach = 9;  // voxels: up to 7 to complete a leaf, 1 for rounding the box to voxels, 1 as a margin
     WorldBox grown = box;
     for (int a = 0; a < 3; ++a) {
         grown.min[a] -= kReach * h;
@@ -112,7 +112,7 @@ CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
 
 namespace {
 
-/// The content of standard input, which is read by the first call. Waits for the writing program; can be cancelled.
+/// The whole content of standard input, which the first call reads. Waits for the writing program unless cancelled.
 const std::string& standard_input(const RunContext& run) {
     static std::string text;
     static bool done = false;
@@ -120,7 +120,7 @@ const std::string& standard_input(const RunContext& run) {
     while (!done) {
         pollfd ready{STDIN_FILENO, POLLIN, 0};
         constexpr int kPause = 50;                          // milliseconds
-        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal arrived
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // no data yet, or a signal arrived
         run.check();
         if (waits) continue;
         const ssize_t got = ::read(STDIN_FILENO, piece.data(), piece.size());

@@ -30,10 +30,11 @@ template <typename Number>
     return text.str();
 }
 
-/// Whether this kind of job offers the option; SingleStep offers all options.
+/// Whether this kind of job offers the option; a command for a single step offers all options of the step.
 [[nodiscard]] bool is_offered(const OptionInfo& option, Offered job);
 
-// Adds an option of each kind. Values out of range throw an Error when they are parsed.
+// Each of these functions adds an option for one type of values, and calls `take` with each value that is parsed.
+// Values out of range throw an Error when they are parsed.
 CLI::Option* add_length(CLI::App& command, const OptionInfo& option, const std::function<void(const Length&)>& take);
 CLI::Option* add_vec3(CLI::App& command, const OptionInfo& option, const std::function<void(const Vec3&)>& take);
 CLI::Option* add_box(CLI::App& command, const OptionInfo& option, const std::function<void(const WorldBox&)>& take);
@@ -99,7 +100,8 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
         in_group(command, option.place.group);
         CLI::Option* made = add_option(command, option, value, given);
         if (made == nullptr) return;
-        // The help shows the text in brackets as the default. It is not set as such, because reports would contain it.
+        // help_of() shows the text in brackets as the default. It is not set by default_str(), because reports would
+        // then contain it as a value.
         const bool is_automatic = *option.automatic != 0;
         made->description(with_flags(option.text) +
                           (is_automatic ? " [" + with_flags(option.automatic) + "]" : std::string()));
@@ -149,7 +151,7 @@ struct MeshFlags : Given<WriteMeshOptions> {
     void bind_plain(CLI::App& command);
     /// @param path  of the mesh, or empty. @throws UsageError with --plain if the format cannot be streamed.
     void check_plain(const std::string& path) const;
-    /// Whether runs that write no mesh refuse the option of this name.
+    /// Whether a run that writes no mesh refuses the option with this name (without dashes).
     [[nodiscard]] static bool needs_mesh(std::string_view option) { return option == "up" || option == "unit-scale"; }
     /// @throws UsageError if an option for which needs_mesh() is true is given, but no mesh is written.
     void check_used(bool writes) const;

@@ -6,12 +6,12 @@
 namespace covol::tool {
 namespace {
 
-// Measured: docs/benchmarks.md, Bricks.
+// Memory in bytes; measured, see docs/benchmarks.md, Bricks.
 constexpr double kBandBytes = 200;    ///< peak memory for each voxel of a band that is solved
 constexpr double kJoinBytes = 30;     ///< peak memory for each voxel of a band whose bricks are joined
 constexpr double kMeshBytes = 80;     ///< peak memory for each voxel if bricks are joined and the whole mesh is made
 constexpr double kBaseBytes = 1.5e8;  ///< memory of the program itself
-constexpr double kLayerFactor = 1.3;  ///< voxels of a brick including layers of its neighbours / without them
+constexpr double kLayerFactor = 1.3;  ///< ratio of the voxels of a brick with and without the layers of its neighbours
 constexpr double kMinVoxels = 2e5;
 
 }  // namespace

@@ -36,7 +36,7 @@ struct EvidenceFlags {
 /// All fields except the values at the vertices.
 [[nodiscard]] Json to_json(const Evidence& evidence);
 
-/// The attributes distance_to_marks and edge_strength, if they are known; empty without evidence.
+/// The vertex attributes distance_to_marks and edge_strength of a mesh, if they are known; empty without evidence.
 [[nodiscard]] std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& evidence);
 
 /// Prints the unsupported fraction of the surface, and the suggestions; each line begins with `who`.

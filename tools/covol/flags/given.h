@@ -44,8 +44,8 @@ struct Given {
             if constexpr (std::is_same_v<PlainOf<std::remove_cvref_t<decltype(value)>>, double>)
                 if (const Length found = length(option.name); found.given) {
                     const double a = found.resolve(h, 0);
-                    // A volume that exceeds the range of double is limited to its maximum; the option's validation
-                    // rejects it.
+                    // A volume must not become infinite. It is limited to the largest double, which the validation of
+                    // the option rejects.
                     value =
                         option.range.unit == Unit::Volume ? std::min(a * a * a, std::numeric_limits<double>::max()) : a;
                 }

@@ -6,7 +6,7 @@
 namespace covol::tool {
 namespace {
 
-/// Whether it is a position such as "1.5,-2,3e1", and not the name of a file.
+/// Whether `text` is a position such as "1.5,-2,3e1", and not the name of a file.
 bool is_position(const std::string& text) {
     std::error_code status;
     return text.find_first_not_of("0123456789+-.eE, ") == std::string::npos &&

@@ -49,7 +49,7 @@ const Json& three(const Json& json, const char* name) {
 }
 
 Index3 index_of(const Json& json, const char* name) {
-    constexpr std::int64_t kMaxIndex = 1 << 24;  // lattices extend to half of this
+    constexpr std::int64_t kMaxIndex = 1 << 24;  // voxels; indices of a valid lattice are at most half of this
     Index3 index{};
     for (int a = 0; a < 3; ++a)
         index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kMaxIndex, kMaxIndex);
@@ -120,7 +120,7 @@ Domain domain_of_plan(const Json& json) {
     return domain;
 }
 
-/// The size of a file; 0 for a folder, such as a Zarr store.
+/// The size of a file, bytes; 0 for a folder, such as a Zarr store.
 std::uintmax_t bytes_of(const std::string& path, std::error_code& status) {
     return fs::is_directory(path, status) ? 0 : fs::file_size(path, status);
 }
@@ -132,7 +132,7 @@ Json input_of(const std::string& path) {
     return {{"path", path}, {"bytes", bytes}};
 }
 
-/// The facts that a sweep stores about a brick.
+/// The facts about the solution of a brick in one sweep, stored in sweep-N/brick-B.json.
 struct BrickFacts {
     bool same = false;
     int steps = 0;

@@ -25,18 +25,18 @@ public:
     [[nodiscard]] BrickPlan read_plan() const;
 
     [[nodiscard]] bool is_done(int sweep, std::size_t brick) const;
-    /// The state of a brick after a sweep, or null.
+    /// The state of a brick after a sweep; null if the brick has not been solved.
     [[nodiscard]] FloatGridPtr state(int sweep, std::size_t brick) const;
     void write_state(int sweep, std::size_t brick, const FloatGridPtr& state, Json facts) const;
     /// Records that the state of the brick is the same as after the previous sweep.
     void write_same(int sweep, std::size_t brick, Json facts) const;
     /// Whether a completed sweep changed the brick's state.
     [[nodiscard]] bool moved(int sweep, std::size_t brick) const { return sweep_of_state(sweep, brick) == sweep; }
-    /// The cost of all sweeps up to a given one.
+    /// The cost of all sweeps from the first to a given one.
     struct Spent {
-        int steps = 0;  ///< maximum over bricks
+        int steps = 0;  ///< steps of the brick with the maximum number of steps
         double seconds = 0;
-        std::size_t unsteady = 0;  ///< bricks whose flow was not steady at its last step
+        std::size_t unsteady = 0;  ///< number of bricks whose last flow ended at the maximum number of steps
     };
     [[nodiscard]] Spent spent(int sweep, std::size_t bricks) const;
     /// The number of the last sweep that is done for all bricks; 0: none.

@@ -17,7 +17,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kSmallJob = 64;  // edge length in voxels: smaller jobs are never split
+constexpr double kSmallJob = 64;  // voxels; a job is not split if the longest side of its box is shorter
 
 std::unique_ptr<BrickJob> make_job(const std::optional<Image>& image, const StructureInput& structure,
                                    const RunContext& run) {
@@ -80,7 +80,7 @@ private:
             }
         }
         const SolvedBrick solved = job_.solve(plan_, brick, states);
-        run_.check();  // a cancelled solve has no valid state
+        run_.check();  // throws if cancelled: the state would be invalid
         facts.update({{"steps", solved.steps},
                       {"stop_reason", to_string(solved.stop_reason)},
                       {"active_voxels", solved.active_voxels},
@@ -112,8 +112,9 @@ RunContext quiet(const RunContext& run) {
     return inner;
 }
 
-/// Larger gaps between the surfaces of neighbouring bricks cause a warning. At gaps, the bricks are averaged.
-constexpr double kWarnOfGap = 0.5;  // voxels
+/// [voxels] A warning is printed if the surfaces of neighbouring bricks are farther apart than this. If they are
+/// closer, their mean is used without a warning.
+constexpr double kWarnOfGap = 0.5;
 
 void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
     double gap = 0;
@@ -136,7 +137,8 @@ std::string about_voxels(std::int64_t count) {
     return "about " + (count < kThousand ? std::to_string(count) : rounded(kThousand) + "000") + " voxels";
 }
 
-/// Whether the mesh has to be streamed, because of --plain or to save memory.
+/// Whether the mesh is streamed, that is, written triangle by triangle without being held in memory, because of --plain
+/// or because there is not enough memory for the whole mesh.
 /// @throws Error if the memory does not suffice even then, or if the mesh would have to be streamed but cannot be
 bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
@@ -189,7 +191,7 @@ void print_plan(const BrickPlan& plan, Session& session) {
                   ", the largest brick " + about_voxels(largest) + ", which takes about " + bytes_text(memory));
 }
 
-/// Names of the given outputs except -o. Planning does not write them.
+/// Names of the outputs that were given, except -o; empty if there are none. `covol brick plan` does not write them.
 std::string outputs_of_join(const Session& session) {
     std::string names;
     for (const std::string& name : session.given())
@@ -262,7 +264,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         plan = solver->plan(job.bricks.resolve(limit));
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return in_one();  // throws the error again if the job is invalid
+        return in_one();  // if the job itself is invalid, the error occurs again
     }
     if (memory_of_band(double(plan.active_voxels())) < double(*limit)) {
         solver.reset();
@@ -273,7 +275,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         throw Error(Errc::InvalidOptions,
                     "--checkpoint: the band is larger than --memory-limit allows at once, and bricks store their own "
                     "states: see covol brick");
-    (void)streams_mesh(job, plan, session);  // throws now rather than after the computation
+    (void)streams_mesh(job, plan, session);  // throws now if the bricks could not be joined later
     run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
     const ScratchFolder scratch(std::filesystem::path(job.any_output()).parent_path());

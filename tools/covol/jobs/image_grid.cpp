@@ -38,7 +38,7 @@ double bytes_of_grid(const ImageGeometry& geometry, double h) {
     const Domain domain = make_domain(geometry.world_box(), h);
     double leaves = 1;
     for (int a = 0; a < 3; ++a) leaves *= (domain.max[a] >> 3) - (domain.min[a] >> 3) + 1.0;
-    // 128 bytes for each leaf in the list of leaves and in the upper nodes of the tree.
+    // Besides its values, each leaf needs about 128 bytes: in the list of leaves and in the upper nodes of the tree.
     constexpr double kBytesOfLeaf = kLeaf * kLeaf * kLeaf * sizeof(float) + 128;
     return leaves * kBytesOfLeaf;
 }

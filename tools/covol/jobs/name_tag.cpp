@@ -54,7 +54,7 @@ struct SplitPath {
 };
 
 SplitPath split_ending(std::string path) {
-    while (path.size() > 1 && path.back() == '/') path.pop_back();  // slashes that a shell appends to folders
+    while (path.size() > 1 && path.back() == '/') path.pop_back();  // slashes from completion by a shell
     const std::size_t end = path.size() - long_ending(path).size();
     return {path.substr(0, end), path.substr(end)};
 }

@@ -11,7 +11,7 @@
 namespace covol::tool {
 namespace {
 
-/// Adds the changes of each step to the facts of the page; reports do not contain them.
+/// Adds the mean displacement of the surface in each step, voxels, to the facts of the page. JSON reports omit them.
 void add_changes(const SegmentReport& report, Json& facts) {
     if (!report.solve.changes.empty()) facts["solve"]["changes"] = report.solve.changes;
 }
@@ -59,7 +59,7 @@ void write_page(const std::string& path, const ReportPage& page, Session& sessio
 void write_page(const std::string& path, const StructuresOutput& output, ReportPage page, Session& session) {
     Json facts = page_facts(session);
     facts.update(to_json(output), true);
-    std::vector<Evidence> distances(output.structures.size());  // for clouds without an image
+    std::vector<Evidence> distances(output.structures.size());  // shown if there is no image
     for (std::size_t n = 0; n < output.structures.size(); ++n) {
         const StructureOutput& s = output.structures[n];
         PageStructure shown;

@@ -19,21 +19,21 @@
 namespace covol::tool {
 namespace {
 
-// Measured: docs/benchmarks.md, Plans.
+// Measured, see docs/benchmarks.md, Plans. Memory in bytes.
 constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, including mesh and files
 constexpr double kTubeBytes = 12;        ///< memory for each voxel of the tube in which the distance is stored
 constexpr double kBaseBytes = 6.5e7;     ///< memory of the program itself
 constexpr double kGuessBandBytes = 335;  ///< instead of kBandBytes if a guess is fitted to the image
-constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud, and in total
-constexpr double kFlowTime = 1.3;                                ///< time of a flow with an image / without one
-constexpr double kGuessTime = 2.8;    ///< the same for a guess; includes estimating the appearance at the marks
-constexpr double kPilotVoxels = 128;  ///< along the longest side of the marks' box, on the finer of the two lattices
-constexpr double kReachVoxels = 12;   ///< distance from the surface within which the image is sampled
-constexpr double kGuessVoxels = 25;   ///< the same for a guess; this part of the image is smoothed
-constexpr double kGuessBytes = 8;     ///< memory for each voxel of that part, for two copies
+constexpr double kCloudPointBytes = 4000, kMaxCloudBytes = 1e8;  ///< for each point of a cloud; maximum for a cloud
+constexpr double kFlowTime = 1.3;                                ///< time of a flow with an image / without an image
+constexpr double kGuessTime = 2.8;    ///< the same ratio for a guess; includes estimating the appearance
+constexpr double kPilotVoxels = 128;  ///< maximum along the longest side of the marks' box, on the finer coarse lattice
+constexpr double kReachVoxels = 12;   ///< voxels; a flow samples the image within this distance of the surface
+constexpr double kGuessVoxels = 25;   ///< voxels; a guess smooths the image within this distance of the surface's box
+constexpr double kGuessBytes = 8;     ///< memory for each smoothed voxel of the image, for two copies
 constexpr std::int64_t kMappedBytes = 1 << 16;  ///< pages of a mapped file that the system loads at once
 
-/// Result of a run with the marks alone on a coarse lattice.
+/// Result of a run on a coarse lattice with the marks alone, without the image.
 struct Pilot {
     double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
     bool is_guess = false, is_cloud = false;
@@ -45,7 +45,7 @@ struct StructurePlan {
     double active_voxels = 0, tube_voxels = 0, seconds = 0;
     double bytes_while_solved = 0;   ///< in addition to kBandBytes for each voxel of the band
     double smoothed_voxels = 0;      ///< voxels of the image that are smoothed
-    std::set<std::uint64_t> blocks;  ///< blocks of the image that are read
+    std::set<std::uint64_t> blocks;  ///< numbers of the blocks of the image that are read
 };
 
 Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<ImageGeometry>& geometry, double h,
@@ -60,7 +60,7 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     Stopwatch watch;
     SegmentResult result = reconstruct(input.points, options, quiet);
     Start start = result.report.resolved.start;
-    if (geometry && is_any<CloudStart>(start)) {  // this start is possible for points without an image only
+    if (geometry && is_any<CloudStart>(start)) {  // the job with the image cannot use this start
         options.start = start = TagStart{};
         watch = {};
         result = reconstruct(input.points, options, quiet);
@@ -116,7 +116,8 @@ private:
     Index3 block_, counts_{};
 };
 
-/// Calls visit(low, high) with the range of image indices within `reach` of each position on the surface.
+/// Calls visit(low, high) for each position on the surface, with the image indices of a box of half width `reach`
+/// (world units) around it.
 template <typename Visit>
 void for_each_place(const FloatGrid& surface, const ImageGeometry& g, double reach, const Visit& visit) {
     const double h = surface.voxelSize()[0];
@@ -133,7 +134,7 @@ void for_each_place(const FloatGrid& surface, const ImageGeometry& g, double rea
     }
 }
 
-/// Adds what a flow reads: the part of the image within `reach` of the surface.
+/// Adds the blocks of the image that a flow reads: those within `reach` (world units) of the surface.
 void plan_samples(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
     if (block_of(image)[0] == 0) return;
     Blocks blocks(image);
@@ -142,7 +143,7 @@ void plan_samples(const FloatGrid& surface, const ImageInfo& image, double reach
     plan.blocks = std::move(blocks.found);
 }
 
-/// Adds what a guess reads and smooths: the part of the image within `reach` of the surface's box.
+/// Adds the part of the image that a guess reads and smooths: within `reach` (world units) of the surface's box.
 void plan_smoothing(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
     Vec3 lowest, highest;
     lowest.fill(1e300);
@@ -179,7 +180,7 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     const double coarse = std::max(h, longest_side(bounding_box(given)) / kPilotVoxels);
     const Pilot coarser = run_pilot(job, marks, geometry, 2 * coarse, quiet);
     const Pilot pilot = run_pilot(job, marks, geometry, coarse, quiet);
-    // Model of the time: seconds = fixed + growing / h^2.
+    // Model of the time: seconds = fixed + growing / h^2. The two pilot runs determine `fixed` and `growing`.
     const double c = pilot.voxel_size, d = std::max(coarser.voxel_size, 1.01 * c);
     const double growing = std::max(0.0, (pilot.seconds - coarser.seconds) / (1 / (c * c) - 1 / (d * d)));
     const double fixed = std::max(0.0, pilot.seconds - growing / (c * c));

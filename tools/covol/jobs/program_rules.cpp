@@ -14,10 +14,10 @@ namespace covol::tool {
 namespace {
 
 constexpr double kFarClip = 1000;   // metres; Blender's default view clips parts of objects that are farther away
-constexpr double kNearClip = 0.01;  // metres; it also clips parts that are nearer
+constexpr double kNearClip = 0.01;  // metres; this view also clips parts that are nearer
 constexpr double kNozzle = 0.4;     // mm, common diameter of printer nozzles: thinner walls are not printed
-constexpr double kPrintBed = 300;   // mm
-constexpr double kSmallPart = 1;    // mm
+constexpr double kPrintBed = 300;   // mm; a remark on the size is made for wider objects
+constexpr double kSmallPart = 1;    // mm; also for narrower ones
 
 std::string number(double value) {
     std::ostringstream text;

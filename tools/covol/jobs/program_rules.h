@@ -25,7 +25,7 @@ struct FileFacts {
     // images
     std::string format;  ///< as printed by covol info
     bool is_rotated = false, has_spacing = true, is_big_tiff = false, has_segments = false;
-    bool has_display_range = true;  ///< false for a TIFF of ImageJ with labels and without min and max
+    bool has_display_range = true;  ///< false for labels in an ImageJ TIFF that states no min and max
 };
 
 struct Advice {
@@ -33,7 +33,7 @@ struct Advice {
     std::string text, remedy;
 };
 
-/// The program's rules that apply to the file, in the table's order.
+/// Advice from those rules of program_rules.cpp for this program that apply to the file, in the order of their table.
 [[nodiscard]] std::vector<Advice> advice_for(Program program, const FileFacts& facts);
 
 /// The first word of letters and digits after `key` in the first 64 KiB of a file; empty if `key` does not occur. For

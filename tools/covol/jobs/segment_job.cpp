@@ -78,7 +78,7 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
 void SegmentJob::sort_output(bool with_image) {
     const FileKind kind = output.empty() ? FileKind::Vdb : kind_of_output(output, FileKind::Mesh);
     const bool is_mask = kind == FileKind::Image && with_image && is_image_name(output);
-    if (kind != FileKind::Mesh && !is_mask) return;  // it stays the path of -o, which accepts only .vdb
+    if (kind != FileKind::Mesh && !is_mask) return;  // `output` is kept, and must be a .vdb
     std::string& alone = is_mask ? mask_path : mesh_path;
     if (!alone.empty())
         throw UsageError("-o " + output + " and " + (is_mask ? "--mask " : "--mesh ") + alone +
@@ -278,7 +278,7 @@ void SegmentJob::run(Session& session) const {
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (images.empty()) session.provenance().set_world_of_points();
-    session.outputs().protect(images);  // the image of a study is not on the command line
+    session.outputs().protect(images);  // the image may come from a study, not from the command line
     if (session.is_planning()) return run_plan(*this, session);
     if (checkpoint.given() && (session.brick() || is_timelapse(*this)))
         throw UsageError(

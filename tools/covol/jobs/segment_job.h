@@ -19,8 +19,8 @@
 
 namespace covol::tool {
 
-/// Reads files whose marks name their structures. They are needed twice, for the names of the structures and for the
-/// marks, but read once.
+/// Reads files in which each mark states its structure. A file is needed twice, for the names of the structures and for
+/// the marks, but is read only once.
 class SharedMarks {
 public:
     /// @throws Error as for read_structures_of_points()
@@ -46,7 +46,7 @@ struct SegmentJob {
     CloudFlags cloud;
     Given<SegmentOptions> given;
     std::string start_path;  ///< file that the start is read from; empty: no file is needed
-    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside seeds of one structure among several
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< name, position; --exterior-seed NAME:X,Y,Z
     MeshFlags mesh;
     EvidenceFlags evidence;
     BrickFlags bricks;
@@ -64,7 +64,7 @@ struct SegmentJob {
     void run(Session& session) const;
 
     // Used by run() and the functions that it calls:
-    /// Adds --exterior-seed, whose positions may be for one structure only.
+    /// Adds --exterior-seed, which accepts positions for all structures and, as NAME:X,Y,Z, for a single one.
     void bind_named_seeds(CLI::App& command);
     /// Uses the study's image if the command line names no image. @throws UsageError if there is no study, either
     void find_image();

@@ -90,13 +90,13 @@ void assign_seeds(std::vector<Marks>& structures, const std::string& flag, const
     }
 }
 
-/// Warns if marks that were read as lengths are probably in voxels. They may be inside the image by chance, but the
-/// edges of the image at the marks are stronger if they are read as voxels.
+/// Warns if marks that were read as lengths are probably voxel indices: although they are inside the image if read as
+/// lengths, the image has stronger edges at the marks if they are read as indices.
 void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const ReadPointsOptions& reading,
                     const RunContext& run) {
     if (!image || reading.space != PointSpace::Unstated || marks.points.empty()) return;
     const bool in_lengths = std::all_of(marks.rules.begin(), marks.rules.end(), [](const std::string& rule) {
-        return rule.ends_with("x, y, z in world units");  // the rule if the file states no unit
+        return rule.ends_with("x, y, z in world units");  // how a file is read that states no unit
     });
     if (!in_lengths) return;
     const std::optional<double> ratio = edges_if_voxels(marks.points, *image);

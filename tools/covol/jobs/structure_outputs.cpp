@@ -96,7 +96,8 @@ std::vector<NamedLabel> label_names(const StructuresOutput& output) {
     return labels;
 }
 
-/// A given mask that was corrected by marks. It keeps its values, which are stored as bytes if they fit.
+/// A mask given by --guess, corrected by marks. Its label values stay as given; they are stored as 8-bit integers if
+/// all are from 0 to 255, otherwise as 32-bit integers.
 class CorrectedLabels : public PixelSource {
 public:
     CorrectedLabels(std::shared_ptr<const StructuresOutput> output, bool has_names)
@@ -205,7 +206,7 @@ Json input_of(const StructureOutput& s) {
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
         json["contours"] = {{"paths", s.files.contours}, {"rules", s.contour_rules}};
-        if (const auto& contours = s.result.report.resolved.contours)  // nullopt: a network, whose lines are marks
+        if (const auto& contours = s.result.report.resolved.contours)  // null for a network: its points are marks
             json["contours"].update({{"closed", contours->closed},
                                      {"open", contours->open},
                                      {"slices", contours->slices},

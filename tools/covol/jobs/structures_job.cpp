@@ -16,7 +16,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // maximum number of structures that are printed as lines, not as a table
+constexpr std::size_t kMaxInLines = 4;  // a summary of more structures is printed as a table
 
 /// Whether the lattices are equal up to the rounding of file formats.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
@@ -123,8 +123,8 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
             s.label = *job.mask_label;
         session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
-        // 0: for an image in chunks, no voxels are read for the statistics; the segmentation has read only those near
-        // marks and surface.
+        // max_read = 0: of an image in chunks, the segmentation has read only the chunks near marks and surface. No
+        // more are read for statistics, so that such an image gets none.
         if (image) s.intensity = intensity_within(*image, *s.result.surface, 0, run);
         if (image && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
     }

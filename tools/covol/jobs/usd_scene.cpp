@@ -23,7 +23,7 @@ std::string asset(const std::string& file, const fs::path& folder) {
     return "@@@" + std::string(name.starts_with("..") || name.starts_with("/") ? "" : "./") + name + "@@@";
 }
 
-/// The text for use in a quoted string: quotes and backslashes become '_'.
+/// The text for use in a quoted string of USD: quotes and backslashes are replaced by '_'.
 std::string in_quotes(const std::string& text) {
     std::string safe = safe_text(text);
     std::replace_if(

@@ -15,6 +15,7 @@ struct Export {
     std::string name, bytes;
 };
 
+/// Makes the file that a page has requested.
 /// @param format  mask.nii.gz, mask.nrrd, mask.tif, mesh.ply, mesh.stl, surface.vdb, marks.csv, table.csv
 /// @param wanted  the structures to export; for a mesh exactly one, because a file holds one mesh
 /// @param results  returns the results of all structures of the study, not only of those in `wanted`, so that masks do

@@ -8,7 +8,7 @@
 // Files that are added to a study: marks, and other programs' results. Each becomes one action.
 namespace covol::tool {
 
-/// Maximum sizes of uploads from a page: a mask is larger than marks.
+/// Maximum sizes of uploads from a page, bytes: of any file such as a mask, and of a file of marks, which is smaller.
 inline constexpr std::size_t kMaxFileBytes = std::size_t(256) << 20, kMaxMarksBytes = std::size_t(4) << 20;
 
 /// A file that a page has sent. The destructor deletes it, unless keep() was called.

@@ -13,12 +13,14 @@ namespace covol::tool {
 /// surfaces have been computed.
 class KeptSurfaces {
 public:
-    /// @param of  identifies the image and the version of the program, which surfaces also depend on
+    /// @param of  text that identifies the image and the version of the program: a stored surface is used only if
+    /// neither has changed
     KeptSurfaces(const std::string& folder, std::string of);
 
     struct Kept {
-        Json
-            figures;  ///< of a message `result`: triangles, volume, area, extent, mean, sd, expected, warnings, seconds
+        /// Fields of the message `result` that pages get: triangles, volume, area, extent, mean, sd, expected,
+        /// warnings, seconds.
+        Json figures;
         std::shared_ptr<const TriangleMesh> mesh;
     };
     /// The stored surface for exactly this structure and options, or nullopt. Its file may be from an untrusted source.

@@ -20,8 +20,8 @@ namespace covol::tool {
 namespace {
 
 constexpr int kSuggestions = 5;
-constexpr std::uint64_t kKeptVersion = 1;     // version of kept surfaces; new surfaces have larger ones
-constexpr double kMaxRead = double(1 << 27);  // voxels of an image in chunks that are read for a mean intensity
+constexpr std::uint64_t kKeptVersion = 1;     // version number of kept surfaces; new surfaces have larger ones
+constexpr double kMaxRead = double(1 << 27);  // maximum number of voxels that are read for the mean intensity
 
 serve::Response refused(int status, const std::string& why) {
     serve::Response response;
@@ -93,7 +93,8 @@ bool MarkSession::show_kept(const std::shared_ptr<const StudyStructure>& structu
     solved.version = kKeptVersion;
     solved.kept = std::move(kept->mesh);
     solved.reported = std::move(kept->figures);
-    // Reported as a first result, not as a refined one: the image may differ in parts that its digest does not cover.
+    // The surface is reported as a first result, not as a refined one: the image may differ in parts that its digest
+    // does not cover.
     solved.reported.update({{"structure", structure->id},
                             {"version", solved.version},
                             {"seq", solved.requested},
@@ -127,7 +128,7 @@ void MarkSession::receive(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
     Json reported;
-    std::shared_ptr<const StudyStructure> from;  // if not null, its surface is stored by KeptSurfaces
+    std::shared_ptr<const StudyStructure> from;  // if not null, the surface is kept for it
     StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
         intensity = intensity_within(image_(), *result.surface->surface, kMaxRead, run_);
@@ -194,7 +195,7 @@ void MarkSession::message(serve::Client client, std::string_view text) {
     try {
         act(client, text);
     } catch (const Error& error) {
-        // The answer contains the key of the action, if it has one, so that the page can assign it.
+        // The answer contains the key of the failed action, if it has one, so that the page can find the action.
         const Json sent = Json::parse(text, nullptr, false);
         constexpr std::string_view kSource = "study: ";  // a prefix that is redundant on the page
         std::string_view why = error.what();

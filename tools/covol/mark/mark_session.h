@@ -19,8 +19,8 @@
 
 namespace covol::tool {
 
-/// The context without log and progress: the page shows messages about results, and messages about the image were
-/// printed when it was read.
+/// The context without log and progress. Computations for a page use it, because the page itself shows their messages;
+/// messages about the image were printed when it was read.
 [[nodiscard]] RunContext quiet(RunContext run);
 
 /// Settings of the page for a study.
@@ -29,7 +29,7 @@ struct MarkView {
     std::string title;       ///< the image's name
     SegmentOptions options;  ///< options of every structure; those of the study take precedence
     StudySite site;
-    std::string image_digest;  ///< identifies the file and the options it is read with, for kept surfaces
+    std::string image_digest;  ///< text that identifies the image, see KeptSurfaces()
 };
 
 /// One study on the page of `covol mark`: answers requests of the page, and sends it all changes. The messages are
@@ -62,8 +62,8 @@ private:
         std::uint64_t requested = 0;                 ///< sequence number of the study at the last request to the solver
         Json reported;                               ///< the last result, as sent to pages; null: none
         std::uint64_t version = 0;
-        std::shared_ptr<const SegmentResult> surface;  ///< surface of that version; null: none, or `kept`
-        std::shared_ptr<const TriangleMesh> kept;      ///< mesh of that version from an earlier session, or null
+        std::shared_ptr<const SegmentResult> surface;  ///< surface with number `version`; null: none, or only `kept`
+        std::shared_ptr<const TriangleMesh> kept;      ///< mesh with number `version` from an earlier session, or null
         bool is_refined = false;
         std::optional<IntensityStatistics> intensity;  ///< of the last refined surface
     };

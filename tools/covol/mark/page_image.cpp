@@ -54,7 +54,7 @@ const PageImage::Channel& PageImage::channel_of(const serve::Request& request) c
         throw Error(Errc::InvalidInput,
                     "'channel': expected one of the image's " + std::to_string(channels_.names.size()) + ", from 0");
     if (number == channels_.own) return own_;
-    const std::lock_guard lock(mutex_);  // so that each channel is opened only once
+    const std::lock_guard lock(mutex_);  // so that two requests do not open the same channel
     const auto found = others_.find(int(number));
     if (found != others_.end()) return found->second;
     return others_.emplace(int(number), made_of(channels_.open(int(number)))).first->second;

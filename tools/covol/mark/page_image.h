@@ -14,10 +14,10 @@
 
 namespace covol::tool {
 
-/// The channels of an image. One channel is marked; the others are only displayed.
+/// The channels of an image. Marks refer to one of the channels; the others are only displayed.
 struct PageChannels {
     std::vector<std::string> names;        ///< names of all channels; empty: the image has one channel
-    int own = 0;                           ///< number of the marked channel
+    int own = 0;                           ///< number of the channel to which marks refer
     std::function<ImageLevels(int)> open;  ///< opens another channel, which has the same lattice
 };
 
@@ -37,7 +37,7 @@ public:
 private:
     struct Channel {
         ImageLevels levels;
-        std::array<double, 2> range{0, 1}, window{0, 1};  // values: for encoding, and from black to white at first
+        std::array<double, 2> range{0, 1}, window{0, 1};  // values encoded in slices; black and white at first
     };
     [[nodiscard]] Channel made_of(ImageLevels levels) const;
     [[nodiscard]] const Channel& channel_of(const serve::Request& request) const;

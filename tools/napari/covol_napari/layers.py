@@ -97,7 +97,7 @@ def lines_of(layer, step=()):
     kinds = layer.shape_type
     for n, corners in enumerate(layer.data):
         kind = kinds if isinstance(kinds, str) else kinds[n]
-        if kind == "ellipse":  # given by the corners of its box
+        if kind == "ellipse":  # napari stores an ellipse as the corners of its bounding box
             middle, a, b = np.mean(corners, 0), (corners[1] - corners[0]) / 2, (corners[3] - corners[0]) / 2
             t = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS, endpoint=False)[:, None]
             corners = middle + np.cos(t) * a + np.sin(t) * b
@@ -143,7 +143,8 @@ def layers_of(result, transform, name, suggestions=0, units=None):
     about = {"metadata": {"covol": result.report}, **({} if units is None else {"units": units})}
     made = [
         (result.mask, {"name": f"{name} covol", "affine": transform, **about}, "labels"),
-        # reversing the axes is a reflection: the corners are reversed, too, to keep the orientation
+        # napari's world is z, y, x. Reversing the coordinates is a reflection, which would turn the triangles inside out; their corners
+        # are reversed, too, so that the normals still point outwards.
         ((mesh.vertices[:, ::-1].copy(), mesh.faces[:, ::-1].astype(np.int64)), {"name": f"{name} covol surface", **about}, "surface"),
     ]
     found = result.suggest(suggestions) if suggestions > 0 else []

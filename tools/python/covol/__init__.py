@@ -133,7 +133,7 @@ def timelapse(frames, marks=None, **keywords):
         except Error as error:
             return error
 
-    # The package that runs the program passes all frames to it at once.
+    # The package that runs the program covol (tools/python/program) has follow(), which passes all frames to the program at once.
     for found in lapse.follow(frames, go) if hasattr(lapse, "follow") else map(go, frames):
         yield found if isinstance(found, Error) else Structures(*found) if several else found[0][0]
 

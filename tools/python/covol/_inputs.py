@@ -41,7 +41,7 @@ def image(value, spacing=None, origin=None, direction=None, affine=None, name="i
         own = {"spacing": value.spacing, "origin": value.origin, "direction": value.direction}
         given = {key: own[key] if v is None else v for key, v in given.items()}
         return _covol.Image(value.array, unit=value.unit, **given)
-    if hasattr(value, "affine") and hasattr(value, "dataobj"):  # nibabel: x, y, z and RAS
+    if hasattr(value, "affine") and hasattr(value, "dataobj"):  # an image of nibabel: indexed x, y, z, and in RAS
         if all(v is None for v in given.values()):
             given = dict(zip(given, from_affine(value.affine)))
         unit = value.header.get_xyzt_units()[0] if hasattr(value.header, "get_xyzt_units") else ""
@@ -99,7 +99,7 @@ def points(name, value, reading, lines=False, normals=None):
     if is_path(value):
         return [read_points(value, **reading)]
     if isinstance(value, (list, tuple)) and value and all(isinstance(v, _covol.Points) or is_path(v) for v in value):
-        return [cloud for v in value for cloud in points(name, v, reading)]  # of one structure
+        return [cloud for v in value for cloud in points(name, v, reading)]  # several files of the same structure
     keywords = (reading["points_space"], reading["points_order"], reading["points_scale"])
     if lines:
         if not isinstance(value, collections.abc.Iterable):

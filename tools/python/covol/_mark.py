@@ -29,7 +29,7 @@ def _notebooks():
     try:
         from jupyter_server.serverapp import list_running_servers
         ports = {int(server["port"]) for server in list_running_servers()}
-    except Exception:  # noqa: BLE001 - files of another program, which may be invalid
+    except Exception:  # noqa: BLE001 - the list is read from files of another program, which may be invalid
         ports = set()
     return [f"http://localhost:{port}" for port in sorted(ports or {8888})]
 
@@ -78,7 +78,7 @@ class Study:
                 file = os.path.join(self._own, f"marks{len(command)}.csv")
                 _files.write_positions(file, places)
                 command += ["--points", f"{name}={file}"]
-            # A separate process group: Ctrl-C in a notebook stops the cell, not the page.
+            # The program runs in a session of its own, so that Ctrl-C in a notebook stops the cell, but not the page.
             with open(os.path.join(self._own, "output.txt"), "w+") as printed:
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=printed, text=True, start_new_session=True)
                 line = self._process.stdout.readline()
@@ -115,10 +115,10 @@ class Study:
     def result(self):
         """The current surfaces of all structures that have marks: Structures, with `mask`. Computed if the study has changed."""
         journal = pathlib.Path(self.folder) / "journal.jsonl"
-        size = journal.stat().st_size  # the journal only grows
+        size = journal.stat().st_size  # changes with each action, because actions are only appended to the journal
         if self._known is None or self._known[0] != size:
             from . import Structures, structures
-            if hasattr(_covol, "solve_study"):  # by the program, which reads the study itself
+            if hasattr(_covol, "solve_study"):  # solved by the program covol, which reads the study itself
                 self._known = size, Structures(*_covol.solve_study(self.image, self.folder, {}, _inputs.call()))
             else:
                 self._known = size, structures(self.image, self.marks, **self.options)

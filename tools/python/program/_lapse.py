@@ -7,7 +7,7 @@ from . import _program, _values
 from ._errors import Error
 from ._program import Folder, read_json
 
-_ALONE = ("inside", "outside", "exterior_seed", "init", "guess", "painted")  # for single images; the program would use them for all frames
+_ALONE = ("inside", "outside", "exterior_seed", "init", "guess", "painted")  # refused for a time-lapse: the program would use them for all frames
 
 
 class Frames:
@@ -76,7 +76,7 @@ class Frames:
         """The result of found(), or the Error, for each frame."""
         folder, first, failed = self.folder, self._frames[0], {}
 
-        class Noted(_values.Call):  # notes the errors of frames that failed
+        class Noted(_values.Call):  # stores the error of each frame that failed
             def __init__(self, call):
                 super().__init__(call.progress, self.note, call.threads, call.memory_limit)
                 self.given = call.log

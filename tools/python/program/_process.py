@@ -40,7 +40,7 @@ class Process:
 
     def __init__(self, program, words, folder=None):
         """@param folder  working directory; it is removed from the paths in messages"""
-        # Without the library paths that 3D Slicer and Blender set for their own libraries.
+        # 3D Slicer and Blender set these variables to the paths of their own libraries, which the program must not load.
         environment = {key: value for key, value in os.environ.items() if key not in ("LD_LIBRARY_PATH", "LD_PRELOAD", "PYTHONHOME")}
         self._folder = os.fspath(folder) + os.sep if folder is not None else None
         self._events, self._failure = queue.Queue(), ""
@@ -93,7 +93,7 @@ class Process:
         """Waits for the end. Raises Failed, Interrupted."""
         code = self._process.wait()
         self._reader.join()
-        if code in (130, -signal.SIGINT):  # it may not have installed its signal handler yet
+        if code in (130, -signal.SIGINT):  # -SIGINT: the program had not installed its signal handler yet
             raise Interrupted(code, "cancelled")
         if code != 0:
             raise Failed(code, self._failure or f"the program covol ended with {code}")

@@ -44,7 +44,8 @@ py::array known_numbers(py::array array) {
     if (kind == 'f' && bytes == 2) return converted("float32");
     if (kind == 'f' && bytes > 8) return converted("float64");
     if ((kind == 'i' || kind == 'u') && bytes == 8) {
-        // labels and counts usually fit into 32 bits; otherwise they become doubles
+        // covol does not support 64-bit integers. Labels and counts usually fit into 32 bits; other values become
+        // doubles.
         const double low = py::cast<double>(array.attr("min")()), high = py::cast<double>(array.attr("max")());
         const bool fits =
             low >= std::numeric_limits<std::int32_t>::min() && high <= std::numeric_limits<std::int32_t>::max();
@@ -65,7 +66,8 @@ bool is_whole(const py::array& array) {
     return py::cast<bool>(array.attr("flags").attr("aligned"));
 }
 
-/// A pointer to `first` that keeps a reference to the array. It may be released on any thread.
+/// A pointer to `first` that keeps the array alive. It may be released on any thread, because it acquires the GIL
+/// first.
 std::shared_ptr<const void> keep(const void* first, py::array array) {
     const auto owner = new py::array(std::move(array));
     return {first, [owner](const void*) {

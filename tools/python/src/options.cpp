@@ -20,9 +20,9 @@ double to_number(const std::string& name, py::handle value) {
     return number;
 }
 
-// ---- what a value of each type is in Python ------------------------------------------------------------------------
+// ---- conversion of values to and from Python, by type --------------------------------------------------------------
 
-/// Types without a case here have no keyword.
+/// Whether options of type T are keyword arguments in Python.
 template <typename T>
 constexpr bool kHasKeyword = HasWords<T> || kIsNumber<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, WorldBox> ||
                              std::is_same_v<T, std::vector<Vec3>>;
@@ -81,7 +81,8 @@ py::object to_python(const std::optional<T>& v) {
     return v ? to_python(*v) : py::none();
 }
 
-/// Calls visit(option, field, plain type) for each option that has a keyword.
+/// Calls visit(option, field, type) for each option that is a keyword argument; `type` is the field's type without
+/// std::optional.
 template <typename Of, typename Visit>
 void for_each_keyword(Of& settings, const Visit& visit) {
     for_each_option(settings, [&](const OptionInfo& option, auto& field) {

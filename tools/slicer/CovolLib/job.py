@@ -82,7 +82,7 @@ class Job:
             made.SetName(f"{self._volume.GetName()} {NAME}")
             made.SetReferenceImageGeometryParameterFromVolumeNode(self._volume)
             return made
-        # Only the segments of the last result are replaced: those that the user has added stay.
+        # Only the segments of the last result are replaced; segments that the user has added to the same node stay.
         old, new = last.GetSegmentation(), made.GetSegmentation()
         for n in range(new.GetNumberOfSegments()):
             number = new.GetNthSegmentID(n)

@@ -9,7 +9,7 @@ export function barButton(name, label, onclick, more = {}) {
   return el('button', {type: 'button', class: 'tool', title: label, 'aria-label': label, 'data-do': name, onclick, ...more}, icon(name));
 }
 
-/** `tools` are [name, label, key]. */
+/** Buttons that choose the tool; `tools` is a list of [name, label, key]. */
 export function toolChoice(state, tools) {
   const buttons = tools.map(([name, label, key]) => barButton(name, `${label} (${key})`, () => state.set({tool: name}), {'data-tool': name}));
   const update = () => buttons.forEach((one) => one.setAttribute('aria-pressed', String(one.dataset.tool === state.get('tool'))));
@@ -18,7 +18,7 @@ export function toolChoice(state, tools) {
   return el('div', {class: 'tools', role: 'group', 'aria-label': 'tool'}, buttons);
 }
 
-/** `can()` returns whether there are actions to undo, and to redo. */
+/** The buttons undo and redo; `can()` returns two booleans: whether there are actions to undo, and actions to redo. */
 export function historyButtons({study, state}, can) {
   const undo = barButton('undo', 'undo (z)', () => study.act({do: 'undo'})), redo = barButton('redo', 'redo (Shift+z)', () => study.act({do: 'redo'}));
   const update = () => { [undo.disabled, redo.disabled] = can().map((is) => !is); };
@@ -27,7 +27,7 @@ export function historyButtons({study, state}, can) {
   return el('div', {class: 'tools', role: 'group', 'aria-label': 'history'}, undo, redo);
 }
 
-/** `more()` returns further entries. */
+/** The menu of grey values; `more()` returns further entries for it. */
 export function windowMenu({state, image, panels}, more = () => []) {
   return menu('grey values (w)', [icon('window'), el('span', {class: 'caret'})], (close) => [
     ...presets(image, panels[state.get('keyPanel')].slice).map(([name, window]) => menuItem(name, () => { state.set({window}); close(); },

@@ -8,15 +8,16 @@ import {linesAt} from './outline.js';
 import {AXIS_COLORS} from './space.js';
 import {EYE, rgbColor, Stage3D} from './stage3d.js';
 
-const CLICK = 4;  // CSS pixels
-// Delays in ms before a change is shown in 3D: after a mark, the surface that follows from it; after a surface, its outlines.
+const CLICK = 4;  // CSS pixels that the pointer may move during a click
+// Delays in ms before a change is shown in 3D. After a change of marks, the view waits for the surface that follows
+// from it; after a new surface, it waits until the planes have drawn its outlines.
 const WITH_SURFACE = 600, AFTER_OUTLINES = 60;
 const KINDS = ['surface', 'inside', 'outside'];
-const HALO = 1.3;  // radius of the rim around a mark, which makes it visible on dark and light backgrounds
+const HALO = 1.3;  // radius of the rim around a mark, in radii of the mark; makes it visible on dark and light backgrounds
 const shared = new IcosahedronGeometry(1, 2), coarse = new IcosahedronGeometry(1, 1), coarsest = new IcosahedronGeometry(1, 0);
 const ballOf = (count) => count > 4000 ? coarsest : count > 800 ? coarse : shared;
 
-/** Marks are distinguishable from their surface, and from marks of other kinds. */
+/** The colour of a mark of a structure: differs from the colour of the surface, and from those of marks of other kinds. */
 function markColor(color, kind) {
   const own = rgbColor(color);
   return kind === 'surface' ? own.multiplyScalar(0.3) : kind === 'inside' ? own.lerp(rgbColor([255, 255, 255]), 0.6) : rgbColor([20, 20, 22]);
@@ -81,7 +82,7 @@ export class BodyScene extends Stage3D {
     state.on(['meshes'], () => this.refreshIn(AFTER_OUTLINES));
     state.on(['drag', 'active', 'marks'], () => this.refreshIn(0));
     state.on(['planes'], () => this.movePlanes());
-    // The positions of the slices are usually not visible in 3D.
+    // Slices that move are redrawn only if a plane or a cut shows their positions in 3D.
     state.on(['slices'], () => { if (state.get('planes').some(Boolean) || state.get('cut') >= 0) this.movePlanes(); });
     state.on(['cut'], () => { this.turnCut(); this.updateClip(); });
     state.on(['flip'], () => this.updateClip());
@@ -97,7 +98,7 @@ export class BodyScene extends Stage3D {
     this.updateSigns();
   }
 
-  /** Shows changes after at most `wait` ms. Delayed, because drawing takes longest of all if there is no graphics card. */
+  /** Shows changes after at most `wait` ms. They are delayed because 3D drawing is slow if there is no graphics card. */
   refreshIn(wait) {
     const due = performance.now() + wait;
     if (this.due <= due) return;
@@ -146,7 +147,7 @@ export class BodyScene extends Stage3D {
     this.updateClip();
   }
 
-  /** Whether the body is visible, and large enough. */
+  /** Whether the body is near the middle of the view, and neither too small nor too large for it. */
   isWellSeen() {
     const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));
     const fit = this.sphere.radius / Math.sin(half), distance = this.camera.position.distanceTo(this.sphere.center);
@@ -182,7 +183,8 @@ export class BodyScene extends Stage3D {
   updateMarks(structure, count) {
     let own = this.balls.get(structure.id);
     const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null, isShown = structure.visible && this.state.get('marks');
-    // About the same size on the screen for small and large bodies; smaller for many marks.
+    // The radius is proportional to the body, so that marks have about the same size on the screen for small and large
+    // bodies. It is smaller if there are many marks.
     const radius = this.sphere.radius * Math.min(0.013, Math.max(0.005, 0.2 / Math.sqrt(count))), ball = ballOf(count);
     const key = [structure.marks, structure.color, isShown, moved, radius, ball];
     if (own && key.every((part, n) => part === own.key[n])) return;
@@ -235,7 +237,7 @@ export class BodyScene extends Stage3D {
     this.cornersOf(axis, this.state.get('slices')[axis]).forEach((place, n) => position.setXYZ(n, ...place));
     position.needsUpdate = true;
     if (!picture) return;
-    // The last pixels of a coarse picture extend beyond the image.
+    // In a coarse picture, the last pixel of a row or column may extend beyond the image; this part is cut off.
     const x = this.space.size[right] / pictureStep / picture.width, y = this.space.size[down] / pictureStep / picture.height;
     [[0, 0], [x, 0], [x, y], [0, y]].forEach(([u, v], n) => uv.setXY(n, u, v));
     uv.needsUpdate = true;
@@ -300,7 +302,7 @@ export class BodyScene extends Stage3D {
     this.app.keep('camera', null);
   }
 
-  /** Depth range in which a thin body in a large image is not clipped when the camera moves away from it. */
+  /** Sets the near and far planes of the camera so that they do not clip the body, even if it is small in a large image. */
   setDepth(distance) {
     const size = this.imageBox.max.distanceTo(this.imageBox.min);
     this.camera.near = Math.min(distance, size) / 100;

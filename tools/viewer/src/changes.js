@@ -9,7 +9,8 @@ const CHANGES = {
   recolor: (own, a) => ({...own, color: a.color}),
   lock: (own, a) => ({...own, locked: a.locked}),
   show: (own, a) => ({...own, visible: a.visible}),
-  // A mark that the server has already sent is not shown twice before it is acknowledged.
+  // The server may send a mark before it acknowledges the action that added it: the action must not add the mark a
+  // second time.
   add_mark: (own, a, id) => own.marks.some((m) => !m.isNew && isSameMark(m, a)) ? own : ({...own, marks: [...own.marks, {id, kind: a.kind, world: a.world, isNew: true}]}),
   move_mark: (own, a) => ({...own, marks: own.marks.map((m) => m.id === a.mark ? {...m, world: a.world} : m)}),
   remove_mark: (own, a) => ({...own, marks: own.marks.filter((m) => m.id !== a.mark)}),

@@ -8,7 +8,7 @@ const MAPS = {
 };
 export const COLOR_MAPS = Object.keys(MAPS);
 
-/** 256 colours as pixels: of a map, or from black to a colour [red, green, blue]. */
+/** 256 colours as pixels (Uint32). `name` is a key of MAPS, or a colour [red, green, blue] for a map from black to this colour. */
 export function colorTable(name) {
   const map = Array.isArray(name) ? [[0, 0, 0], name] : MAPS[name] ?? MAPS.grey, table = new Uint32Array(256);
   for (let n = 0; n < 256; ++n) {

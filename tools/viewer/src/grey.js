@@ -1,7 +1,7 @@
 // The window of grey values, from black to white, and the colours in between.
 import {colorTable} from './color_maps.js';
 
-/** A pixel for each of the 65536 codes of a slice. */
+/** A table with the displayed pixel for each of the 65536 codes of a slice; the codes 0 to 65535 stand for `low` to `high`. */
 export function greyTable({low, high}, {black, white}, colors = 'grey') {
   const shades = colorTable(colors), table = new Uint32Array(65536), scale = (high - low) / 65535, range = white - black || 1e-9;
   for (let n = 0; n < 65536; ++n) {
@@ -24,12 +24,12 @@ function rangeOfSlice({values}, {low, high}) {
   return {black: value(at(0.01)), white: value(at(0.99))};
 }
 
-/** Available choices as [name, window]; `slice` is the displayed one. */
+/** The windows of grey values that a menu offers, as [name, window]; `slice` is the displayed slice or null. */
 export function presets(image, slice) {
   const automatic = {black: image.black, white: image.white}, whole = {black: image.low, white: image.high}, list = [['automatic', automatic]];
   if (!isSame(automatic, whole)) list.push(['whole range', whole]);
   if (slice) list.push(['this slice', rangeOfSlice(slice, image)]);
-  // Hounsfield units: air is -1000, and scanners report values from -4096 to 32767.
+  // CT images are recognised by Hounsfield units: air is -1000, and scanners report values from -4096 to 32767.
   const isAnatomicalCt = image.anatomical && image.low <= -500, looksLikeCt = image.low <= -900 && image.low >= -4096 && image.high <= 32767;
   if ((isAnatomicalCt || looksLikeCt) && image.high >= 300)
     list.push(['soft tissue', {black: -160, white: 240}], ['brain', {black: 0, white: 80}], ['bone', {black: -450, white: 1050}], ['lung', {black: -1350, white: 150}]);

@@ -1,4 +1,4 @@
-// Icons, drawn as lines in a box of 18 x 18.
+// Icons, drawn as lines in a box of 18 x 18 units of their SVG.
 import {svg} from './dom.js';
 
 const PATHS = {

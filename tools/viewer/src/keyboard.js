@@ -6,7 +6,7 @@ export const VIEW_ROWS = [['wheel, [ ]', 'slice; with Shift 10'], ['Ctrl+wheel, 
   ['arrows', 'move the crosshair, turn 3D'], ['right-drag', 'grey values'], ['w', 'next grey values'], ['f', 'this view alone'], ['r', 'reset views'], ['v', 'slices in 3D'],
   ['q', 'marks: show or hide'], ['k', 'count slices from 1, as Fiji does'], ['t', 'dark or light'], ['?', 'this sheet']];
 
-/** `parts` are [title, rows of [key, description]]. */
+/** The dialog that lists all keys; `parts` is a list of [title, rows of [key, description]]. */
 export function helpSheet(parts) {
   const dialog = el('dialog', {class: 'help', 'aria-label': 'keys', onclick: (event) => { if (event.target === dialog) dialog.close(); }},
     el('div', {class: 'help-head'}, el('h2', {}, 'Keys'), el('button', {type: 'button', class: 'icon', 'aria-label': 'close', onclick: () => dialog.close()}, '\u2715')),
@@ -56,7 +56,7 @@ export function listenToKeys(keys, {help, view, moveCrosshair, enter, digit, tak
   document.addEventListener('keydown', (event) => {
     const {key, target} = event, isText = target.matches?.('input:not([type=range]):not([type=color]):not([type=checkbox]), select, textarea'), isOnControl = target.matches?.('button, a, input, select, summary');
     if (help.open || document.querySelector('dialog[open]') || isText) return;
-    const isTyped = event.getModifierState('AltGraph');  // [ and ] on many keyboard layouts
+    const isTyped = event.getModifierState('AltGraph');  // on many keyboard layouts, [ and ] are typed with AltGr
     if (!isTyped && (event.ctrlKey || event.metaKey)) {
       const act = {z: event.shiftKey ? keys.Z : keys.z, Z: keys.Z, y: keys.Z}[key];
       if (!act) return;
@@ -80,7 +80,7 @@ export function listenToKeys(keys, {help, view, moveCrosshair, enter, digit, tak
   });
 }
 
-/** Shows a frame around the focused element once keys are used. */
+/** Shows a frame around the focused element after a key was pressed, until the pointer is used again. */
 export function showFocus() {
   addEventListener('keydown', ({key}) => { if (/^(Tab|Arrow.*|Page.*|[[\]{}a])$/.test(key)) document.documentElement.dataset.keys = 'on'; });
   addEventListener('pointerdown', () => { delete document.documentElement.dataset.keys; }, true);

@@ -2,10 +2,10 @@
 import {marksOn} from './overlay.js';
 import {CLICK, PlanePointer, TAP} from './pointer.js';
 
-const HIT = 8;  // CSS pixels
+const HIT = 8;  // CSS pixels: maximum distance of the pointer from a mark that it selects
 
 export class MarkPointer extends PlanePointer {
-  /** The nearest mark on this slice that can be changed. */
+  /** The mark on this slice that is nearest to a position on the canvas, within so many CSS pixels, and that can be changed. */
   markAt([x, y], within = HIT) {
     let best = null, least = within;
     const active = this.panel.tools.active();
@@ -18,7 +18,7 @@ export class MarkPointer extends PlanePointer {
     return best;
   }
 
-  /** The target of a press at that position. */
+  /** The mark that a press at that position selects or moves. */
   targetAt(spot, isTouch = false) { return this.markAt(spot, isTouch ? TAP + 4 : HIT); }
 
   takesTouch(spot) { return super.takesTouch(spot) || Boolean(this.markAt(spot, TAP + 4)); }

@@ -1,6 +1,6 @@
 // Effects of clicks, drags and keys on marks of the active structure; the ruler.
 
-/** [name, label, key, description] */
+/** The tools for marks: [name, label, key, description]. */
 export const MARK_TOOLS = [
   ['surface', 'surface mark', 's', 'Click: mark on the surface \u00b7 Shift: inside \u00b7 Alt: outside \u00b7 drag moves a mark'],
   ['inside', 'inside mark', 'i', 'Click: mark inside \u00b7 drag moves a mark'],
@@ -47,7 +47,7 @@ export class MarkTools {
 
   moveMark({structure, mark}, world) { this.study.act({do: 'move_mark', structure, mark, world}); }
 
-  /** A mark or an outline: {structure, mark} or {structure, outline}. */
+  /** Removes a mark or an outline; `target` is {structure, mark} or {structure, outline}. */
   remove(target) {
     const own = target && this.study.structure(target.structure);
     if (!own) return false;

@@ -1,7 +1,7 @@
 // A button with a list below it.
 import {el} from './dom.js';
 
-/** `fill` returns the list's elements when it opens. */
+/** A menu; `fill` is called when it opens and returns the elements of the list. */
 export function menu(label, face, fill) {
   const list = el('div', {class: 'menu', role: 'menu', 'aria-label': label, hidden: true});
   const button = el('button', {type: 'button', class: 'tool', title: label, 'aria-label': label, 'aria-haspopup': 'menu', 'aria-expanded': 'false', onclick: () => open(list.hidden)}, face);
@@ -11,7 +11,7 @@ export function menu(label, face, fill) {
     list.hidden = !isOpen;
     button.setAttribute('aria-expanded', String(isOpen));
     if (!isOpen) return isByKey && button.focus();
-    // Near the edge of a narrow window it opens to the other side.
+    // If the list would extend beyond the right edge of the window, it is moved to the left.
     list.style.left = '0';
     const over = list.getBoundingClientRect().right - document.documentElement.clientWidth + 8;
     if (over > 0) list.style.left = `${-over}px`;

@@ -6,7 +6,7 @@ import {
 import {linesAt} from './outline.js';
 import {rgbColor} from './stage3d.js';
 
-const PIXELS = 384;  // in each direction
+const PIXELS = 384;  // number of pixels of the plane's picture in each direction
 const COLOR = '#c98b1d';
 
 /** Two directions that span the plane with this normal; the second one is as upright as possible. */
@@ -35,7 +35,7 @@ export class ObliquePlane {
     this.group.add(this.mesh, border, this.lines);
   }
 
-  /** `grey` has a pixel for each code of 16 bits; `surfaces` are [mesh, colour]. */
+  /** Moves the plane. `grey` is a table with a pixel for each code of 16 bits, `surfaces` is a list of [mesh, colour] to intersect with the plane. */
   put({normal, center}, grey, surfaces) {
     const towards = new Vector3(...normal), middle = new Vector3(...center), [right, up] = basisOf(towards), {half} = this;
     const place = (x, y) => middle.clone().addScaledVector(right, x).addScaledVector(up, y), position = this.mesh.geometry.getAttribute('position');
@@ -54,7 +54,7 @@ export class ObliquePlane {
     const codes = this.codesOf(grid);
     if (!(codes instanceof Promise)) return this.take(codes, grid, grey);
     return codes.then((own) => {
-      if (this.key !== key || !own) return;  // another plane is displayed now
+      if (this.key !== key || !own) return;  // the answer is for a plane that is not displayed any more
       this.take(own, grid, grey);
       this.arrived();
     });

@@ -5,7 +5,7 @@ import {el} from './dom.js';
 import {ObliquePlane} from './oblique.js';
 import {EYE} from './stage3d.js';
 
-export const OBLIQUE = 3;  // in addition to the image axes 0, 1, 2: the plane that cuts surfaces
+export const OBLIQUE = 3;  // value of the state "cut" if the oblique plane cuts the surfaces; 0, 1, 2: the slice of an image axis
 
 /** The stored plane from before a reload if it is valid, otherwise null. */
 export function keptOblique(kept) {
@@ -13,7 +13,7 @@ export function keptOblique(kept) {
   return isPlace(kept?.normal) && isPlace(kept?.center) ? {normal: kept.normal, center: kept.center} : null;
 }
 
-/** The plane faces the camera when it is switched on. */
+/** The button that switches the oblique plane on and off. When it is switched on, the plane faces the camera. */
 export function obliqueButton(state, view, key) {
   const button = el('button', {type: 'button', class: 'small', title: `a plane through the crosshair that faces you (${key})`, 'data-key': 'oblique', onclick: () => {
     if (!state.get('oblique')) view()?.faceOblique();

@@ -18,7 +18,8 @@ export function indexCoordinates(positions, volume) {
  */
 function cross(coordinates, corners, axis, at, [right, down], edges = null) {
   const along = coordinates[axis], xs = coordinates[right], ys = coordinates[down], segments = [], count = along.length;
-  // A vertex on the plane counts as above it, so that no segment is found twice or missed.
+  // A vertex exactly on the plane is treated as above it, so that a segment through this vertex is neither found twice
+  // nor missed.
   const edge = (a, b) => {
     const share = (at - along[a]) / (along[b] - along[a]);
     segments.push(xs[a] + share * (xs[b] - xs[a]), ys[a] + share * (ys[b] - ys[a]));
@@ -40,7 +41,8 @@ export function outlineAt(structure, axis, at, axes) {
   structure.outlines ??= [];
   const known = structure.outlines[axis];
   if (known?.at === at) return known.segments;
-  // Marching cubes have vertices exactly on slices: with a small offset, no triangle lies in the plane.
+  // Marching cubes often place vertices exactly on slices. The plane is moved by a small offset, so that no triangle
+  // lies in it.
   const segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes);
   structure.outlines[axis] = {at, segments};
   return segments;
@@ -73,7 +75,7 @@ function chain(segments, edges) {
   return lines;
 }
 
-/** Whether a slice meets the structure's extent; with many structures, most do not. */
+/** Whether a slice meets the structure's extent: a quick test, because with many structures, a slice meets only a few of them. */
 function isMet(structure, axis, at) {
   structure.spans ??= structure.index.map((along) => along.reduce(([low, high], x) => [Math.min(low, x), Math.max(high, x)], [Infinity, -Infinity]));
   const [low, high] = structure.spans[axis];

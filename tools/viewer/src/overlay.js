@@ -4,7 +4,7 @@ import {linesAt} from './outline.js';
 import {write} from './plane.js';
 import {AXIS_COLORS} from './space.js';
 
-export const FAINT_WITHIN = 2;  // slices
+export const FAINT_WITHIN = 2;  // slices: maximum distance at which marks of other slices are drawn, faintly
 const GAP = 9;  // pixels around the crosshair's centre that stay free
 const indices = new WeakMap();
 
@@ -25,7 +25,7 @@ export function inkOf(rgb) {
 /** The distance in whole slices between a mark or an outline and the displayed slice. */
 export const away = (at, shown) => Math.max(0, Math.ceil(Math.abs(at - shown) - 0.5 - 1e-6));
 
-/** A line of voxels with a dark rim, which makes it visible on white, too. */
+/** Draws lines, given by voxel coordinates, with a dark rim, which makes them visible on white, too. */
 export function stroke(context, panel, lines, color, {width = 1.6, rim = 1.8, dash = [], alpha = 1} = {}) {
   context.beginPath();
   for (const {places, closed} of lines) {
@@ -52,7 +52,8 @@ export function drawCrosshair(panel, context) {
   if (slices[axis] !== panel.shownAt) return;
   context.lineWidth = 1;
   context.globalAlpha = 0.6;
-  // Columns are inclined if the image is sheared.
+  // If the image is sheared, columns of voxels are inclined on the screen, and so is the vertical line of the
+  // crosshair.
   const slope = plane.lean / plane.scaleY, from = left + (y - top) * slope, on = (row) => x + (row - y) * slope;
   const parts = [[plane.right, on(top), top, on(y - GAP), y - GAP], [plane.right, on(y + GAP), y + GAP, on(top + height), top + height],
     [plane.down, from, y, x - GAP, y], [plane.down, x + GAP, y, from + width, y]];
@@ -79,7 +80,7 @@ export function drawSurface(panel, context, structure, isActive) {
   }
 }
 
-/** A disc for marks on the surface, with a plus for inside, hollow with a minus for outside. */
+/** Draws a mark: a disc for a mark on the surface, a disc with a plus for inside, a ring with a minus for outside. */
 export function drawMark(context, [x, y], kind, color, {radius = 4, alpha = 1, isMeant = false} = {}) {
   const size = isMeant ? radius + 1.5 : radius;
   context.globalAlpha = alpha;
@@ -136,7 +137,7 @@ export function marksOn(panel, most = FAINT_WITHIN) {
 
 export function drawMarks(panel, context) {
   const selected = panel.state.get('selected'), hover = panel.state.get('hover'), list = marksOn(panel);
-  const many = list.length > 300;  // full-size marks would hide the outline
+  const many = list.length > 300;  // so many marks are drawn smaller, because they would hide the outline
   for (const {structure, mark, far, spot} of list.sort((a, b) => b.far - a.far)) {
     const isMeant = [selected, hover].some((t) => t?.mark === mark.id && t.structure === structure.id);
     drawMark(context, spot, mark.kind, inkOf(structure.color), {radius: (far ? 3 : 4) * (many ? 0.6 : 1), alpha: far ? 0.5 - 0.15 * far : 1, isMeant});

@@ -1,10 +1,10 @@
 // The image on a plane, on a separate canvas below the marks: it is redrawn only if the picture changes.
 import {el} from './dom.js';
 
-/** Pictures are computed on the CPU: a canvas in GPU memory would require an upload of each one. */
+/** The context of a canvas in CPU memory. Pictures are computed on the CPU, and each would have to be uploaded to a canvas in GPU memory. */
 const contextOf = (canvas) => canvas.getContext('2d', {willReadFrequently: true});
 
-/** Adds the colours of another channel. */
+/** Adds the colours of another channel to the pixels of a picture. */
 function addTo(pixels, values, table) {
   if (!values) return;
   for (let n = 0; n < pixels.length; ++n) {

@@ -4,7 +4,7 @@ import {dominant} from './space.js';
 
 const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // at the - and + ends of the world's axes, LPS
 
-/** Text that is legible on any grey value. */
+/** Writes text with a dark outline, which makes it legible on any grey value. */
 export function write(context, text, x, y, color = '#fff') {
   context.lineJoin = 'round';
   context.strokeStyle = 'rgba(0, 0, 0, 0.7)';
@@ -14,7 +14,7 @@ export function write(context, text, x, y, color = '#fff') {
   context.fillText(text, x, y);
 }
 
-/** The largest of 1, 2, 5, 10, ... that is not larger than `most`. */
+/** The largest number of the form 1, 2 or 5 times a power of 10 that is not larger than `most`. */
 export function roundLength(most) {
   const tens = 10 ** Math.floor(Math.log10(most));
   return [5, 2, 1].map((n) => n * tens).find((n) => n <= most) ?? tens;
@@ -47,7 +47,7 @@ export class Plane {
       left: width / 2 - (x + 0.5) * scaleX - (y + 0.5) * lean, top: height / 2 - (y + 0.5) * scaleY});
   }
 
-  /** Voxel coordinates counted from the left and from the top; the function is its own inverse. */
+  /** Converts voxel coordinates to those counted from the left and the top of the displayed plane; the function is its own inverse. */
   shown(x, y) {
     const {size} = this.space;
     return [this.flipX ? size[this.right] - 1 - x : x, this.flipY ? size[this.down] - 1 - y : y];
@@ -83,7 +83,7 @@ export class Plane {
     const {viewWidth: width, viewHeight: height} = this;
     const most = Math.min(120, width / 4) / this.scale;
     const length = roundLength(most), pixels = length * this.scale;
-    // On the image itself, if there is enough space.
+    // The bar is placed on the image itself, at least 12 pixels from the edges of the view.
     const x = width - Math.max(12, this.left + 10) - pixels, y = height - Math.max(12, this.top + 10);
     context.font = '11px system-ui, sans-serif';
     context.textAlign = 'center';

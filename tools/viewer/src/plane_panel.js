@@ -5,10 +5,10 @@ import {AXIS_COLORS, dominant, planeName} from './space.js';
 import {icon} from './icons.js';
 import {PictureLayer} from './picture_layer.js';
 
-const MAX_STEP = 1024, LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
+const MAX_STEP = 1024, LARGEST_VOXEL = 90;  // LARGEST_VOXEL: maximum size of a voxel when zoomed in, CSS pixels
 const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom', 'marks'];
 
-/** The number of voxels per value that matches the pixels of the screen. */
+/** The step of a slice, in voxels per value and a power of two, if a pixel of the screen shows this many voxels along an axis. */
 const stepFor = (voxels) => Math.min(MAX_STEP, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
 
 export class PlanePanel {
@@ -57,7 +57,7 @@ export class PlanePanel {
     this.state.set({views});
   }
 
-  /** The view that shows a voxel at a position on the canvas. */
+  /** The view with this zoom in which voxel (x, y) is displayed at position (px, py) of the canvas. */
   viewWith(zoom, [x, y], [px, py]) {
     const {plane} = this, grow = zoom / (this.view?.zoom ?? 1), [sx, sy] = plane.shown(x, y), rows = (py - plane.viewHeight / 2) / (plane.scaleY * grow);
     const [cx, cy] = plane.shown(sx - (px - plane.viewWidth / 2) / (plane.scaleX * grow) + rows * plane.lean / plane.scaleX, sy - rows);
@@ -68,7 +68,7 @@ export class PlanePanel {
     const {plane} = this, before = this.view?.zoom ?? 1, fit = Math.min(plane.scaleX, plane.scaleY) / before;
     const zoom = Math.min(LARGEST_VOXEL / fit, before * factor);
     this.setView(zoom <= 1.001 ? null : this.viewWith(zoom, plane.unplace(px, py), [px, py]));
-    this.draw();  // updates the plane, from which the next event starts
+    this.draw();  // at once, because the next event uses the updated plane
   }
 
   /** Scrolls to a position if it is outside of the zoomed view. */
@@ -129,14 +129,14 @@ export class PlanePanel {
     return undefined;
   }
 
-  /** A plane that is hidden behind another one on the page may still be visible in 3D. */
+  /** Updates the picture of a plane that is not visible on the page, because another one is enlarged; the 3D view may still show it. */
   drawHidden(ratio) {
     if (!this.state.get('planes')[this.axis]) return;
     if (!this.plane.scaleX) this.plane.lay(512, 512);
     this.takeSlice(ratio);
   }
 
-  /** The number of voxels per value that matches the pixels of the screen, and the displayed part of the slice. */
+  /** The step that matches the pixels of the screen, and the displayed part of the slice. */
   requestFor(ratio) {
     const {plane, axis, slices} = this, step = stepFor(1 / (Math.max(plane.scaleX, plane.scaleY) * ratio));
     const {viewWidth: width, viewHeight: height} = plane, corners = [[0, 0], [width, 0], [0, height], [width, height]].map(([x, y]) => plane.unplace(x, y));
@@ -159,7 +159,7 @@ export class PlanePanel {
     if (isNew) this.onPicture?.(axis);
   }
 
-  /** The content of the slice has changed, although its position has not. */
+  /** To be called when the content of the slice has changed although its position has not: it is then drawn again. */
   forgetPicture() { this.layer.whole.slice = null; }
 
   drawNoPicture(context, width, height) {

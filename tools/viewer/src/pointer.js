@@ -1,6 +1,7 @@
-// Mouse, pen and touch on a plane: position, zoom, grey values, crosshair, ruler. Subclasses add further actions of a press.
+// Mouse, pen and touch on a plane: position, zoom, grey values, crosshair, ruler. Subclasses add further actions of a
+// press.
 
-export const CLICK = 4, TAP = 10;  // CSS pixels that a click may move
+export const CLICK = 4, TAP = 10;  // CSS pixels that the pointer may move during a click of the mouse, and during a tap
 const NOTCH = 30;  // scroll distance of one step, for wheels without notches
 
 /** Whether the space bar is pressed: then a drag moves the image. */
@@ -24,7 +25,7 @@ export class PlanePointer {
     canvas.addEventListener('wheel', (event) => this.turn(event), {passive: false});
     // The space bar must not scroll the page while the pointer is on a plane.
     addEventListener('keydown', (event) => { if (event.key === ' ' && this.spot && !event.target.matches?.('button, a, input, select, summary, textarea')) event.preventDefault(); });
-    // One finger scrolls the page, unless the touch has a function here.
+    // A touch with one finger scrolls the page, unless it has a function on the plane (takesTouch).
     canvas.addEventListener('touchstart', (event) => {
       const box = canvas.getBoundingClientRect(), touch = event.touches[0];
       if (event.touches.length > 1 || this.takesTouch([touch.clientX - box.left, touch.clientY - box.top])) event.preventDefault();
@@ -40,7 +41,7 @@ export class PlanePointer {
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
-  /** Whether a touch at that position has a function. */
+  /** Whether a touch at that position has a function on the plane, and must not scroll the page. */
   takesTouch() { return ['ruler', 'crosshair'].includes(this.tool); }
 
   down(event) {
@@ -59,7 +60,7 @@ export class PlanePointer {
     return this.press(event, spot);
   }
 
-  /** Called when the main button is pressed and no gesture of this class begins. */
+  /** For subclasses. Called when the main button is pressed and no gesture of this class begins. */
   press() {}
 
   /** Called when a second finger or the system interrupts a gesture. */

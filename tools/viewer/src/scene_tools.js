@@ -2,7 +2,7 @@
 import {el} from './dom.js';
 import {icon} from './icons.js';
 
-/** `names` are those of the planes; a page may add further controls, and further [value, text] for the choice of the cut. */
+/** The controls of the 3D view. `names` are those of the planes, `more` further controls, `cuts` further choices, [value, text]. */
 export function sceneTools(app, view, names, {more = [], cuts = []} = {}) {
   const {state} = app;
   const planes = [2, 1, 0].map((axis) => el('button', {type: 'button', class: 'small', 'data-plane': axis, 'aria-label': `slice ${names[axis]} in 3D`, onclick: () => {

@@ -11,7 +11,7 @@ export const EYE = new Vector3(0.45, -0.8, 0.4);
 
 export function rgbColor(rgb) { return new Color().setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255, SRGBColorSpace); }
 
-/** The world's axes as seen by the camera. */
+/** A drawing of the world's axes as seen by the camera. */
 export function axisTriad(anatomical) {
   const names = anatomical ? ['L', 'P', 'S'] : ['x', 'y', 'z'], drawing = svg('svg', {viewBox: '-32 -32 64 64', class: 'triad', 'aria-hidden': 'true'});
   const lines = AXIS_COLORS.map((color) => svg('line', {x1: 0, y1: 0, stroke: color, 'stroke-width': 2.5, 'stroke-linecap': 'round'}));
@@ -30,7 +30,7 @@ export function axisTriad(anatomical) {
   return {drawing, turn};
 }
 
-/** A scale bar for the distance of the centre of rotation. */
+/** A scale bar, which is correct at the distance of the centre of rotation from the camera. */
 export function scaleBar(unit) {
   const text = el('span', {}), bar = el('i', {}), drawing = el('div', {class: 'scale', 'aria-hidden': 'true'}, text, bar);
   const update = ({camera, controls, canvas}) => {
@@ -98,7 +98,7 @@ export class Stage3D {
     fill.position.set(1.2, -0.1, 0.7);
     rim.position.set(0.2, 0.8, -1.2);
     for (const light of [key, fill, rim]) {
-      this.camera.add(light, light.target);  // they turn with the camera
+      this.camera.add(light, light.target);  // as children of the camera, the lights turn with it
       light.target.position.set(0, 0, 0);
     }
     this.scene.add(new AmbientLight(0xffffff, 0.4));
@@ -111,7 +111,7 @@ export class Stage3D {
     if (!(this.sphere.radius > 0)) this.sphere.radius = 1;
   }
 
-  /** Cuts away the half that is in front. */
+  /** Chooses the side of the cut that is removed: the half of the body that is nearer to the camera. */
   turnCut() {
     const axis = this.state.get('cut');
     if (axis < 0) return;
@@ -153,7 +153,7 @@ export class Stage3D {
     });
   }
 
-  /** Turns to a direction; at once, or within a third of a second. */
+  /** Turns the camera to a direction, at once or in a motion of a third of a second. */
   look(direction, atOnce = false) {
     // The narrower side of the view must contain the bounding sphere of all surfaces.
     const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));

@@ -1,14 +1,14 @@
 // The row below the views: the values at the cursor, and the effect of a click.
 import {el, number} from './dom.js';
 
-/** `hints` has a text for each tool. */
+/** The row with the values at the cursor; `hints` has a text for each tool, the effect of a click. */
 export function statusRow({state, space, image, slices, unitText}, hints) {
   const voxel = el('span', {}), world = el('span', {}), value = el('span', {}), hint = el('span', {class: 'hint'});
   const element = el('footer', {class: 'status', 'aria-label': 'under the cursor'}, el('span', {class: 'cursor'}, voxel, world, value), hint);
   const update = () => { hint.textContent = hints[state.get('tool')] ?? ''; };
   state.on(['tool'], update);
   update();
-  // The digits resolve a tenth of a voxel.
+  // The number of decimals is chosen so that a tenth of the smallest voxel side can be read.
   const digits = Math.min(6, Math.max(0, Math.ceil(1 - Math.log10(Math.min(...space.spacing)))));
   const signed = (v) => v.toFixed(digits).replace('-', '\u2212');
   /** Shows a position in a panel; null: the pointer has left. */

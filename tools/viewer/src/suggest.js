@@ -7,7 +7,7 @@ export class Suggestions {
     study.on('suggestions', (answer) => this.take(answer));
     study.on('failed', () => this.stopAsking());
     study.on('change', () => { if (this.structure !== null && !this.study.structure(this.structure)) this.clear(); });
-    study.on('action', (item) => {  // a mark near the suggestion replaces it, too
+    study.on('action', (item) => {  // any mark that the user adds ends the display of the suggestion
       if (item?.action.do === 'add_mark' && this.state.get('ring')) this.state.set({ring: null});
     });
     state.on(['active'], () => this.clear());
@@ -19,7 +19,7 @@ export class Suggestions {
     this.state.set({ring: null, suggested: 0});
   }
 
-  /** Goes to the next one; requests more if none is left. */
+  /** Goes to the next suggestion; requests more if none is left. */
   next() {
     if (this.left.length > 0) return this.show();
     const own = this.tools.active() ?? this.study.structures[0];

@@ -1,7 +1,7 @@
 // Short messages that disappear after a while, or on a click.
 import {el} from './dom.js';
 
-const STAY = 6000;  // ms
+const STAY = 6000;  // ms for which a message is displayed
 
 export class Toasts {
   constructor() { this.element = el('div', {class: 'toasts', role: 'status', 'aria-live': 'polite'}); }

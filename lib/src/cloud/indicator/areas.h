@@ -10,8 +10,9 @@
 
 namespace covol::cloud {
 
-/// Area of the surface that each point represents, world units squared, from the area of the disc whose radius is the
-/// distance to its eighth neighbour. A density on a lattice would also count points of the opposite side of thin parts.
+/// Area of the surface that each point represents, world units squared: an eighth of the area of the disc whose radius
+/// is the distance to its eighth neighbour. It is not computed from the number of points in the cells of a lattice,
+/// because the cells of a thin part also contain points of its opposite side.
 [[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
     const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<double> areas(points.size());

@@ -6,17 +6,17 @@
 namespace covol::cloud {
 
 /// The longest side of the box in which the indicator is computed.
-/// @param longest  that of the points' box
+/// @param longest  longest side of the points' box
 [[nodiscard]] double indicator_side(double longest);
-/// `cell`, or a smaller cell size if the longest side would have too few cells.
+/// `cell`, or a smaller cell size if the longest side would have fewer than kIndicator.min_cells cells.
 [[nodiscard]] double indicator_cell(const std::vector<Vec3>& points, double cell);
-/// Grids around the points with a margin wide enough for the indicator to be 0 at its end, coarser around sparse
-/// points. The cell size is that of indicator_cell().
+/// Grids around the points, coarser where the points are sparse, with a margin so wide that the indicator may be set to
+/// 0 at its end. The cell size is that of indicator_cell().
 /// @param areas  area of the surface that each point represents; empty: the finest grid is used around all points
 [[nodiscard]] std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points,
                                                               const std::vector<double>& areas, double cell);
 
-/// The same with exactly the given cell size.
+/// The grids of indicator_grid(), but with exactly the given cell size.
 [[nodiscard]] std::shared_ptr<const GridStack> grid_around(const std::vector<Vec3>& points,
                                                            const std::vector<double>& areas, double cell);
 

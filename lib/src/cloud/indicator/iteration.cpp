@@ -71,14 +71,15 @@ void Iteration::estimate_normals(double cell, Orientation& result) const {
     });
 }
 
-/// Computes the indicator of the normals and scales the areas accordingly.
+/// Computes the indicator of the normals, scales it to 1/2 at the points, and scales the areas by the same factor.
 void Iteration::solve(WindingField& field, Orientation& result, int cycles) {
     cloud::solve(field, points_, result, cycles, run_);
     const double half = scale_to_half(field, points_);
     for (double& area : result.areas) area *= half;
 }
 
-/// Computes the indicator of the normals, and the normals of that indicator. @return the mean change, 1 - cosine
+/// Computes the indicator of the normals, then replaces the normals by those of that indicator.
+/// @return mean of 1 - cosine of the angles between old and new normals
 double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
     solve(field, result, cycles);
     const std::size_t count = points_.size();
@@ -102,7 +103,7 @@ void Iteration::turn_patches(WindingField& field, Orientation& result) {
     const PointCells cells(points_, kCloud.coarse * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
     for (int round = 0; round < kCommon.rounds; ++round) {
-        turn(field, result, kIteration.patch_cycles);  // the indicator is then that of the last normals
+        turn(field, result, kIteration.patch_cycles);  // first updates the indicator, which is measured below
         const std::vector<double> off = mean_off(cells, field.indicator());
         const std::vector<int> patch = patches_of(beside, sides_of(off));
         const int patches = 1 + *std::max_element(patch.begin(), patch.end());

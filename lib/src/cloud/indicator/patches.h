@@ -12,7 +12,7 @@ namespace covol::cloud {
 
 /// For each cell, the number of its patch, from 0; -1 for cells of side 0. A patch consists of connected cells of the
 /// same side.
-/// @param beside  neighbours_of()
+/// @param beside  the result of neighbours_of()
 [[nodiscard]] std::vector<int> patches_of(const std::vector<std::vector<std::uint32_t>>& beside,
                                           const std::vector<int>& side);
 

@@ -53,8 +53,8 @@ private:
     std::vector<std::array<std::uint32_t, kNeighbours>> beside_;
 };
 
-/// Replaces normals far from the normal of their sheet by that, on the side of the neighbours' normals. @return how
-/// many
+/// Replaces each normal that differs by more than 60 degrees from both normals of its sheet by one of these two, on the
+/// side of the neighbours' normals. @return number of replaced normals
 std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::vector<char> is_lying(sheets.size(), 0);
     std::vector<std::uint32_t> lying;
@@ -118,7 +118,7 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::erase_if(turned, [](const auto& t) { return t.second.first == 0; });
     std::size_t count = 0;
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
-        // If that larger part is reversed as well, the two reversals cancel out.
+        // The larger part may itself be reversed to agree with a still larger one; two reversals cancel out.
         int times_turned = 0;
         for (auto at = turned.find(parts.root(n)); at != turned.end(); at = turned.find(at->second.second))
             ++times_turned;

@@ -27,18 +27,20 @@ using cloud::is_clean;
 using cloud::is_settled;
 using cloud::miss_reach;
 
-/// Fraction of the surface that is far from every point.
+/// Fraction of the area of the indicator's surface that is farther from every point than kCloud.coarse times the
+/// spacing or the noise, whichever is larger.
 double bare_fraction(const CloudOrientation& cloud) {
     const double reach = kCloud.coarse * std::max(cloud.scale.spacing, cloud.scale.noise);
     return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
 }
 
 bool does_enclose(const CloudOrientation& cloud) {
-    // The doubt is up to 0.013 for closed shapes, and 0.026 to 0.19 for scans of one side. The bare fraction is up to
-    // 0.04 and from 0.14.
+    // Measured for closed shapes and for scans of one side: the doubt is at most 0.013 for the former and 0.026 to 0.19
+    // for the latter; the bare fraction is at most 0.04 for the former and at least 0.14 for the latter.
     return doubt(cloud.orientation) < kCloud.some || bare_fraction(cloud) < kCommon.minority;
 }
-/// Recomputes the indicator with smaller cells if its cells are too large for the detail of the normals.
+/// Recomputes the indicator with smaller cells if its cells are too large for the detail of the normals, or if the
+/// orientation is not settled and the surface misses many points.
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double spacing = cloud.scale.spacing;
@@ -56,7 +58,8 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
 /// the side from which most of its points are seen. @return whether this is used: the normals are consistent, and the
 /// surface misses no more points than the current one
 bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
-    // With more noise, neighbours may lie above one another, and quadrics form handles in regions without points.
+    // If the noise is not small compared to the spacing, nearest neighbours may lie above one another instead of beside
+    // one another, and quadrics form handles in regions without points.
     if (!is_clean(cloud.scale)) return false;
     PointHints hints;
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
@@ -78,13 +81,13 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
 /// @param reach  distance from a point beyond which the surface misses it
 void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
     const double passed = fraction_missed(*cloud.orientation.indicator, cloud.points, reach);
-    // More of the surface closes gaps than lies near points. The bare fraction is up to 0.04 for closed shapes, 0.14 to
-    // 0.37 for scans of some sides, and 0.66 to 0.85 for scans from the air.
+    // Whether more than half of the surface's area closes gaps between the points. The measured bare fraction is up to
+    // 0.04 for closed shapes, 0.14 to 0.37 for scans of some sides, and 0.66 to 0.85 for scans from the air.
     const bool mostly_bare = bare_fraction(cloud) > 0.5;
     Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
     // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most
-    // points: the ratio is 0.06 to 0.21 for closed shapes and shells open at one end, 0.83 to 0.97 for scans of one
-    // side.
+    // points. The number of points missed by the current surface, divided by that of the surface from views, was
+    // measured as 0.06 to 0.21 for closed shapes and shells open at one end, and 0.83 to 0.97 for scans of one side.
     cloud.encloses = (!mostly_bare || passed < kCloud.some) &&
                      kCommon.clear_ratio * passed < fraction_missed(*seen.indicator, cloud.points, reach);
     if (cloud.encloses) return;
@@ -131,7 +134,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         // Therefore given normals are not overruled if they have identified enclosed points.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kCloud.some &&
-            // In narrow folds, the computed normals are wrong, and their surface then misses more points.
+            // In narrow folds, the computed normals may be wrong; their surface then misses more points than that of
+            // the given normals, which are kept.
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=
                 fraction_missed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;
@@ -146,8 +150,8 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
         cloud.encloses = true;
     }
     report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
-    // Only the sides of given normals are kept. They may be the normals of flat faces, which do not show where the
-    // edges between the faces are: quadrics fitted to one face would extend beyond its edges.
+    // Only the sides of given normals are used, not their directions, which may be those of flat faces: such normals do
+    // not show where the edges between the faces are, and quadrics fitted to one face would extend beyond its edges.
     if (report.used) cloud::take_directions(*cloud.orientation.indicator, cloud.points, cloud.orientation.normals);
 }
 

@@ -21,7 +21,7 @@ namespace covol {
 namespace {
 
 constexpr double kCellRadii = 2;      // edge of the cells by which points are sorted, in first radii
-constexpr std::size_t kNearest = 12;  // twice the number of a quadric's coefficients
+constexpr std::size_t kNearest = 12;  // points in a group of nearest ones: twice a quadric's coefficients
 
 /// Standard deviation of points from the best-fitting quadric over the plane of the second and third axes.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
@@ -78,7 +78,7 @@ Around measure_around(const cloud::PointCells& cells, const Vec3& at, double rad
     return {radius, double(near.size()), radius * off_sheet(near)};
 }
 
-/// Measures the neighbourhoods of the nearest neighbours for a sample of the points.
+/// Measures the group of kNearest points, of which one is the point itself, for every `step`-th point.
 std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
                                     std::size_t step) {
     tbb::concurrent_vector<Around> around;  // the order does not affect the medians
@@ -108,7 +108,7 @@ double median_of(const std::vector<Around>& around, Value value) {
 CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
     CloudScale scale;
     const double nearest = scale.nearest = measure_spacing(points).median;
-    scale.spacing = 2 * nearest;  // approximate ratio for points at random positions on a surface
+    scale.spacing = 2 * nearest;  // approximately true for points at random positions on a surface
     if (!(nearest > 0)) return scale;
     const std::size_t step = std::max<std::size_t>(1, points.size() / kCommon.sample);
     double radius = kCloudScale.first_spacings * nearest, best = 1;

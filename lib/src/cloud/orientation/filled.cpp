@@ -55,11 +55,13 @@ double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / st
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;  // an eighth is less than 12 rings
+    // With fewer points, the sizes to be tested, from kCommon.ring points to an eighth of all points, would not span a
+    // factor of 12.
+    if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kCommon.sample));
-    // The sampled points are not at regular intervals of the order, which in rows of points would select the same
-    // position of each row.
+    // The sampled points are not at regular intervals of the sorted points: if the points form rows, these might all be
+    // at the same position in their rows.
     const auto at = [&](std::size_t m) { return cells.sorted()[m * 2654435761U % points.size()]; };
     double radius = spacing;
     for (int n = 0; n < kMaxRadii; ++n, radius *= kCommon.growth) {

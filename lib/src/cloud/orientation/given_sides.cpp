@@ -31,7 +31,7 @@ std::size_t count_known(const std::vector<Vec3>& directions) {
     }));
 }
 
-/// Normals of local planes, on the side of `towards`; 0 if that is 0.
+/// Normals of local planes, on the side to which `towards` points; 0 for points at which `towards` is 0.
 std::vector<Vec3> normals_towards(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
                                   const CloudScale& scale) {
     std::vector<Vec3> normals = plane_normals(points, scale);
@@ -93,8 +93,8 @@ public:
     [[nodiscard]] Orientation& oriented() { return oriented_; }
 
 private:
-    /// Whether a point belongs to the second half. The halves are pseudo-random instead of alternating, because files
-    /// may contain pairs of points.
+    /// Whether a point belongs to the second half. The halves are pseudo-random instead of alternating, because the two
+    /// points of a pair would always be in different halves if a file contains its points in pairs.
     static bool is_second(std::size_t n) { return (n * 2654435761U >> 16 & 1) != 0; }
 
     [[nodiscard]] double falls_along(std::size_t n) const {
@@ -133,7 +133,8 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
     return double(std::count(is_torn.begin(), is_torn.end(), 1)) / double(points.size());
 }
 
-/// Computes the indicator of an orientation's normals and scales the areas accordingly.
+/// Computes the indicator of an orientation's normals, scaled to 1/2 at the points, and scales the areas by the same
+/// factor.
 void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result, const RunContext& run) {
     solve(field, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(field, points);
@@ -142,6 +143,7 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
     result.off_half = std::abs(mean_at(field, points) - 0.5);
 }
 
+/// Cross-validates the given normals, and computes the orientation from them unless they fail.
 /// @param given  normals; 0 if unknown
 /// @return whether they are used
 bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, bool is_outward, const CloudScale& scale,
@@ -182,7 +184,8 @@ std::vector<char> find_enclosed(const std::vector<Vec3>& points, const std::vect
         alone[n] = std::min({indicator.inside(points[n]), indicator.inside(plus(points[n], away)),
                              indicator.inside(minus(points[n], away))}) > kHalfwayInside;
     });
-    // Noise moves single points into the solid, whereas the points of a wall inside it are next to each other.
+    // Noise moves single points into the solid, whereas the points of a wall inside it are next to each other. A point
+    // therefore counts as enclosed only if most of its neighbours are inside as well.
     const PointCells cells(points, kNear.first_radius * scale.spacing);
     for_nearest(cells, scale.spacing, kCommon.ring, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         const auto others = std::count_if(near.begin(), near.end(),

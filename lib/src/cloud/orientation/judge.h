@@ -19,8 +19,8 @@ namespace covol::cloud {
 /// Distance from a point beyond which a surface misses it, world units.
 [[nodiscard]] double miss_reach(const CloudScale& scale);
 
-/// Measure of doubt in an orientation: the fraction of normals that turned in the last iteration, plus a penalty if the
-/// mean of the indicator at the points differs from 1/2, as it does if the normals of whole parts are reversed.
+/// Measure of doubt in an orientation: the fraction of normals that changed their side in the last iteration, plus a
+/// penalty if the mean of the indicator at the points differs from 1/2, as it does if whole parts are inverted.
 [[nodiscard]] double doubt(const Orientation& orientation);
 [[nodiscard]] bool is_settled(const Orientation& orientation);
 

@@ -17,7 +17,8 @@ namespace {
 
 using Patch = std::vector<std::uint32_t>;  // indices of points
 
-/// Finds the cells of points whose mean free direction is opposed to the sum of those around them.
+/// Finds the cells of points whose mean free direction is opposed to the sum of the mean free directions of the cells
+/// around them.
 class Opposed {
 public:
     Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
@@ -74,7 +75,7 @@ private:
     std::vector<std::vector<std::uint32_t>> beside_;
 };
 
-/// The indicator's surface.
+/// The cells that the indicator's surface crosses, and the area of those without points.
 struct Level {
     Level(const WindingField& field, const PointCells& points) {
         const double cell = field.indicator().stack().cell(), reach = kCloud.coarse * cell;
@@ -116,7 +117,8 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
-        // The far side of a cavity is not much larger than its near side, unlike the hole of a ring.
+        // If a false cavity vanishes, the bare area decreases by that of its far side, which is not much larger than
+        // the patch on its near side. If the hole of a ring closes, it decreases by much more.
         const double gain = (bare - level.bare) * cell * cell;
         if (!(gain > 0 && gain < kCommon.clear_ratio * area) ||
             double(away) > kCommon.minority * double(patch.size())) {

@@ -30,7 +30,8 @@ using cloud::Iteration;
 using cloud::normals_of;
 using cloud::Stage;
 
-/// Parameters of an attempt. No further attempts are made after one with at least the first cell size that is settled.
+/// Parameters of an attempt. No further attempt is made after one that is settled and has at least the cell size of the
+/// first attempt.
 struct Attempt {
     double cell;         // cell size relative to the first attempt
     double enclosed;     // Stage::enclosed of the first stage
@@ -44,7 +45,7 @@ struct Sample {
         for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
         areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
     }
-    /// The areas of all points.
+    /// The areas of all points: the area of each point of the sample is divided among the points that it represents.
     [[nodiscard]] std::vector<double> all_areas() const {
         std::vector<double> all(order.size());
         for (std::size_t n = 0; n < order.size(); ++n)
@@ -87,12 +88,13 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         throw Error(Errc::InvalidInput, "points: expected different positions, got the same one for all points");
     Orientation best;
     with_threads(run, [&] {
-        // If normals keep turning, the cause may be noise or thin parts, which are hard to distinguish; smaller cells
-        // may resolve thin parts.
+        // If normals keep changing their sides, the cause may be noise or thin parts, which are hard to distinguish.
+        // Therefore attempts with smaller cells follow, which may resolve thin parts.
         const double first = first_cell(scale, points.size());
         // Parts thinner than the first cells require cells as small as the points allow.
         const double finest = cloud::finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
-        // As many points as determine the indicator: several in each cell that the surface crosses.
+        // The iteration uses as many points as are needed to determine the indicator: several in each cell that the
+        // surface crosses.
         const double cells = kCloud.coarse * scale.spacing / cell;
         const double fraction = std::min(cells * cells, kOrientation.max_sampled / double(points.size()));
         const double maximum = std::max(1.0, double(points.size() / kCommon.sample));
@@ -101,7 +103,8 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         std::optional<cloud::Consistency> consistency;
         std::vector<std::tuple<double, double, bool>> lattices;
         std::vector<AttemptResult> tried;
-        // Noise may make the first cells wider than thin walls.
+        // The cells are at least as wide as the noise, and may thus be wider than thin walls. Therefore some attempts
+        // have smaller cells.
         std::vector<Attempt> attempts{{1, kOrientation.enclosed, true},
                                       {1, kOrientation.surely_enclosed, false},
                                       {1 / kCommon.growth, kOrientation.surely_enclosed, true},

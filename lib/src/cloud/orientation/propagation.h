@@ -13,8 +13,8 @@ namespace covol::cloud {
 /// plane_normals() with signs that agree along a minimum spanning tree of the graph of neighbours (Hoppe et al.,
 /// Surface reconstruction from unorganized points, SIGGRAPH 1992). The cost of an edge increases with the angle between
 /// its normals and with its angle to their planes, so that edges across thin parts are avoided. Each connected part of
-/// the graph is oriented such that it encloses a positive volume with its centre of mass, or faces the side from which
-/// most of it is seen.
+/// the graph is oriented such that it encloses a positive volume with its centre of mass or, if `towards` is given,
+/// faces the side from which most of it is seen.
 /// @param spacing  of these points, world units; `scale` may be that of a larger set
 /// @param towards  direction from each point to its viewpoint, 0 if unknown; empty: all unknown
 [[nodiscard]] std::vector<Vec3> propagated_normals(const std::vector<Vec3>& points, CloudScale scale, double spacing,

@@ -31,7 +31,7 @@ double usual_reach(const PointCells& cells, double spacing) {
     return median(std::move(reach));
 }
 
-/// Whether fewer than kCommon.ring other points lie within the distance of point n.
+/// Whether fewer than kCommon.ring other points are closer than `distance` to point n.
 bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
     const Vec3& p = cells.sorted()[n];
     std::size_t found = 0;
@@ -42,7 +42,8 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
         }
         return found >= kCommon.ring;
     };
-    // For most points, enough of the points next to them in the sorted order are within the distance.
+    // For most points, the points next to them in the sorted order include enough neighbours, so that no search is
+    // needed.
     if (has_enough_neighbours(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
     found = 0;
     cells.find(p, distance, ranges);
@@ -75,7 +76,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
             const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])),
                          reach = std::sqrt(near.back().squared);
-            // The maximum of `off` decreases with the distance of the neighbours.
+            // The more distant the neighbours are, the smaller is the value of `off` above which the point is stray.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
             stray[point] = off * reach / far_reach > kCloud.flat;
         },

@@ -114,7 +114,8 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
     const Occupied occupied(points, cell);
     const PointCells cells(points, occupied.cell());
     const std::vector<Vec3> rays = directions();
-    std::vector<double> seen(rays.size());  // points with a free view minus those with the opposite one
+    // For each ray, the number of points with a free view along it minus that of points with a free view against it.
+    std::vector<double> seen(rays.size());
     tbb::parallel_for(std::size_t(0), rays.size(), [&](std::size_t r) {
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             const auto [begin, end] = cells.cell(c);
@@ -123,7 +124,8 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
                 double(end - begin) * (occupied.is_free(from, rays[r]) - occupied.is_free(from, times(-1, rays[r])));
         }
     });
-    // In a scan with a common direction of view, the sky, more points are seen from there than from the opposite side.
+    // In a scan with a common direction of view, which is called the sky here, more points are seen from there than
+    // from the opposite side.
     Vec3 sky{0, 0, 0};
     if (*std::max_element(seen.begin(), seen.end()) > kCloud.some * double(points.size())) {
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));

@@ -15,7 +15,8 @@ COVOL_INLINE Float8 neighbours(const float* p) {
            detail::load<Float8>(p + 10) + detail::load<Float8>(p - 1) + detail::load<Float8>(p + 1);
 }
 
-/// Calls visit(first value of the row in the padded block, first node of the row, parity of that node) for each row.
+/// Calls visit(index of the row's first value in the padded block, index of its first node in the block, parity of
+/// i + j) for each row of eight nodes.
 template <typename Visit>
 COVOL_INLINE void for_rows(Visit visit) {
     for (std::size_t i = 0; i < 8; ++i)

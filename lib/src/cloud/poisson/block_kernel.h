@@ -7,14 +7,15 @@ namespace covol::cloud {
 
 constexpr std::size_t kPadded = 1000;
 
-/// Performs a red-black Gauss-Seidel sweep for (6 + screen) u - sum of neighbours = right.
-/// @param screen  null: 0 at all nodes
+/// Performs a red-black Gauss-Seidel sweep for the equation (6 + screen) u - sum of the six neighbours of u = right.
+/// @param padded  u, in a padded block
+/// @param right, screen  8^3 values each; screen may be null, which is 0 at all nodes
 void sweep_block(float* padded, const float* right, const float* screen);
 
-/// residual = right + sum of neighbours - (6 + screen) u.
+/// Computes the residual of the equation of sweep_block(): right + sum of the six neighbours of u - (6 + screen) u.
 void residual_block(const float* padded, const float* right, const float* screen, float* residual);
 
-/// Adds to a block the trilinear interpolation of 5^3 nodes of the coarser grid.
+/// Adds to a block of 8^3 nodes the trilinear interpolation of the 5^3 nodes of the coarser grid that surround them.
 void prolong_block(const float* coarse, float* fine);
 
 /// Restricts 9^3 nodes, which begin one node before the block along each axis, to 4^3 nodes of the coarser grid by sums

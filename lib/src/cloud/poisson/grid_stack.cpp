@@ -12,11 +12,13 @@
 namespace covol::cloud {
 namespace {
 
-// Margin, in cells, of each level around a point's splines, which reach nodes -1 to 2: splines of twice the cell size
-// then end within the level.
+// [cells] Margin of each level around the nodes -1 to 2 that the spline of one of its points reaches. The same point's
+// spline on the next coarser level, which is twice as wide, then ends within the finer level.
 constexpr int kAround = 3;
-constexpr int kCoarsestCells = kBlockSide - 1;  // maximum number along the longest side: one block of nodes
-constexpr int kGrading = 2;                     // margin around each block, in cells of the coarser level
+// Maximum number of the coarsest level's cells along its longest side. Its nodes then fit into one block.
+constexpr int kCoarsestCells = kBlockSide - 1;
+// [cells of the coarser level] Margin that each level covers around the blocks of the next finer level.
+constexpr int kGrading = 2;
 
 std::size_t hash(const BlockAt& at) {
     std::uint64_t h = std::uint64_t(std::uint32_t(at[0])) * 0x9e3779b97f4a7c15ULL;
@@ -64,7 +66,7 @@ void GridLevel::index() {
     }
 }
 
-/// Points with their levels.
+/// The points, and for each the level of the finest grid around it.
 struct GridStack::Placed {
     [[nodiscard]] std::uint8_t level_of(std::size_t n) const { return levels.empty() ? 0 : levels[n]; }
     const std::vector<Vec3>& points;
@@ -110,7 +112,7 @@ std::array<std::int32_t, 3> GridStack::base(std::size_t level, const Vec3& world
 /// Adds blocks near the points of this level and around the blocks of the next finer level.
 void GridStack::add_blocks(std::size_t level, const Placed& placed) {
     std::vector<BlockAt>& blocks = levels_[level].blocks;
-    const int last = (1 << (levels_.size() - 1 - level)) - 1;  // along each axis
+    const int last = (1 << (levels_.size() - 1 - level)) - 1;  // last block along each axis
     const auto add = [&](const BlockAt& low, const BlockAt& high) {
         BlockAt from, to;
         for (std::size_t a = 0; a < 3; ++a) from[a] = std::max(0, low[a] >> 3), to[a] = std::min(last, high[a] >> 3);
@@ -128,8 +130,8 @@ void GridStack::add_blocks(std::size_t level, const Placed& placed) {
             add(shifted(first, -kGrading, -kGrading, -kGrading),
                 shifted(first, 4 + kGrading, 4 + kGrading, 4 + kGrading));
         }
-    // For each block with points, masks of the neighbouring blocks that the points need. Duplicates are removed so that
-    // few blocks are added repeatedly.
+    // For each point, its block and a mask with three bits for each axis: whether the point needs the block before its
+    // own, its own and the block after it. Duplicates, which are frequent for neighbouring points, are removed.
     std::vector<std::pair<BlockAt, std::uint32_t>> needs;
     for (std::size_t n = 0; n < placed.points.size(); ++n) {
         if (std::min<std::size_t>(placed.level_of(n), levels_.size() - 1) != level) continue;

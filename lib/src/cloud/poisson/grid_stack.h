@@ -16,30 +16,34 @@ constexpr int kBlockSide = 8;
 constexpr std::size_t kBlockNodes = 512;
 constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
-/// Nodes of one cell size. Node (i, j, k) of a block is at 64 i + 8 j + k.
+/// One grid of the stack: its nodes have one cell size. Node (i, j, k) of a block is at index 64 i + 8 j + k.
 class GridLevel {
 public:
     double cell = 1;                                    ///< distance between nodes, world units
     std::vector<BlockAt> blocks;                        ///< sorted
-    std::vector<std::array<std::uint32_t, 27>> beside;  ///< neighbours; the block itself at 13; kNoBlock: none
-    std::vector<std::array<std::uint32_t, 8>> finer;    ///< its eight blocks of the finer level, or kNoBlock
-    std::vector<std::uint32_t> coarser;                 ///< the block of the coarser level that contains it
-    std::vector<std::array<std::uint32_t, 6>> ghost;    ///< number of each face with no block beyond it, or kNoBlock
-    std::size_t ghosts = 0;                             ///< number of such faces
-    std::array<std::vector<std::uint32_t>, 2> colours;  ///< blocks with even and with odd coordinate sum
+    std::vector<std::array<std::uint32_t, 27>> beside;  ///< the 3^3 blocks around each, itself at 13, or kNoBlock
+    std::vector<std::array<std::uint32_t, 8>> finer;    ///< the 8 finer blocks within each, or kNoBlock
+    std::vector<std::uint32_t> coarser;                 ///< for each block, the coarser block around it
+    /// For each face of each block, a running number if there is no block beyond the face, else kNoBlock.
+    std::vector<std::array<std::uint32_t, 6>> ghost;
+    std::size_t ghosts = 0;                             ///< number of faces without a block beyond them
+    std::array<std::vector<std::uint32_t>, 2> colours;  ///< blocks with even and with odd sum of coordinates
     [[nodiscard]] std::uint32_t find(const BlockAt& at) const;
 
-    /// Points whose splines reach nodes of this level, grouped by the block of their cell, which need not exist.
+    /// Points whose splines reach nodes of this level, grouped by the block that would contain their cell. This block
+    /// need not exist.
     struct Source {
         BlockAt at;
-        std::uint32_t begin, end;                 ///< in `order`
-        std::array<std::uint32_t, 27> targets{};  ///< blocks that the splines may reach
+        std::uint32_t begin, end;                 ///< range in `order`
+        std::array<std::uint32_t, 27> targets{};  ///< the 3^3 blocks around `at`, or kNoBlock
     };
     std::vector<Source> sources;
-    std::array<std::vector<std::uint32_t>, 8> source_colours;  ///< no two sources of a colour reach the same node
-    std::vector<std::uint32_t> order;                          ///< points, sorted by source
+    /// Sources in eight groups. No two sources of a group reach the same node, so they can be processed in parallel.
+    std::array<std::vector<std::uint32_t>, 8> source_colours;
+    std::vector<std::uint32_t> order;  ///< indices of the points, sorted by source
 
-    /// Computes all other members from the blocks, which it sorts and makes unique.
+    /// Sorts the blocks, removes duplicates, and computes from them `beside`, `ghost`, `ghosts`, `colours` and the
+    /// table of find(). `finer` and `coarser` are set to kNoBlock.
     void index();
 
 private:
@@ -51,13 +55,14 @@ public:
     /// @param levels  for each point, the level of the finest grid around it, whose cells are cell * 2^level; empty: 0
     /// for all
     /// @param cell    cell size of the finest grid, world units
-    /// @param beyond  minimum margin of the coarsest grid on each side of the points, in units of their longest side
+    /// @param beyond  minimum margin of the coarsest grid on each side of the points, in units of the longest
+    /// side of the points' box
     GridStack(const std::vector<Vec3>& points, const std::vector<std::uint8_t>& levels, double cell, double beyond);
 
     [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }  ///< the finest first
-    [[nodiscard]] const Vec3& origin() const { return origin_; }                    ///< of node 0 of all levels
-    /// The border of the coarsest level, where values are 0, consists of its nodes below 1 and from end() on along each
-    /// axis.
+    [[nodiscard]] const Vec3& origin() const { return origin_; }                    ///< world position of node 0
+    /// The values at the border of the coarsest level are fixed to 0: at nodes whose index along any axis is 0, or is
+    /// at least end() along that axis.
     [[nodiscard]] const std::array<int, 3>& end() const { return end_; }
     [[nodiscard]] double cell() const { return levels_.front().cell; }
     [[nodiscard]] std::size_t block_count() const;
@@ -84,7 +89,7 @@ public:
     struct Sample {
         double value;
         Vec3 gradient;  ///< 1 / world unit
-        double cell;    ///< of the level used
+        double cell;    ///< cell size of the level that was used, world units
     };
     [[nodiscard]] Sample at(const Vec3& world) const;
     [[nodiscard]] double value_at(const Vec3& world) const;

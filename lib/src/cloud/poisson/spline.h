@@ -16,7 +16,8 @@ inline Float4 load4(const float* p) {
 
 inline double sum_of(Float4 v) { return double((v[0] + v[1]) + (v[2] + v[3])); }
 
-/// Weights of the 4 nodes around a position along each axis, and their derivatives per cell.
+/// Weights w of the four nodes around a position along each axis, and the derivatives d of these weights with respect
+/// to the position in cells.
 struct Spline {
     /// @param within  position in the cell, 0 to 1 along each axis
     explicit Spline(const std::array<double, 3>& within) {

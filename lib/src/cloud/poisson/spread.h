@@ -14,7 +14,7 @@ namespace covol::cloud {
 template <typename Row>
 void spread_on(const GridStack& stack, const std::vector<Vec3>& points, std::size_t l, std::vector<float>& nodes,
                Row row) {
-    constexpr std::size_t kSide = 12;  // nodes -1 to 9 relative to a block, rounded up to a multiple of 4
+    constexpr std::size_t kSide = 12;  // nodes -1 to 9 of a block, rounded up to a multiple of 4
     const GridLevel& level = stack.levels()[l];
     for (const std::vector<std::uint32_t>& colour : level.source_colours)
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, colour.size(), 4), [&](const auto& some) {

@@ -10,14 +10,16 @@
 namespace covol::cloud {
 namespace {
 
-/// The 4^3 nodes around a position, and the position within their middle cell.
+/// The values of the 4^3 nodes around a position, the position within their middle cell (0 to 1 along each axis), and
+/// the cell size.
 struct Surrounding {
     float nodes[64];
     std::array<double, 3> within;
     double cell;
 };
 
-/// Collects the nodes around a position. @return whether all of them exist; with `whole`, missing nodes are 0 instead
+/// Collects the nodes around a position. @return whether all of them exist
+/// @param whole  for the coarsest level: a position beyond its end is moved to the end, and missing nodes are 0
 bool collect(const GridLevel& level, const float* values, const Vec3& origin, const Vec3& world, bool whole,
              Surrounding& s) {
     BlockAt at;

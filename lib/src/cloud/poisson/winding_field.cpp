@@ -32,7 +32,7 @@ void collect_nodes(const GridLevel& grid, const std::vector<float>& values, std:
     for (int i = low[0]; i < low[0] + count; ++i)
         for (int j = low[1]; j < low[1] + count; ++j)
             for (int k = low[2], run = 0; k < low[2] + count; k += run, out += run) {
-                run = std::min(8 - (k & 7), low[2] + count - k);  // within one block
+                run = std::min(8 - (k & 7), low[2] + count - k);  // up to the end of the block
                 const std::uint32_t b = grid.beside[block][beside_at(i, j, k)];
                 if (b == kNoBlock)
                     std::fill_n(out, run, 0.0F);
@@ -61,7 +61,8 @@ const float* WindingField::screen_of(std::size_t l, std::size_t block) const {
     return levels_[l].screen.empty() ? nullptr : levels_[l].screen.data() + block * kBlockNodes;
 }
 
-/// Copies the block's solution and the values across its faces.
+/// Copies the block's solution, and one layer of values across each of its faces: those of the next block or, if there
+/// is none, the ghosts.
 void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
     const std::vector<float>& u = solution_.values[l];
     const float* own = u.data() + block * kBlockNodes;
@@ -71,7 +72,7 @@ void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
     constexpr std::size_t kFaces[6] = {4, 22, 10, 16, 12, 14};
     constexpr std::size_t kNodeStep[3] = {64, 8, 1}, kPaddedStep[3] = {100, 10, 1};
     for (std::size_t face = 0; face < 6; ++face) {
-        const std::size_t axis = face / 2, b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;  // b, c: along the face
+        const std::size_t axis = face / 2, b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;  // b, c: parallel to the face
         const std::uint32_t other = grid(l).beside[block][kFaces[face]];
         const bool high = (face & 1) != 0;
         const float* from;
@@ -90,7 +91,8 @@ void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
 }
 
 void WindingField::sweep(std::size_t l) {
-    for (const std::vector<std::uint32_t>& colour : grid(l).colours)  // blocks of a colour have no common faces
+    // Blocks of one colour have no faces in common, so they can be processed in parallel.
+    for (const std::vector<std::uint32_t>& colour : grid(l).colours)
         for_blocks(colour.size(), [&](std::size_t n) {
             const std::size_t block = colour[n];
             float padded[kPadded];
@@ -114,7 +116,7 @@ void WindingField::find_residual(std::size_t l) {
 
 /// Sets the values beyond the faces at which the grid of level l ends, by trilinear interpolation of the coarser grid.
 void WindingField::set_ghosts(std::size_t l) {
-    if (l + 1 == levels_.size()) return;  // the border values are 0
+    if (l + 1 == levels_.size()) return;  // the values beyond the coarsest grid are 0
     const GridLevel& fine = grid(l);
     for_blocks(fine.blocks.size(), [&](std::size_t block) {
         if (std::all_of(fine.ghost[block].begin(), fine.ghost[block].end(), [](auto g) { return g == kNoBlock; }))
@@ -160,7 +162,8 @@ void WindingField::restrict_from(std::size_t l) {
             for (std::size_t n = 0; n < 64; ++n) {
                 const std::size_t i = n / 16, j = n / 4 % 4, k = n % 4, to = first + i * 64 + j * 8 + k;
                 u[to] = solution_.values[l - 1][child * kBlockNodes + i * 128 + j * 16 + k * 2];
-                // The stencil is that of the weak form divided by h, and h doubles.
+                // The equations of each level are those of the weak form, divided by the cell size. The cells of level
+                // l are twice as large as those of level l - 1, so the sums are halved.
                 levels_[l].right[to] = 0.5F * sums[n];
             }
         });
@@ -181,7 +184,7 @@ void WindingField::restrict_from(std::size_t l) {
     });
 }
 
-/// Adds the change of the solution of level l + 1 since restrict_from() to level l.
+/// Adds the change of level l + 1 since restrict_from() to the solution of level l.
 void WindingField::correct(std::size_t l) {
     std::vector<float>& change = levels_[l + 1].before;
     tbb::parallel_for(std::size_t(0), change.size(),

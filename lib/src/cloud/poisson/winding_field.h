@@ -1,8 +1,8 @@
 #pragma once
 // The indicator function of a solid from points with normals on its border: the solution chi of the Poisson equation
 // div grad chi = -div V, where V is the sum of area * normal at the points (Kazhdan, Bolitho and Hoppe, Poisson surface
-// reconstruction, SGP 2006), which is the generalised winding number of the same points (Barill et al., 2018). The
-// equation is solved on a stack of grids, which are finer only near the points. At each position, the finest grid
+// reconstruction, SGP 2006). chi is also the generalised winding number of these points (Barill et al., 2018). The
+// equation is solved on a stack of grids; fine grids exist only near the points. At each position, the finest grid
 // represents the equation and the coarser grids correct its solution (full approximation storage; Brandt, Multi-level
 // adaptive solutions to boundary-value problems, Math. Comp. 31, 1977); nodes beyond a grid's end are interpolated from
 // the next coarser one.
@@ -36,9 +36,9 @@ public:
 private:
     struct Level {
         std::vector<float> right, residual;
-        std::vector<float> before;  ///< solution before the correction by this level, then its change
-        std::vector<float> ghosts;  ///< 8^2 nodes for each face without a block beyond it
-        std::vector<float> screen;  ///< weights at the nodes, or empty
+        std::vector<float> before;  ///< solution after restrict_from(); in correct(), its change since
+        std::vector<float> ghosts;  ///< 8^2 values for each face without a block beyond it
+        std::vector<float> screen;  ///< weights at the nodes by screen(), or empty
     };
     void cycle(std::size_t l);
     void sweep(std::size_t l);

@@ -1,6 +1,6 @@
 #pragma once
-// Blends quadrics over the voxels of one leaf, eight at a time. Lengths are world units relative to the leaf's first
-// voxel; voxel (i, j, k) of 8^3 is at index 64 i + 8 j + k.
+// Blends quadrics over the voxels of one leaf, eight at a time. Positions are relative to the leaf's first voxel, in
+// world units; voxel (i, j, k) of 8^3 is at index 64 i + 8 j + k.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,10 +20,11 @@ struct BlendPiece {
 
 struct BlendLeaf {
     static constexpr float kNone = 1e30F;
-    alignas(32) std::array<float, 512> fraction;               ///< minimum of (distance from a foot / reach) squared
+    alignas(32) std::array<float, 512> fraction;               ///< minimum of (distance from foot / reach)^2
     alignas(32) std::array<std::int32_t, 512> nearest;         ///< piece with that minimum; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< normal of that piece
-    alignas(32) std::array<float, 512> sum, weight;            ///< sums over the pieces on the side of `normal`
+    /// Sums of weight * distance and of the weights, over the pieces whose normals are on the side of `normal`.
+    alignas(32) std::array<float, 512> sum, weight;
 };
 
 /// Fills a leaf of voxels of edge h. Rows whose voxels are all farther than `limit` from their nearest pieces are

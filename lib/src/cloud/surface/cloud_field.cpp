@@ -32,14 +32,16 @@ public:
     Pieces(std::vector<Quadric> quadrics, double h)
         : quadrics_(std::move(quadrics)), h_(h), cells_(feet(quadrics_), 4 * h) {
         std::vector<Quadric> sorted;
-        // Beyond the next nodes, even if the voxels are wider than the neighbourhoods.
+        // A quadric applies at least up to beyond the next nodes, even if the voxels are wider than the neighbourhoods
+        // of the fits.
         const double shortest = kCloud.coarse * kBlend.node_voxels * h;
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
             const double wanted = std::max(
                 {kBlend.reach_voxels * h, kBlend.reach_of_min * q.min_radius, kBlend.reach_of_radius * q.radius});
-            // The quadric was not fitted to points beyond the radius.
+            // Above this minimum, the reach is limited to less than the radius, because the quadric was not fitted to
+            // points beyond the radius.
             reach_.push_back(float(std::max(shortest, std::min(wanted, q.radius / kCommon.growth))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
@@ -95,7 +97,8 @@ private:
 
 namespace {
 
-constexpr double kMaxLeaves = 2e7;  // maximum length of the list before duplicates are removed
+// Maximum of the estimated number of leaves crossed by the indicator's surface, including duplicates.
+constexpr double kMaxLeaves = 2e7;
 
 /// Collects leaves of the domain from boxes of voxels.
 class LeafList {
@@ -188,7 +191,8 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
     return leaves;
 }
 
-/// Offsets to the leaves across the faces at which the narrow band continues.
+/// Offsets, in voxels, to those neighbouring leaves into which the narrow band continues: the leaves across the faces
+/// at which an absolute value is below `limit`.
 std::vector<Coord> continuing_faces(const Leaf& leaf, float limit) {
     const float* values = leaf.buffer().data();
     const auto inside = [&](int i, int j, int k) { return std::abs(values[i << 6 | j << 3 | k]) < limit; };
@@ -220,13 +224,14 @@ BlendSheet blend_sheet(const Sheet& sheet, const Vec3& leaf) {
     return result;
 }
 
-/// Fills one leaf.
+/// Fills leaves with the blend of the quadrics and the indicator, one leaf at a time.
 class Blend {
 public:
     Blend(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain)
         : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
-    /// Sets all values. Beyond the domain is outside, so that the surface is closed at its end.
+    /// Sets all values of a leaf. Voxels beyond the domain are outside, so that the surface is closed at the domain's
+    /// end.
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
         const Coord origin = leaf.origin();
@@ -286,7 +291,7 @@ private:
             {double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
     }
 
-    /// The pieces that may reach the voxels of the box, relative to it.
+    /// Collects the pieces that may reach the voxels of the box, with positions relative to the box's lowest corner.
     void gather(const WorldBox& box) {
         pieces_.find(box, ranges_);
         near_.clear();
@@ -370,8 +375,9 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
     return field;
 }
 
-/// Moves those points to the indicator's surface that are no farther from it than noise may have displaced them.
-/// Otherwise there would be nodes throughout the layer of points.
+/// Moves those points to the indicator's surface that are no farther from it than noise may have displaced them. The
+/// nodes of the quadrics are taken from the moved points; otherwise, there would be nodes throughout the thickness of a
+/// noisy layer of points.
 OrientedCloud near_level(OrientedCloud points, const Indicator& indicator, double noise) {
     const double maximum = kCommon.errors * noise;
     points.squares_off.clear();

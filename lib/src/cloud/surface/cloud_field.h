@@ -37,7 +37,7 @@ private:
 [[nodiscard]] FloatGridPtr level_set_of(const Indicator& indicator, const Domain& domain, const RunContext& run);
 
 /// Removes pieces with few points, joins pieces that were torn off, and gives the field of a whole cloud the topology
-/// of an indicator that has fewer pieces and handles.
+/// of the indicator's surface if this has fewer pieces and handles.
 void settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run);
 
 /// The field over a domain after settle(). Its zero level set is the surface, but its values are not distances and its

@@ -26,7 +26,7 @@
 namespace covol {
 namespace {
 
-/// Numbers of pieces, cavities and handles.
+/// Numbers of pieces and handles of a level set's surface.
 struct Complexity {
     Complexity(const FloatGrid& level_set, const RunContext& run) {
         try {
@@ -37,14 +37,14 @@ struct Complexity {
         }
     }
     int pieces = 0;  ///< including cavities
-    int all = 0;
+    int all = 0;     ///< pieces, cavities and handles
 };
 
 /// Gives a level set the topology of an indicator's surface, but only if that surface has fewer pieces and handles in
 /// total than the level set.
 struct TopologyOf {
     Complexity own;
-    std::size_t minimum;  // minimum number of points on a piece
+    std::size_t minimum;  // pieces with fewer points are removed from the indicator's surface
     const std::vector<Vec3>& points;
     const RunContext& run;
 
@@ -68,9 +68,10 @@ struct TopologyOf {
     }
 };
 
-/// Whether a considerable part of the surface is far from all points.
+/// Whether more than the fraction kCommon.minority of the surface's area is farther from all points than kCloud.coarse
+/// spacings, as in gaps between the points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const RunContext& run) {
-    constexpr std::uint64_t kTriangles = 100000;  // sufficient for a fraction accurate to a thousandth
+    constexpr std::uint64_t kTriangles = 100000;  // size of the sample: the fraction is accurate to about 0.001
     const double reach = kCloud.coarse * points.scale.spacing;
     const cloud::PointCells cells(points.points, reach);
     double all = 0, bare = 0;
@@ -100,8 +101,8 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
 
 void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     const Orientation& orientation = cloud.orientation;
-    // Noise creates spurious pieces with few points. If the points enclose nothing, a separate piece is not a thin part
-    // of a solid, and must have more.
+    // Noise creates spurious pieces with few points, which are removed. If the points enclose nothing, a separate piece
+    // is not a thin part of a solid, so it must have more points to be kept.
     const double fraction = cloud.encloses ? kCloud.few : kCloud.some, noises = report.noise / report.spacing;
     const auto minimum = std::size_t(
         std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
@@ -117,7 +118,8 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
     topology.hold(field, cloud.has_quadrics && orientation.screened ? *orientation.screened : *orientation.indicator,
                   report);
-    // Around gaps between the points, cells as small as their spacing create small handles.
+    // If the indicator's cells are as small as the spacing of the points, its surface has small handles around gaps
+    // between the points. The topology is then taken from an indicator with larger cells.
     if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
         topology.hold(field, *cloud::indicator_of(cloud.points, orientation, kCloud.coarse * cloud.scale.spacing, run),
                       report);

@@ -28,11 +28,11 @@ constexpr int kTurns = 6;                   // maximum number of iterations of k
 
 /// Points, and for each the index of the sheet to which it belongs.
 struct Parts {
-    static constexpr std::size_t kAll = 3;  // stands for all points instead of one part
+    static constexpr std::size_t kAll = 3;  // as an argument of bend(): all points instead of those of one sheet
     const std::vector<CreasePoint>& points;
     double radius;
     std::vector<std::uint8_t> of;
-    std::vector<double> weights;  // of the points, adapted to their distances
+    std::vector<double> weights;  // of the points; reweight() reduces them with the distance from the sheet
 
     Parts(const std::vector<CreasePoint>& all, double r) : points(all), radius(r) {
         for (const CreasePoint& p : points) weights.push_back(p.weight);
@@ -80,7 +80,7 @@ struct Parts {
         return true;
     }
 
-    /// Fits a quadric over a plane.
+    /// Replaces a plane by a quadric over it, fitted to the points of one sheet, unless these are too few.
     void bend(std::size_t part, Sheet& sheet) const {
         Matrix6 m = Matrix6::Zero();
         Vector6 right = Vector6::Zero();
@@ -104,7 +104,7 @@ struct Parts {
         sheet.c = {x[0] * radius, x[1], x[2], x[3] / radius, x[4] / radius, x[5] / radius};
     }
 
-    /// Assigns each point to its closest sheet. @return whether any changed
+    /// Assigns each point to its closest sheet. @return whether any assignment changed
     template <typename Distance>
     bool assign(const std::array<Sheet, 3>& sheets, std::size_t count, const Distance& distance) {
         bool changed = false;
@@ -161,7 +161,8 @@ bool divide(Parts& parts, std::size_t count) {
     return true;
 }
 
-/// Whether the points of each of the two sheets are below the other sheet on average.
+/// Whether the solid is convex at the crease between two sheets: the points of each of them are, on average, below the
+/// other one.
 bool is_convex(const Parts& parts, const std::array<Sheet, 3>& sheets, std::size_t a, std::size_t b) {
     double above = 0;
     for (std::size_t n = 0; n < parts.points.size(); ++n)
@@ -181,7 +182,8 @@ void combine(const Parts& parts, Crease& crease) {
     const int convex = with[0] + with[1] + with[2];
     crease.first_is_convex = convex >= 2;
     crease.others_are_convex = convex == 3 || convex == 1;
-    // If one pair differs from the other two, the sheet that is not in it must come first.
+    // If one of the three pairs is convex and the other two are not, or the reverse, the sheet that does not belong to
+    // this pair must come first.
     for (std::size_t n = 0; n < 3; ++n)
         if (convex % 3 != 0 && with[n] == (convex == 1)) std::swap(sheets[0], sheets[n]);
 }
@@ -196,6 +198,7 @@ double misfit_of(const std::vector<CreasePoint>& points, const auto& shape) {
     return std::sqrt(squares / weight);
 }
 
+/// Fits a crease of `count` sheets.
 /// @param misfit  misfit of the best fit so far: planes with a larger misfit are rejected
 std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double radius, std::size_t count,
                                  double misfit) {
@@ -222,7 +225,8 @@ std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double 
     }
     combine(parts, crease);
     crease.misfit = misfit_of(points, crease);
-    // Quadrics that are determined by few points are wrong beyond these; they are used only if planes fit badly.
+    // Quadrics that are determined by few points are wrong beyond these points. Quadrics are therefore fitted only if
+    // planes do not fit well, and used only if they fit clearly better.
     if (crease.misfit > kFlat * radius) {
         Crease bent = crease;  // All its sheets are fitted again because combine() may have swapped them.
         for (std::size_t n = 0; n < points.size(); ++n) parts.weights[n] = points[n].weight;

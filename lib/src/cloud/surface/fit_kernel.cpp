@@ -23,8 +23,8 @@ COVOL_INLINE Double4 dot(const Double4 (&a)[3], const Double4 (&b)[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// For each mask of lanes, the indices of the 32-bit halves of its lanes, in order, for a shuffle that moves these
-/// lanes to the front.
+/// For each of the 16 subsets (masks) of the four lanes: the number of its lanes, and the indices of their 32-bit
+/// halves in ascending order, for a shuffle that moves these lanes to the front of the vector.
 struct LanesFirst {
     alignas(32) std::int32_t halves[16][8] = {};
     std::size_t count[16] = {};
@@ -68,7 +68,7 @@ void FitPoints::clear(std::size_t room) {
 
 void FitPoints::fill_up() {
     for (std::size_t n = size; n % kFitLanes != 0; ++n) {
-        u[n] = 1;  // the weight is then 0
+        u[n] = 1;  // then 1 - u^2, and with it the weight, is 0
         v[n] = t[n] = count[n] = 0;
     }
 }

@@ -7,7 +7,7 @@ namespace covol::cloud {
 
 inline constexpr std::size_t kFitLanes = 4;
 
-/// A cloud in arrays of coordinates.
+/// A cloud as one array for each coordinate, for vector instructions.
 class FitCloud {
 public:
     void reserve(std::size_t count);
@@ -40,17 +40,18 @@ struct FitPoints {
 /// @pre clear() has reserved memory for all of them
 void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame, FitPoints& near);
 
-/// Weight of a point: count * near, near = (1 - u^2 - v^2 - t^2)^2.
+/// Sums over the points. Each is weighted by count * near, where near = (1 - u^2 - v^2 - t^2)^2.
 struct FitSums {
     double moments[15] = {};            ///< of u^a v^b: 1 | u v | uu uv vv | uuu uuv uvv vvv | uuuu uuuv uuvv uvvv vvvv
     double heights[6] = {};             ///< of t times 1 u v uu uv vv
     double squares = 0;                 ///< of count * near^2
-    double near = 0, near_squares = 0;  ///< without the counts
+    double near = 0, near_squares = 0;  ///< of near and of near^2, without the counts
 };
 [[nodiscard]] FitSums fit_sums(const FitPoints& points);
 
-/// Residual of t - height, height = x0 + x1 u + x2 v + x3 uu + x4 uv + x5 vv. Here near is (1 - u^2 - v^2)^2 without t:
-/// otherwise noise would be underestimated in balls that are hardly larger than it.
+/// Residual of t - height, where height = x0 + x1 u + x2 v + x3 uu + x4 uv + x5 vv. Here near is (1 - u^2 - v^2)^2,
+/// without t: otherwise, points far from the quadric would have small weights, and noise that is hardly smaller than
+/// the neighbourhood would be underestimated.
 struct FitResidual {
     double squares = 0;  ///< sum of count * near * (t - height)^2
     double weight = 0;   ///< sum of count * near

@@ -21,7 +21,8 @@ constexpr std::size_t kCheckEvery = 10'000;  // voxels between two checks for ca
 // surface, but not 0, so that triangles do not degenerate.
 constexpr double kHeld = 0.1;
 
-/// The 26 neighbours of a voxel, one bit each, with their adjacency.
+/// The 26 neighbours of a voxel, one bit each. For each neighbour, `beside6` and `beside18` are the other neighbours
+/// that are 6-adjacent and 18-adjacent to it.
 struct Neighbourhood {
     std::array<Coord, 26> offset;
     std::array<std::uint32_t, 26> beside6{}, beside18{};
@@ -62,7 +63,7 @@ private:
 
 const Neighbourhood kAround;
 
-/// The voxels adjacent to any of the front.
+/// The voxels that are adjacent to any voxel of the set `front`.
 std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& neighbours) {
     std::uint32_t all = 0;
     for (; front != 0; front &= front - 1) all |= neighbours[std::size_t(__builtin_ctz(front))];
@@ -83,7 +84,8 @@ bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::u
     return (touching & ~reached) == 0;
 }
 
-/// Whether a voxel can change its sign without a change of topology. @param inside  its neighbours that are inside
+/// Whether a voxel can change its sign without a change of topology.
+/// @param inside  set of its 26 neighbours that are inside
 bool is_simple(std::uint32_t inside) {
     return is_one_piece(inside, kAround.faces, kAround.beside6, 3) &&
            is_one_piece(~inside & 0x3FFFFFFU, kAround.faces_and_edges, kAround.beside18, 2);
@@ -149,7 +151,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunCo
         if (value.isVoxelValue()) compare(value.getCoord());
     for (auto value = rough.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
-    // Voxels between the two surfaces but far from both are active in neither.
+    // Voxels between the two surfaces but far from both are active in neither, and are found as neighbours of others.
     for (std::size_t n = 0; n < found.size(); ++n) {
         if (found.size() > maximum) return 0;
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)

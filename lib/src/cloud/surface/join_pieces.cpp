@@ -135,7 +135,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         const Gap gap = next->gap;
         if (!(gap.length < max_gap)) break;
         if (!has_points_along(gap)) {
-            next->gap = {};  // it may still be joined to another piece that is joined first
+            next->gap = {};  // the piece may still be joined to another small piece after that has been joined
             continue;
         }
         std::vector<double> around;
@@ -144,7 +144,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
             for (std::uint32_t n = range.begin; n < range.end; ++n)
                 if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < apart)
                     around.push_back(off);
-        // The radius is limited because parts thicker than the distance between points are not torn off.
+        // Only parts thinner than the distance between points are torn off, so the rod needs no larger radius.
         fill(level_set, gap, std::max(std::min(median(std::move(around)), 0.5 * apart), voxel));
         ++joined;
         const detail::KdTree own(std::move(next->surface));

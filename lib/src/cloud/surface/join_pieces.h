@@ -13,7 +13,7 @@ namespace covol::cloud {
 /// @param level_set  active near its surface and signed everywhere; values at the joints have the right sign but are
 /// not distances
 /// @param apart  spacing of the points or their noise, if that is larger
-/// @return how many were joined
+/// @return number of pieces that were joined
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run);
 
 /// The number of pieces of a solid that are not small.

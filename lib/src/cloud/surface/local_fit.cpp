@@ -25,8 +25,10 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 struct Fit {
     std::array<double, 6> c{};
-    double noise = 0;      // standard deviation of the points
-    double misfit = 0;     // of means of points, in which noise averages out, unlike the quadric's error
+    double noise = 0;  // standard deviation of the points from the quadric
+    // Standard deviation of the thinned points from the quadric. Each is the mean of several points, in which noise
+    // averages out, unlike an error of the quadric's shape.
+    double misfit = 0;
     double deviation = 0;  // standard deviation of c[0]
     bool good = false;
 };
@@ -85,7 +87,8 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
     if (std::hypot(m(0, 1), m(0, 2)) > kFit.max_off_centre * sum) return result;
-    // If the points lie near a line, as on narrow bodies, the quadric is undetermined across the line.
+    // If the points lie near a line, as on narrow bodies, the quadric is undetermined across the line. Such points are
+    // rejected.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
@@ -185,7 +188,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
-        if (seen.empty()) best.noise = now.noise;  // in wider neighbourhoods, the surface's shape adds to it
+        if (seen.empty()) best.noise = now.noise;  // in wider ones, the surface's shape adds to the noise
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
@@ -219,7 +222,7 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
     const std::optional<Crease> crease = crease_at(level, q.origin, normal, scratch);
     if (!crease) return;
     const std::array<Vec3, 3> axes = frame_of(crease->mean_normal());
-    // Moves along the normal to the sheets.
+    // Newton's method for the height at which the line along the mean normal meets the sheets.
     double height = 0;
     for (int step = 0; step < 4; ++step) {
         const Vec3 at = plus(q.origin, height, axes[2]);
@@ -236,8 +239,9 @@ void take_crease(const Level& level, const Vec3& normal, Quadric& q, Scratch& sc
     q.crease = std::make_shared<const Crease>(*crease);
 }
 
-/// A radius at which noise keeps the misfit of sheets below its limit, at most twice the usual radius, so that other
-/// creases are not included; 0 if there is none.
+/// Radius of the neighbourhoods in which creases are sought. It is so wide that the noise, as a fraction of the radius,
+/// is below the maximum misfit of the sheets, but at most twice the usual radius, so that other creases are not
+/// included. 0 if no radius satisfies both.
 double crease_radius_for(double spacing, double noise) {
     const double smallest = kCrease.radius * spacing, widest = 2 * smallest;
     if (noise > kCrease.max_misfit * widest) return 0;
@@ -280,7 +284,7 @@ public:
 
 private:
     std::vector<Level> levels_;
-    std::optional<Level> every_;  // not thinned, because that averages across creases
+    std::optional<Level> every_;  // all points: thinning would average across creases
 };
 
 /// The nodes that are not yet represented by a nearby quadric on the same sheet.
@@ -317,8 +321,8 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
     return left;
 }
 
-/// Removes quadrics that are fitted to a few sparse points near quadrics of much denser points: their neighbourhoods
-/// are so wide that they may belong to another side.
+/// Removes quadrics that are fitted to a few sparse points near quadrics of much denser points: the neighbourhoods of
+/// the former are so wide that they may contain points of another side of the body.
 std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
     if (quadrics.empty()) return {};
     std::vector<Vec3> feet;

@@ -22,12 +22,12 @@ struct OrientedCloud {
 /// The means of the points in each cell of the given edge, separately for the two sides of a sheet.
 [[nodiscard]] OrientedCloud thinned(const OrientedCloud& cloud, double edge);
 
-/// A sheet, or several sheets that meet, fitted to a neighbourhood. If there are several, the base class is the plane
-/// perpendicular to their mean normal, through the point at which the line along that normal from the origin intersects
-/// them.
+/// A sheet, or several sheets that meet, fitted to a neighbourhood. If there are several, the base class Sheet is the
+/// plane perpendicular to their mean normal, through the point at which the line along that normal from the origin
+/// intersects them.
 struct Quadric : Sheet {
-    double radius = 0;                     ///< of the neighbourhood of the fit
-    double min_radius = 0;                 ///< of the smallest neighbourhood with enough points
+    double radius = 0;                     ///< radius of the neighbourhood of the fit; 0: no fit
+    double min_radius = 0;                 ///< radius of the smallest neighbourhood with enough points
     double noise = 0;                      ///< standard deviation of the points along its normal
     double apart = 0;                      ///< edge of the cells from which the nodes were taken
     std::shared_ptr<const Crease> crease;  ///< null: a single sheet

@@ -19,10 +19,11 @@ namespace cloud {
 namespace {
 
 // All lengths are in voxels.
-constexpr double kOnSurface = 1;      // maximum distance of a vertex from the surface that a crease's sheets form
-constexpr double kBeside = 2;         // maximum difference between the distances of a moved vertex to two sheets
-constexpr double kOnCrease = 0.3;     // the same for a vertex that is moved onto the crease of the two sheets
-constexpr double kSame = 0.02;        // the same for a vertex that lies on both sheets
+constexpr double kOnSurface = 1;  // maximum distance of a vertex from the surface that a crease's sheets form
+// Maximum difference between the distances of a vertex to two sheets:
+constexpr double kBeside = 2;         // for it to be moved at all
+constexpr double kOnCrease = 0.3;     // for it to be moved onto the crease of the two sheets
+constexpr double kSame = 0.02;        // for it to count as lying on both sheets
 constexpr double kLongestMove = 1.5;  // maximum distance of a new position from the old or the estimated one
 
 constexpr double kNeedle = 0.2;       // maximum length of a degenerate triangle's shortest edge that is collapsed
@@ -36,7 +37,8 @@ std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {
     return feet;
 }
 
-/// A point near `from` at which these sheets meet, by Newton's method; none if it is not within `longest`.
+/// A point near `from` at which the given sheets meet, by Newton's method; none if it is farther away than `longest`.
+/// @param sheets  one bit for each sheet of the crease
 std::optional<Vec3> meeting(const Crease& crease, unsigned sheets, const Vec3& from, double longest) {
     Vec3 at = from;
     for (int step = 0; step < 5; ++step) {
@@ -98,7 +100,8 @@ private:
             if (std::has_single_bit(crease->sheets_at(place, kBeside * h_))) return;
             const unsigned on = crease->sheets_at(place, kOnCrease * h_);
             std::optional<Vec3> moved = meeting(*crease, on, place, kLongestMove * h_);
-            // A point on two sheets need not be on the surface that the crease's sheets form.
+            // A point on two sheets need not be on the surface that the crease's sheets form, for example if the third
+            // sheet cuts it off. The vertex is then moved to its own sheet only.
             if (!moved || std::abs(crease->distance(*moved)) > kSame * h_)
                 moved = meeting(*crease, 1U << crease->nearest(place), place, kLongestMove * h_);
             if (moved) put(v, *moved);
@@ -149,8 +152,8 @@ private:
                 divided += found != divided_.end();
             }
             if (divided == 0) continue;
-            // Rotates the triangle such that its first edge is divided, and of two divided edges, the other is the
-            // last.
+            // Rotates the triangle such that its first edge is divided and, if two edges are, these are the first and
+            // the last one.
             while (on[0] == kNone || (divided == 2 && on[2] == kNone)) {
                 std::rotate(t.begin(), t.begin() + 1, t.end());
                 std::rotate(on.begin(), on.begin() + 1, on.end());
@@ -244,7 +247,7 @@ private:
             std::uint32_t corner = 3 * triangle + shape.at_shortest;
             const std::uint32_t across = table.opposite(corner), kept = table.vertex(table.next(corner)),
                                 gone = table.vertex(table.previous(corner));
-            // Keeps the vertex on more sheets.
+            // Of the two vertices, that on more sheets is kept, so that vertices on creases and at corners remain.
             if (across != meshing::CornerTable::kNone && count_sheets(gone) > count_sheets(kept)) corner = across;
             if (table.can_collapse(corner)) return table.collapse(corner);
         }
@@ -259,7 +262,7 @@ private:
     }
 
     struct Shape {
-        std::uint32_t at_longest, at_shortest;  ///< corners opposite to these edges
+        std::uint32_t at_longest, at_shortest;  ///< corners (0 to 2) opposite to the longest and the shortest edge
         double shortest;                        ///< length of the shortest edge
         double height;                          ///< over the longest edge
     };

@@ -23,14 +23,15 @@ struct Sheet {
     [[nodiscard]] Vec3 foot() const;         ///< the sheet's point above or below `origin`
 };
 
-/// Two or three sheets that meet. The solid is first & second or first | second; with three sheets it is first &
-/// (second & third) with either operator at either position.
+/// Two or three sheets that meet. Each bounds a solid that lies below it. The solid of the crease is the intersection
+/// of the first one with the others if first_is_convex is set, else their union; with three sheets, `others` stands for
+/// the intersection or the union of the second and the third, depending on others_are_convex.
 struct Crease {
     std::array<Sheet, 3> sheets;
     std::size_t count = 0;
     bool first_is_convex = true;    ///< whether the solid is convex between the first and the others
     bool others_are_convex = true;  ///< the same between the second and the third
-    double misfit = 0;              ///< root mean square distance of the points
+    double misfit = 0;              ///< root mean square distance of the points from the crease's surface
     [[nodiscard]] double distance(const Vec3& world) const;
     /// The sheet that determines the distance.
     [[nodiscard]] std::size_t nearest(const Vec3& world) const;

@@ -47,8 +47,8 @@ void convert_row(const ChunkedArray& array, const char* from, std::uint64_t step
     if (array.swap) swap_bytes(to, count, array.stored_bytes());
 }
 
-/// The size of a chunk, limited to that of the image: if an axis has a single chunk, the chunk may be longer than the
-/// image, in a damaged file by any amount.
+/// The size of a chunk, limited to the size of the image. The limit is needed because the only chunk along an axis may
+/// be longer than the image, in a damaged file by any amount.
 Index3 chunk_size_of(const ChunkedArray& array, const ArrayAxes& axes, const Index3& size) {
     Index3 chunk;
     for (int a = 0; a < 3; ++a)

@@ -16,11 +16,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxAxes = 16, kMaxLevels = 64, kMaxChannels = 4096;
 
-/// The attributes of a group: the object "ome" if the file has one, and the file that they come from.
+/// The attributes of a group, or the object "ome" among them if there is one, and the file that contains them.
 struct Attributes {
     Json json;
     std::string file;
-    std::string version;  ///< from OME-Zarr 0.5 on
+    std::string version;  ///< stated here from OME-Zarr 0.5 on; empty for older versions
 };
 
 std::optional<Attributes> read_attributes(const std::string& folder) {
@@ -69,7 +69,7 @@ private:
 
     void read_axes() {
         const Json& axes = member(json_, "axes");
-        if (axes.is_null())  // before OME-Zarr 0.3
+        if (axes.is_null())  // before OME-Zarr 0.3, no axes are stated
             for (const char* name : {"t", "c", "z", "y", "x"}) image_.axes.push_back({name, "", ""});
         else if (!axes.is_array() || axes.size() > kMaxAxes)
             throw wrong("expected a list of axes in its multiscales");
@@ -91,7 +91,7 @@ private:
         return values;
     }
 
-    /// Applies transformations one after the other. @returns whether there was a translation among them.
+    /// Applies a list of transformations to a level, one after the other. @returns whether one of them is a translation
     bool apply(const Json& transformations, OmeLevel& level) const {
         bool translated = false;
         if (transformations.is_null()) return translated;

@@ -29,7 +29,7 @@ std::string list_text(const Numbers& numbers, const char* between) {
     return text.str();
 }
 
-/// The axes of an array, one letter for each dimension: x, y, z, c, t, or ? for another.
+/// The axes of an array, one letter for each dimension: x, y, z, c, t, or ? for any other axis.
 std::string letters_of(const std::string& path, const std::vector<OmeAxis>& axes) {
     std::string letters;
     for (const OmeAxis& axis : axes) {
@@ -71,8 +71,8 @@ std::vector<OmeAxis> axes_without_ome(const ZarrArray& array) {
     return axes;
 }
 
-/// The path of the image if a group holds a single image in a subfolder, as written by bioformats2raw. @throws Error
-/// Unsupported otherwise: lists the contents.
+/// The path of the only image in a group that holds it in a subfolder, as bioformats2raw writes it. @throws Error
+/// Unsupported if the group has other contents, which the message lists.
 std::string only_image_of(const std::string& path) {
     const OmeGroup group = read_ome_group(path);
     if (group.is_series && group.images.size() == 1) return path + "/" + group.images.front();
@@ -193,7 +193,8 @@ private:
         }
     }
 
-    /// Describes a level: "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2"; "1: cannot be read" if its metadata is invalid.
+    /// Describes a level for users: "1: 1024 x 1024 x 1024, spacing 2 x 2 x 2"; "1: cannot be read" if its metadata is
+    /// invalid.
     [[nodiscard]] std::string level_text(const OmeLevel& level) const {
         std::string text = level.path + ": ";
         try {
@@ -208,7 +209,8 @@ private:
     }
 
     /// A level without a translation has the wrong position if its voxels are means of those of level 0: the centre of
-    /// its first voxel is then the centre of several voxels of level 0. Corrects this, or warns about it.
+    /// its first voxel is then the centre of several voxels of level 0. Corrects the origin if `correct` is set;
+    /// otherwise warns.
     void describe_shift(bool correct, const RunContext& run) {
         if (!ome_ || level_ == 0 || ome_->levels[level_].has_translation) return;
         const Vec3 own = along_axes(ome_->levels[level_].scale), finest = along_axes(ome_->levels[0].scale);

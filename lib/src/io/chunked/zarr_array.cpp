@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMaxDimensions = 16;
 constexpr std::uint64_t kMaxIndexed = std::uint64_t(1)
-                                      << 22;  ///< maximum number of chunks in a shard: an index of 64 MiB
+                                      << 22;  ///< maximum number of chunks in a shard, whose index then needs 64 MiB
 
 /// Reads the metadata of one array.
 class ArrayReader {
@@ -143,7 +143,8 @@ void ArrayReader::set_fill(const Json& value) {
         throw wrong("its fill_value " + std::to_string(array_.fill) + " is not a valid " + to_string(array_.type));
 }
 
-/// Limits the size of a chunk, because it is unpacked as a whole, including all of its channels and frames.
+/// Limits the size of a chunk, because a chunk is unpacked into memory as a whole, including all of its channels and
+/// frames.
 void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -293,7 +294,8 @@ void ArrayReader::read_codecs(const Json& codecs) {
                               quote(codec_name(codecs.back())));
     }
     if (!has_bytes) throw wrong("expected the codec bytes or sharding_indexed among its codecs");
-    if (!array_.strides.empty()) return;  // set by the codecs within shards
+    // read_shards() has already called this function for the codecs within shards, which set the strides.
+    if (!array_.strides.empty()) return;
     check_chunk();
     set_strides(slowest_first);
 }

@@ -21,19 +21,19 @@ struct ZarrShards {
 /// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html, https://zarr-specs.readthedocs.io/en/latest/v3/core/
 struct ZarrArray : ChunkedArray {
     std::string folder;
-    std::string metadata;  ///< the file that the metadata comes from
+    std::string metadata;  ///< path of the file with the metadata of the array
     int version = 2;
     std::vector<ZarrCodec> codecs;
     ZarrShards shards;
-    std::string key_begin;  ///< beginning of a chunk's file name: "c/"
+    std::string key_begin;  ///< beginning of the name of each chunk's file, such as "c/"
     char separator = '.';
     std::vector<std::string> dimension_names;  ///< empty, or one for each dimension
 
-    /// The file of the chunk or shard at this position in the grid.
+    /// The path of the file with the chunk or shard at this position in the grid of chunks or shards.
     [[nodiscard]] std::string file_of(const std::vector<std::uint64_t>& place) const;
 };
 
-/// Whether a folder is an array, not a group.
+/// Whether a folder is an array of a Zarr store; false for groups and other folders.
 bool is_zarr_array(const std::string& folder);
 
 /// @throws Error InvalidInput, Io, Unsupported.

@@ -38,7 +38,8 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kMaxEntries = std::uint64_t(1) << 22;  ///< 64 MiB
+    /// Maximum number of index entries that are kept: 64 MiB.
+    static constexpr std::uint64_t kMaxEntries = std::uint64_t(1) << 22;
 
     [[nodiscard]] std::shared_ptr<const ShardIndex> read(const std::string& path, const StoreFile& file) const {
         const std::uint64_t bytes = count_ * sizeof(ShardEntry) + (shards_.index_has_checksum ? 4 : 0);
@@ -86,7 +87,7 @@ private:
     }
 
     [[nodiscard]] std::optional<Bytes> read_shard(std::vector<std::uint64_t> place, std::string& path) const {
-        std::uint64_t number = 0;  // within the shard, the last dimension fastest
+        std::uint64_t number = 0;  // index of the chunk within the shard; the last dimension varies fastest
         for (std::size_t d = 0; d < place.size(); ++d) {
             const std::uint64_t count = array_.shards.counts[d];
             number = number * count + place[d] % count;

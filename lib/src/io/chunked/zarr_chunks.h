@@ -5,7 +5,7 @@
 
 namespace covol::detail {
 
-/// The chunks of one channel and frame. Dimensions other than the axes have one element.
+/// The chunks of one channel and frame. Dimensions that are not in `axes` must have a single element.
 std::shared_ptr<const ChunkSource> zarr_chunks(const ZarrArray& array, const ArrayAxes& axes, const Index3& size,
                                                std::uint64_t channel, std::uint64_t frame);
 

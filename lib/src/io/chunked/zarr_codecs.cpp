@@ -33,7 +33,8 @@ struct Packed {
 };
 
 /// Maximum number of unpacked bytes for one packed byte. Deflate encodes at most 258 bytes in two bits, LZ4 adds at
-/// most 255 to a length with each byte, zstd encodes a block of 128 KiB in at least 4 bytes. Blosc may use zstd.
+/// most 255 to a length with each byte, zstd encodes a block of 128 KiB in at least 4 bytes. Blosc has the ratio of
+/// zstd, because it may use zstd.
 std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     switch (codec) {
         case ZarrCodec::Deflate: return 1032;
@@ -45,7 +46,8 @@ std::uint64_t max_unpacked_of_byte(ZarrCodec codec) {
     return 1;
 }
 
-/// Rejects packed bytes that are too few to be unpacked to `packed.maximum` bytes. @throws Error InvalidInput.
+/// Rejects a chunk whose packed bytes are too few for `packed.maximum` unpacked bytes, before memory is allocated.
+/// @throws Error InvalidInput.
 void check_ratio(const Packed& packed, ZarrCodec codec) {
     if (packed.maximum / max_unpacked_of_byte(codec) > packed.bytes.size())
         throw packed.damaged("packed", std::to_string(packed.bytes.size()) + " bytes cannot hold a chunk of " +
@@ -74,7 +76,8 @@ Bytes unpack_zstd(const Packed& packed) {
     const Bytes& in = packed.bytes;
     const unsigned long long claimed = ZSTD_getFrameContentSize(in.data(), in.size());
     if (claimed == ZSTD_CONTENTSIZE_ERROR) throw packed.damaged("zstd", "it has no header");
-    // There may be several frames in a row, and a frame that was written as a stream does not state its size.
+    // `claimed` is only a check: the data may consist of several frames, and a frame that was written as a stream does
+    // not state its size. The output is therefore allocated with the maximum size.
     if (claimed != ZSTD_CONTENTSIZE_UNKNOWN) packed.check_claim("zstd", claimed);
     Bytes out(packed.maximum);
     const std::size_t got = ZSTD_decompress(out.data(), out.size(), in.data(), in.size());
@@ -91,7 +94,7 @@ Bytes unpack_deflate(const Packed& packed) {
     if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib could not be initialised");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
     Bytes out(packed.maximum);
-    char more = 0;  // one more byte, to detect excess output
+    char more = 0;  // receives one byte when `out` is full, so that excess output is detected
     std::uint64_t read = 0, written = 0;
     for (bool ended = false; !ended;) {
         const std::uint64_t room = out.size() - written, left = in.size() - read;
@@ -108,7 +111,7 @@ Bytes unpack_deflate(const Packed& packed) {
                                  "expected " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
         written += made;
         if (status == Z_STREAM_END) {
-            // A gzip file may contain several streams, one after another.
+            // The data may consist of several gzip streams, one after another.
             ended = read == in.size();
             if (!ended && inflateReset(&stream) != Z_OK) throw packed.damaged("zlib", "zlib could not continue");
         } else if (status != Z_OK || (taken == 0 && made == 0)) {
@@ -162,7 +165,8 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name) {
 }
 
 std::uint64_t max_packed_bytes(std::uint64_t unpacked) {
-    // Codecs enlarge incompressible data by a few per cent and by headers, and never to more than twice its size.
+    // Codecs enlarge incompressible data by headers and by a few per cent, far less than the factor of two that is
+    // allowed here.
     constexpr std::uint64_t kHeaders = 1U << 16;
     return 2 * unpacked + kHeaders;
 }

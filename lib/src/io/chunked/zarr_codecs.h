@@ -13,7 +13,7 @@ enum class ZarrCodec {
     Zstd,
     Deflate,  ///< zlib or gzip, according to the stream's header
     Lz4,      ///< as in numcodecs: the unpacked size in 4 bytes, then one LZ4 block
-    Crc32c    ///< a checksum after the bytes
+    Crc32c    ///< does not pack, but appends a checksum
 };
 
 /// The codec that has this name in the metadata of a Zarr 2 or 3 array. @param path  of the metadata, for messages
@@ -23,7 +23,7 @@ ZarrCodec zarr_codec(const std::string& path, const std::string& name);
 /// Upper bound for the packed size of `unpacked` bytes, for all codecs.
 std::uint64_t max_packed_bytes(std::uint64_t unpacked);
 
-/// Reverses the codecs, the last first. Sizes are checked before memory is allocated.
+/// Reverses the codecs, beginning with the last one. Sizes are checked before memory is allocated.
 /// @param path  of the file that contains `packed`
 /// @throws Error InvalidInput unless `packed` is valid and is unpacked to `expected` bytes.
 Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Bytes packed, std::uint64_t expected);

@@ -8,12 +8,12 @@
 
 #include "covol/error.h"
 
-// Files of a Zarr store. Their contents are untrusted.
+// Reads files of a Zarr store. Their contents are untrusted, because the store may come from anyone.
 namespace covol::detail {
 
 using Json = nlohmann::json;
 
-/// Bytes that occupy no physical memory until they are written to.
+/// An array of bytes that are not initialized, so that large arrays occupy physical memory only where they are written.
 class Bytes {
 public:
     Bytes() = default;
@@ -29,10 +29,11 @@ private:
     std::uint64_t size_ = 0;
 };
 
-/// A file that is open for reading. It is not mapped, because another process may truncate it while it is read.
+/// A file that is open for reading. It is not mapped, because accessing mapped memory would crash if another process
+/// truncated the file.
 class StoreFile {
 public:
-    /// @returns nothing if there is no such file. @throws Error Io.
+    /// Opens a file. @returns nothing if there is no such file. @throws Error Io.
     static std::optional<StoreFile> open(const std::string& path);
     StoreFile(StoreFile&& other) noexcept;
     StoreFile& operator=(StoreFile&&) = delete;
@@ -41,7 +42,7 @@ public:
     ~StoreFile();
 
     [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-    /// @throws Error InvalidInput if there are fewer bytes, Io.
+    /// Reads `count` bytes from the position `begin`. @throws Error InvalidInput if the file has fewer bytes, Io.
     [[nodiscard]] Bytes read(std::uint64_t begin, std::uint64_t count) const;
 
 private:
@@ -51,8 +52,8 @@ private:
     std::uint64_t size_;
 };
 
-/// @returns nothing if there is no such file. @throws Error InvalidInput (not JSON, or larger or more deeply nested
-/// than metadata can be), Io.
+/// Reads a JSON file. @returns nothing if there is no such file. @throws Error InvalidInput (not JSON, or larger or
+/// more deeply nested than metadata can be), Io.
 std::optional<Json> read_json(const std::string& path);
 
 /// Parses an object. @param path  of the text, for messages @throws Error InvalidInput.
@@ -63,8 +64,8 @@ const Json& member(const Json& object, const char* key);
 /// The text of a string; empty if `value` is not a string.
 std::string text_of(const Json& value);
 
-/// The path `inside` relative to `folder`. @throws Error InvalidInput, naming the metadata at `path`, if it leads
-/// outside of `folder`.
+/// The path `inside` relative to `folder`. @throws Error InvalidInput, which names the metadata file `path`, if the
+/// result would be outside of `folder`.
 std::string path_within(const std::string& path, const std::string& folder, const std::string& inside);
 
 }  // namespace covol::detail

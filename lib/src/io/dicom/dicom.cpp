@@ -1,4 +1,5 @@
-// DICOM: uncompressed pixels are read here, compressed ones by ITK's GDCM reader in a separate program (reader.h).
+// Reads DICOM series: uncompressed pixels are read here, compressed ones by ITK's GDCM reader in a separate program
+// (reader.h).
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -16,13 +17,14 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Whether a file is a DICOM object without an image, or a segmentation. Such files are often stored in the folder of a
-/// series: structure sets, plans, treatments, registrations, reports, presentations, documents (PS3.4 B.5).
+/// series, of which they are not slices: structure sets, plans, treatments, registrations, reports, presentations,
+/// documents (PS3.4 B.5).
 bool holds_no_image(const std::string& path) {
     const std::string own = dicom_class(path);
     constexpr std::string_view kClasses = "1.2.840.10008.5.1.4.1.1.";
     if (!own.starts_with(kClasses)) return false;
     const std::string kind = own.substr(kClasses.size());
-    if (kind == "481.1" || kind == "481.2") return false;  // RT images and doses
+    if (kind == "481.1" || kind == "481.2") return false;  // RT images and RT doses, which have pixels
     for (const char* group : {"481.", "66.", "88.", "11.", "104."})
         if (kind.starts_with(group)) return true;
     return false;
@@ -36,7 +38,7 @@ std::string kind_of_object(const std::string& sop_class) {
     return "SOP class " + sop_class;
 }
 
-/// All usable files of a folder, grouped by series.
+/// The slices of all usable files of a folder, by series UID. Warns about files that cannot be used.
 std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folder, const RunContext& run) {
     std::error_code status;
     std::vector<std::string> paths;
@@ -55,7 +57,8 @@ std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folde
         }
         for (const DicomSlice& slice : std::get<std::vector<DicomSlice>>(file)) series[slice.series].push_back(slice);
     }
-    // A missing slice between others is reported as an error later; one at an end can be reported only here.
+    // If an unusable file is a slice between others, the gap is reported as an error later. If it is a slice at an end
+    // of the series, only this warning reports it.
     if (passed_over > 0)
         run.warn(why + "; skipped" +
                  (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " other files of the folder" : "") +
@@ -83,7 +86,8 @@ public:
         info_.frames = int(volumes.size());
         info_.type = first.type;
         for (const DicomSlice& slice : slices_)
-            if (slice.type != first.type) info_.type = PixelType::Float;  // different rescaling of slices
+            // Slices may be rescaled to different types. The image then has the type Float.
+            if (slice.type != first.type) info_.type = PixelType::Float;
         info_.channels = int(std::max(1U, first.components));
         if (first.file_frames > 1)
             info_.fields.emplace_back("NumberOfFrames (0028,0008)", std::to_string(first.file_frames));
@@ -106,7 +110,8 @@ public:
     }
 
 private:
-    /// Rejects a series whose volumes have only one plane each: time points of one plane, or planes of many directions.
+    /// Rejects a series whose volumes have only one plane each, so that none is 3D: time points of one plane, or planes
+    /// of many directions.
     void check_depth(const std::vector<DicomVolume>& volumes) const {
         if (volumes.size() < 2 || volumes.front().slices.size() > 1) return;
         throw read_error(Errc::InvalidInput, path_,
@@ -116,12 +121,12 @@ private:
     }
 
     /// Calls use(slice, pixels) for the slices [begin, end), in this order, with all pixels of the slice. Uncompressed
-    /// slices are decoded one by one, compressed files several at once.
+    /// slices are decoded one by one, compressed files are decoded several at once.
     template <typename Use>
     void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
         constexpr std::uint64_t kMaxAtOnce = std::uint64_t(256) << 20;
         std::optional<DecodedPixels> packed;
-        std::map<std::string, std::size_t> numbers;  // path to index of the compressed files in `packed`
+        std::map<std::string, std::size_t> numbers;  // index in `packed` of each compressed file, by path
         for (std::size_t n = begin; n < end; ++n) {
             run.check();
             run.report("image", double(n - begin) / double(end - begin));

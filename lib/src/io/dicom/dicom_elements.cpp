@@ -14,7 +14,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // 2^32 - 1 means "undefined"
+constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // the length 2^32 - 1 means "undefined"
 
 template <typename T>
 std::string little_endian(T value) {
@@ -141,8 +141,8 @@ std::string dicom_uid(const std::string& text) {
         const char* const at = hex.data() + 2 * n;
         std::from_chars(at, at + 2, bytes[n], 16);
     }
-    bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // UUID version 8
-    bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // UUID variant
+    bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // sets the version of the UUID to 8
+    bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // sets the variant of the UUID to that of RFC 9562
     // Converts the 128 bits to one decimal number.
     std::string decimal = "0";
     for (const unsigned byte : bytes) {

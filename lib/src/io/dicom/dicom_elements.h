@@ -7,14 +7,14 @@
 
 #include "covol/fwd.h"
 
-// Elements for writing DICOM files: PS3.5 7.1, 7.5, and PS3.10 7.1.
+// Encodes the elements of DICOM files for writing: PS3.5 7.1, 7.5, and PS3.10 7.1.
 namespace covol::detail {
 
 /// The elements of a file or of an item of a sequence, sorted by tag (group << 16 | element).
 class DicomItem {
 public:
-    /// Replaces an element of the same tag.
-    /// @param vr  two letters
+    /// Adds an element, or replaces the element with the same tag.
+    /// @param vr  the value representation, two letters
     /// @param bytes  the value as in the file; put() pads it to an even length
     void put(std::uint32_t tag, const char* vr, std::string bytes);
     /// Numbers of 16 bits.
@@ -29,7 +29,8 @@ public:
     /// Adds the elements of another item; they replace elements with the same tags.
     void add(const DicomItem& other);
 
-    /// The elements one after another, little-endian. @param with_vr  explicit VR, otherwise implicit
+    /// The bytes of all elements one after another, little-endian. @param with_vr  whether the encoding is explicit VR;
+    /// otherwise it is implicit VR
     [[nodiscard]] std::string encoded(bool with_vr) const;
 
 private:
@@ -52,12 +53,14 @@ private:
 /// A number with at most 16 characters, as the VR DS requires.
 [[nodiscard]] std::string decimal_string(double value);
 
-/// A UID that is derived from a text: equal texts have equal UIDs. @see RFC 9562, UUIDs of version 8, and PS3.5 B.2
+/// A unique identifier (UID) that is derived from a text: equal texts have equal UIDs. @see RFC 9562, UUIDs of version
+/// 8, and PS3.5 B.2
 [[nodiscard]] std::string dicom_uid(const std::string& text);
 
 /// Writes a file with one instance, which is the only one of its series. The UIDs of the instance and of the series are
 /// derived from the contents.
-/// @param with_vr  explicit VR, otherwise implicit, which allows texts longer than 64 KiB
+/// @param with_vr  whether the encoding is explicit VR; otherwise it is implicit VR, which allows texts longer than 64
+/// KiB
 /// @throws Error Io, Unsupported if the length of an element does not fit into 32 bits.
 void write_dicom_instance(const std::string& path, DicomItem& file, bool with_vr, const std::string& sop_class);
 

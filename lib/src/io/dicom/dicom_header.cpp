@@ -22,7 +22,7 @@ namespace {
 constexpr std::uint32_t kUndefined = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
-constexpr std::uint32_t kMaxPixels = 65535;  // along a side
+constexpr std::uint32_t kMaxPixels = 65535;  // maximum number of pixels along a side of a frame
 constexpr int kDeepest = 16;
 
 constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
@@ -32,16 +32,16 @@ constexpr std::uint64_t kLongestValue = 1 << 12;
 constexpr std::uint64_t kPreamble = 128;
 
 constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
-/// Sequences outside functional groups that give the positions of frames: detectors (PS3.3 C.8.4.11), regions of
-/// ultrasound (C.8.5.5). Only the first item of each is used.
+/// Sequences outside functional groups that give the position or spacing of frames: detectors of nuclear medicine
+/// (PS3.3 C.8.4.11) and regions of ultrasound (C.8.5.5). Only the first item of each sequence is used.
 constexpr std::uint32_t kPositionSequences[] = {0x00186011, 0x00540022};
-/// The functional groups that are used: echo, frame content, position, orientation, position and orientation of
-/// volumes, time, pixel measures, rescaling.
+/// The functional groups (PS3.3 C.7.6.16) that are used: echo, frame content, position, orientation, position and
+/// orientation of volumes, time, pixel measures, rescaling.
 constexpr std::uint32_t kGroups[] = {0x00189114, 0x00209111, 0x00209113, 0x00209116, 0x0020930E,
                                      0x0020930F, 0x00209310, 0x00289110, 0x00289145};
 
 /// The value representations (VR) that PS3.6 prescribes for the elements that describe an image. Debian's GDCM
-/// terminates the process if a file uses other VRs, even in a sequence.
+/// terminates the process if an element has another VR, even within a sequence.
 struct Representation {
     std::uint32_t tag;
     std::string_view vr;
@@ -58,10 +58,10 @@ constexpr Representation kRepresentations[] = {
     {0x00281102, "US"}, {0x00281103, "US"}, {0x00282110, "CS"}, {0x00282112, "DS"}, {0x00282114, "CS"},
     {0x00409224, "FD"}, {0x00409225, "FD"}, {0x3004000C, "DS"}, {0x3004000E, "DS"}};
 
-/// "UN" (unknown) is accepted for all tags.
+/// Whether an element may have this VR. "UN" (unknown) is accepted for all tags.
 bool has_expected_vr(std::uint32_t tag, std::string_view vr) {
     if (vr == "UN") return true;
-    // The descriptors of palettes (tags 0028,1101 to 1103) are signed if the pixels are.
+    // The descriptors of palettes (tags 0028,1101 to 1103) are signed (SS) if the pixels are signed.
     if (vr == "SS" && tag >= 0x00281101 && tag <= 0x00281103) return true;
     const auto* known = std::lower_bound(std::begin(kRepresentations), std::end(kRepresentations), tag,
                                          [](const Representation& r, std::uint32_t t) { return r.tag < t; });
@@ -108,7 +108,8 @@ public:
         if (syntax.rfind("1.2.840.10008.1.2", 0) != 0 || syntax == kDeflated) return false;
         explicit_ = syntax != "1.2.840.10008.1.2";
         big_ = syntax == "1.2.840.10008.1.2.2";
-        // Pixels are encapsulated in fragments if and only if the syntax is compressed.
+        // The pixels must be encapsulated in fragments if the transfer syntax is a compressed one, and must not be
+        // otherwise.
         const bool plain = syntax == "1.2.840.10008.1.2" || syntax == "1.2.840.10008.1.2.1" || big_;
         header_.big_endian = big_;
         return at_ < size_ && walk(size_, false, 0) && describes_pixels() && header_.encapsulated != plain &&
@@ -116,8 +117,8 @@ public:
     }
 
 private:
-    /// The transfer syntax of a file without a meta group, from its first element: the group number shows the byte
-    /// order, and two capital letters after the tag mean explicit VR.
+    /// The transfer syntax of a file without a meta group, from its first element: the two bytes of the group number
+    /// show the byte order, and two capital letters after the tag mean explicit VR.
     std::string inferred_syntax() {
         const std::uint64_t begin = at_;
         char first[6] = {};
@@ -184,7 +185,8 @@ private:
         }
         return !in_item && at_ == end;
     }
-    /// The map that receives the elements of an item of the sequence `tag`; null if they are not needed.
+    /// The map that receives the elements of the item with index `item` of the sequence `tag`; null if these elements
+    /// are not needed.
     DicomValues* values_of_item(std::uint32_t tag, int depth, std::size_t item) {
         const bool outermost = depth == 1;
         if (outermost && tag == kFrameGroups) {
@@ -196,7 +198,7 @@ private:
         return depth == 2 && is_one_of(tag, kGroups) ? destination_ : nullptr;
     }
     bool walk_value(const Element& e, std::uint64_t end, int depth) {
-        // With implicit VR, a sequence of known length can only be recognized by its tag.
+        // With implicit VR, no VR marks a sequence. If its length is known, only its tag shows that it is a sequence.
         const bool is_known = !explicit_ && (e.tag == kSharedGroups || e.tag == kFrameGroups ||
                                              is_one_of(e.tag, kPositionSequences) || is_one_of(e.tag, kGroups));
         const bool sequence = e.vr == "SQ" || is_known || (e.length == kUndefined && e.tag != kPixelData);
@@ -314,7 +316,8 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 std::string dicom_class(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a named pipe would wait for a writer
-    constexpr std::size_t kMeta = 1024;                              // bytes; the SOP class is near the beginning
+    // [bytes] Size of the part that is searched; the SOP class is near the beginning.
+    constexpr std::size_t kMeta = 1024;
     std::string begin(kMeta, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), std::streamsize(begin.size()));
@@ -337,7 +340,7 @@ bool is_dicom(const std::string& path) {
     const auto bytes = static_cast<std::size_t>(file.gcount());
     if (bytes == begin.size() && std::memcmp(begin.data() + kPreamble, "DICM", 4) == 0) return true;
     if (bytes < 12) return false;
-    // Without "DICM", the file must begin with an element of group 0002 or 0008 with a plausible length or a known VR.
+    // Without "DICM", the file must begin with an element of group 0002 or 0008, with a known VR or a plausible length.
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(begin[at]); };
     const bool big = byte(0) == 0;
     const unsigned group = big ? byte(1) : byte(0), other = big ? byte(0) : byte(1);

@@ -12,7 +12,8 @@ inline constexpr std::uint32_t kSamples = 0x00280002, kRows = 0x00280010, kColum
 inline constexpr std::uint32_t kBitsAllocated = 0x00280100, kBitsStored = 0x00280101, kHighBit = 0x00280102;
 inline constexpr std::uint32_t kRepresentation = 0x00280103;
 
-/// The values of elements, as in the file, by their tags (group << 16 | element); long values are omitted.
+/// The values of elements, as in the file, by their tags (group << 16 | element). Values of more than 4 KiB, such as
+/// pixels, are omitted.
 using DicomValues = std::map<std::uint32_t, std::string>;
 
 /// The elements of a DICOM file outside its sequences, those of its functional groups (PS3.3 C.7.6.16), and the
@@ -22,18 +23,21 @@ struct DicomHeader {
     DicomValues shared;  ///< functional groups of all frames, and other elements that give the positions of frames
     std::vector<DicomValues> frames;  ///< functional groups of each frame, in the file's order
     bool big_endian = false;
-    bool encapsulated = false;       ///< compressed
-    std::uint64_t pixel_offset = 0;  ///< position in the file
-    std::uint64_t pixel_bytes = 0;   ///< 0 when encapsulated
+    bool encapsulated = false;       ///< the pixels are compressed, in fragments
+    std::uint64_t pixel_offset = 0;  ///< position of the pixels in the file, in bytes
+    std::uint64_t pixel_bytes = 0;   ///< size of the pixels in bytes; 0 if they are encapsulated
 
-    /// The text of an element without padding; empty if there is none. If a frame is given, its functional groups have
-    /// priority over the shared functional groups, and these have priority over the elements outside of sequences.
+    /// The text of an element without padding; empty if the file has no such element. If a frame is given, its
+    /// functional groups have priority over the shared functional groups, and these have priority over the elements
+    /// outside of sequences.
     [[nodiscard]] std::string text(std::uint32_t tag, std::optional<std::size_t> frame = std::nullopt) const;
-    /// Decimal strings, one for each value; empty if there is none, or if one is not a finite number.
+    /// The numbers of an element of decimal strings (VR DS, IS); empty if there is no such element, or if a value is
+    /// not a finite number.
     [[nodiscard]] std::vector<double> numbers(std::uint32_t tag, std::optional<std::size_t> frame = std::nullopt) const;
-    /// Binary numbers of double precision (VR FD); empty if there is none, or if one is not finite.
+    /// The numbers of an element in double precision (VR FD); empty if there is no such element, or if a value is not
+    /// finite.
     [[nodiscard]] std::vector<double> doubles(std::uint32_t tag, std::optional<std::size_t> frame = std::nullopt) const;
-    /// A number of 16 or 32 bits (VR US, UL).
+    /// The number of an element with 16 or 32 bits (VR US, UL); nothing if there is no such element.
     [[nodiscard]] std::optional<std::uint32_t> integer(std::uint32_t tag,
                                                        std::optional<std::size_t> frame = std::nullopt) const;
 
@@ -43,8 +47,9 @@ private:
 
 /// Reads the elements of a file as PS3.10 and PS3.5 specify, and checks the structure up to the end of the file:
 /// lengths, value representations, nesting, order, and the elements of the image pixel module. Debian's GDCM terminates
-/// the process on invalid files, so it reads only files that pass these checks. The result is empty if a check fails or
-/// there are no pixels. If the preamble and the meta group are missing, the first element determines the encoding.
+/// the process on invalid files, so only files that pass these checks are given to it. The result is empty if a check
+/// fails or there are no pixels. If the preamble and the meta group are missing, the first element determines the
+/// encoding.
 std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
 /// The kind of object according to the file's meta group (a SOP class, PS3.6 A); empty if it is not stated.

@@ -20,10 +20,11 @@ namespace {
 constexpr std::uint32_t kSegmentNumber = 0x0062000B, kSegmentIdentification = 0x0062000A;
 constexpr std::uint32_t kPlanePosition = 0x00209113, kImagePosition = 0x00200032;
 
-/// The voxels of a label in a slice, one bit for each, the first voxel in the lowest bit (PS3.5 8.1.1).
+/// The voxels of a label in a slice, one bit for each voxel. The first voxel is the lowest bit of the first byte (PS3.5
+/// 8.1.1).
 using Bits = std::vector<std::uint8_t>;
 
-/// For each label value, the slices in which it occurs.
+/// For each label, the indices of the slices in which it occurs, with its voxels in the slice.
 using Planes = std::map<std::int32_t, std::map<std::int32_t, Bits>>;
 
 std::map<std::int32_t, Bits> split(const PixelSource& source, int k) {
@@ -93,7 +94,7 @@ private:
     std::size_t count_ = 0;
 };
 
-/// The labels with names, followed by those without names that occur in the image.
+/// The labels that have names, followed by the labels without names that occur in the image.
 std::vector<NamedLabel> segments_of(const PixelSource& source, const Planes& planes) {
     std::vector<NamedLabel> segments = source.label_names();
     for (const auto& [value, slices] : planes)
@@ -105,7 +106,7 @@ std::vector<NamedLabel> segments_of(const PixelSource& source, const Planes& pla
 
 DicomItem segment_item(const DicomSource& from, std::size_t number, const NamedLabel& label) {
     constexpr std::size_t kLongest = 64;
-    // The kind of structure is unknown, so the most general code is used.
+    // The kind of structure (organ, tumour, ...) is unknown, so the most general code, "Tissue", is used.
     const DicomItem tissue = dicom_code("85756007", "SCT", "Tissue");
     const auto [l, a, b] = to_cielab(label.color);
     DicomItem item;
@@ -123,7 +124,8 @@ DicomItem shared_groups(const ImageGeometry& g) {
     std::vector<double> cosines;
     for (std::size_t a = 0; a < 2; ++a)
         for (std::size_t r = 0; r < 3; ++r) cosines.push_back(g.direction[r][a]);
-    // Slices of a tilted gantry are sheared, so the distance between their planes is measured along the normal.
+    // If the gantry is tilted, the axis k is oblique to the slices, so the distance between their planes is measured
+    // along the normal.
     const Vec3 normal{cosines[1] * cosines[5] - cosines[2] * cosines[4],
                       cosines[2] * cosines[3] - cosines[0] * cosines[5],
                       cosines[0] * cosines[4] - cosines[1] * cosines[3]};
@@ -242,9 +244,9 @@ void write_dicom_segmentation(const std::string& path, const PixelSource& source
     if (segments.empty())
         throw Error(Errc::InvalidInput, path + ": expected labels, got an image that is 0 everywhere");
     const std::size_t pixels = std::size_t(g.size[0]) * std::size_t(g.size[1]);
-    // DICOM requires at least one frame. If no label has voxels, the first one gets an empty frame.
+    // DICOM requires at least one frame. If no label has voxels, the first label gets an empty frame.
     if (planes.empty()) planes[segments.front().value][0].resize((pixels + 7) / 8);
-    std::map<std::int32_t, std::size_t> places;  // slice index to number in the file, from 1
+    std::map<std::int32_t, std::size_t> places;  // number of each slice in the file, counted from 1, by slice index
     for (const auto& [value, slices] : planes)
         for (const auto& [k, bits] : slices) places[k] = 0;
     std::size_t place = 0;

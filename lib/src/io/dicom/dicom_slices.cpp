@@ -26,8 +26,8 @@ constexpr std::uint32_t kVolumePosition = 0x00209301, kVolumeOrientation = 0x002
 constexpr std::uint32_t kPlanar = 0x00280006, kFrameCount = 0x00280008, kPixelSpacing = 0x00280030;
 constexpr std::uint32_t kIntercept = 0x00281052, kSlope = 0x00281053, kFrameOffsets = 0x3004000C;
 
-/// The type of the rescaled values: without rescaling the stored type, otherwise Int16 or Int32 if it holds every
-/// value, otherwise Float.
+/// The type of the rescaled values: without rescaling the stored type, otherwise Int16 or Int32 if every rescaled value
+/// is an integer that this type can hold, otherwise Float.
 PixelType rescaled_type(PixelType stored, double slope, double intercept, int stored_bits) {
     if (slope == 1 && intercept == 0) return stored;
     const bool integral = slope == std::floor(slope) && intercept == std::floor(intercept);
@@ -36,7 +36,8 @@ PixelType rescaled_type(PixelType stored, double slope, double intercept, int st
     return largest < std::ldexp(1.0, 15) ? PixelType::Int16 : PixelType::Int32;
 }
 
-/// A text whose alphabetical order is that of the numbers; the number itself follows the last blank.
+/// A text that represents a number, so that the alphabetical order of such texts is the order of the numbers. The
+/// number as users read it follows the last blank.
 std::string sortable(double value) {
     const auto digits = std::to_string(std::int64_t(std::llround(std::clamp(value, -1e9, 1e9) * 1e6) + (1LL << 60)));
     return std::string(20 - std::min<std::size_t>(20, digits.size()), '0') + digits + " " + number(value);
@@ -94,8 +95,9 @@ void fill_packed(const DicomHeader& header, const ItkHeader& image, DicomSlice& 
     slice.type = PixelType::Float;
 }
 
-/// The stated position of the plane; empty if there is none. If the file has `several` frames, the frame's own
-/// functional groups must state it; a shared position is used only if the frames are time points of one plane.
+/// The stated position of the plane; empty if there is none. If the file has `several` frames, the position must be in
+/// the functional groups of the frame. A position in the shared groups is used only if the frames are time points of
+/// one plane, because it would otherwise be the same for different planes.
 std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bool several) {
     if (several) {
         if (header.frames.size() <= frame) return {};
@@ -108,7 +110,8 @@ std::vector<double> position_of(const DicomHeader& header, std::size_t frame, bo
     return position.size() == 3 ? position : header.doubles(kVolumePosition, frame);
 }
 
-/// Sets the direction: along a row, along a column, and the normal of the plane.
+/// Sets the columns of the matrix `direction`: the direction along a row, the direction along a column, and the normal
+/// of the plane.
 void fill_direction(const DicomHeader& header, DicomSlice& slice) {
     std::vector<double> cosines = header.numbers(kOrientation, slice.frame);
     if (cosines.size() != 6) cosines = header.doubles(kVolumeOrientation, slice.frame);
@@ -133,8 +136,8 @@ void fill_step(const DicomHeader& header, DicomSlice& slice) {
         slice.step = {10 * std::abs(x[0]), 10 * std::abs(y[0])};
 }
 
-/// Sets the position of the plane: the stated one, otherwise from offsets or distances between planes, in the order of
-/// the file, or from the slice location.
+/// Sets the position of the plane: the position that the file states; otherwise it is derived from offsets or distances
+/// between planes, in the order of the file, or from the slice location.
 void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     fill_direction(header, slice);
     fill_step(header, slice);
@@ -148,7 +151,8 @@ void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice
     if (first.size() == 3) slice.origin = {first[0], first[1], first[2]};
     double offset = 0;
     if (frames > 1 && offsets.size() == frames) {
-        // Offsets of RT doses are relative to the first plane, or are z positions; the differences are the same.
+        // In RT doses, the offsets are relative to the first plane, or are z coordinates. The difference to the first
+        // offset is the same in both cases.
         offset = offsets[slice.frame] - offsets[0];
         slice.has_origin = true;
         slice.gap_field = "GridFrameOffsetVector (3004,000c)";
@@ -234,7 +238,7 @@ std::vector<std::variant<std::vector<DicomSlice>, Error>> read_dicom_slices(cons
                                                                             const RunContext& run) {
     std::vector<std::variant<std::vector<DicomSlice>, Error>> files;
     std::vector<Piece> for_gdcm;
-    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // indices in `files`, and headers
+    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // compressed files: index in `files`, and header
     for (const std::string& path : paths) {
         run.check();
         const std::string unusable = path + ": damaged, truncated, or not a DICOM image";

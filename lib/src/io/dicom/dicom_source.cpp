@@ -46,8 +46,8 @@ bool is_valid_uid(const std::string& uid) {
            std::all_of(uid.begin(), uid.end(), [](char c) { return c == '.' || (c >= '0' && c <= '9'); });
 }
 
-/// A text that distinguishes the image `like` from others on the same lattice: its digest or, if the path does not
-/// exist, the path and dicom_time().
+/// A text that distinguishes the image `like` from others on the same lattice: the digest of the file, or the path with
+/// dicom_time() if there is no such file.
 std::string identity_of(const std::string& like) {
     std::error_code status;
     if (std::filesystem::exists(like, status)) return digest_of(like);
@@ -60,7 +60,7 @@ std::vector<DicomSlice> planes_of(const std::string& like, std::optional<int> fr
     std::error_code status;
     const bool is_folder = std::filesystem::is_directory(like, status);
     if (is_folder ? is_zarr(like) : !std::filesystem::is_regular_file(like, status) || !is_dicom(like)) return {};
-    RunContext silent = run;  // warnings have already been reported when the image was read
+    RunContext silent = run;  // warnings about the image were already reported when it was read for the computation
     silent.log = {};
     std::vector<DicomVolume> volumes = dicom_volumes(like, read_dicom_series(like, silent));
     const auto chosen = std::size_t(std::max(0, frame.value_or(0)));
@@ -87,7 +87,7 @@ void copy_patient_and_study(const DicomHeader& header, DicomSource& source) {
 }  // namespace
 
 DicomTime dicom_time() {
-    // As specified by https://reproducible-builds.org/specs/source-date-epoch
+    // SOURCE_DATE_EPOCH, for reproducible files: https://reproducible-builds.org/specs/source-date-epoch
     const char* const given = std::getenv("SOURCE_DATE_EPOCH");
     const std::optional<long long> seconds = given == nullptr ? std::nullopt : to_number<long long>(given);
     const std::time_t now = seconds ? std::time_t(*seconds) : std::time(nullptr);
@@ -103,9 +103,9 @@ DicomTime dicom_time() {
 }
 
 std::optional<SourcePlane> DicomSource::plane_of(const ImageGeometry& geometry, int k) const {
-    constexpr double kNear = 0.5;  // voxels; any other slice is farther away
+    constexpr double kNear = 0.5;  // [voxels] the planes of other slices are farther away than this
     for (const DicomSlice& plane : planes) {
-        if (!plane.has_origin && plane.file_frames == 1) continue;  // its position is unknown
+        if (!plane.has_origin && plane.file_frames == 1) continue;  // the position of this plane is unknown
         const Vec3 at = geometry.world_to_index(plane.origin);
         const double off = std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2] - k)});
         if (off < kNear && is_valid_uid(plane.sop_class) && is_valid_uid(plane.sop_instance))
@@ -199,7 +199,8 @@ ImageGeometry in_millimetres(const std::string& path, const ImageGeometry& geome
                geometry.direction[1][a] * geometry.direction[1][b] +
                geometry.direction[2][a] * geometry.direction[2][b];
     };
-    constexpr double kMax = 1e-3;  // the same limit as is_sheared() for NIfTI
+    // Maximum cosine of the angle between rows and columns; is_sheared() in raw_write.cpp has the same limit.
+    constexpr double kMax = 1e-3;
     if (std::abs(along(0, 1)) > kMax)
         throw Error(Errc::Unsupported,
                     path +

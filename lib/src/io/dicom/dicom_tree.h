@@ -5,10 +5,11 @@
 #include <string_view>
 #include <vector>
 
-// A parser for DICOM files whose content is in sequences, not in pixels.
+// A parser for DICOM files whose contents are in sequences, not in pixels, such as RT structure sets.
 namespace covol::detail {
 
-/// The elements of a file or an item, by their tags. Refers to the bytes of the file, which must outlive it.
+/// The elements of a file or an item, by their tags. The values refer to the bytes of the file, which must outlive this
+/// object.
 struct DicomTree {
     std::map<std::uint32_t, std::string_view> values;
     std::map<std::uint32_t, std::vector<DicomTree>> sequences;  ///< only the requested sequences
@@ -21,7 +22,8 @@ struct DicomTree {
 
 /// Reads a file as specified in PS3.10 and PS3.5: little-endian, with explicit or implicit VR, with or without preamble
 /// and meta group. Every length is checked against the number of bytes in the file.
-/// @param wanted  the tags of the sequences to keep; with implicit VR, sequences can be recognized by these tags alone
+/// @param wanted  the tags of the sequences to keep; with implicit VR, sequences of known length are recognized only by
+/// these tags
 /// @throws Error InvalidInput (not DICOM; damaged, with the position of the byte), Unsupported (big-endian, deflated).
 DicomTree parse_dicom(const std::string& path, std::string_view bytes, const std::vector<std::uint32_t>& wanted);
 

@@ -1,5 +1,5 @@
-// Combines the planes of a DICOM series into a volume. ITK's own helper neither reports the contents of a folder nor
-// detects a missing slice, and assumes that the frames of a file are evenly spaced in the order of the file.
+// Combines the planes of a DICOM series into a volume. ITK's class for DICOM series neither reports the contents of a
+// folder nor detects a missing slice, and assumes that the frames of a file are evenly spaced in the order of the file.
 #include "io/dicom/dicom_volumes.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ bool same_direction(const DicomSlice& a, const DicomSlice& b) {
     return maximum < 1e-3;
 }
 
-/// The position of a plane along the normal of the first plane; all planes have the same normal.
+/// The position of a plane along the normal of the plane `first`, in mm. All planes of a volume have the same normal.
 double depth(const DicomSlice& slice, const DicomSlice& first) {
     double along = 0;
     for (std::size_t a = 0; a < 3; ++a) along += first.direction[a][2] * slice.origin[a];
@@ -52,8 +52,9 @@ bool has_planes_at_one_place(const Slices& slices) {
     return slices.front().has_origin && std::adjacent_find(sorted.begin(), sorted.end(), same_place) != sorted.end();
 }
 
-/// Splits volumes by the value of `key` in their planes. A volume stays whole if the key differs in none of its planes;
-/// with `only_at_one_place`, if no two planes have the same position; without, if the key differs in every plane.
+/// Splits each volume by the value of `key` in its planes. A volume is not split if all its planes have the same value.
+/// With `only_at_one_place`, it is also not split if no two planes have the same position; otherwise, also not if every
+/// plane has a value of its own.
 std::vector<DicomVolume> split_by(const std::vector<DicomVolume>& volumes, const char* what,
                                   std::string DicomSlice::*key, bool only_at_one_place) {
     std::vector<DicomVolume> parts;
@@ -87,8 +88,8 @@ std::vector<DicomVolume> split_by_direction(const DicomVolume& volume) {
     return parts;
 }
 
-/// Splits frames of one file that have the same position although time, echo and stack do not differ: the first frames
-/// of all positions form one volume, the second frames another, and so on.
+/// Splits volumes in which frames of one file have the same position although they have the same time, echo and stack:
+/// the first frames of all positions form one volume, the second frames another, and so on.
 std::vector<DicomVolume> split_by_order(const std::vector<DicomVolume>& volumes) {
     std::vector<DicomVolume> parts;
     for (const DicomVolume& volume : volumes) {
@@ -129,7 +130,8 @@ void check_gaps(const std::string& path, const Slices& slices) {
     }
 }
 
-/// Checks that the slices lie on a straight line. With a tilted gantry, the line is oblique to the slices.
+/// Checks that the origins of the slices lie on a straight line, so that an affine map describes the volume. With a
+/// tilted gantry, this line is oblique to the slices.
 void check_straight(const std::string& path, const Slices& slices, const Vec3& step) {
     const DicomSlice& first = slices.front();
     const double pixel = std::min(first.step[0], first.step[1]), maximum = pixel > 0 ? pixel / 2 : 0.5;
@@ -165,7 +167,7 @@ void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info
 }
 
 /// Orders frames as in the file (reversed if the stated distance is negative) and slices by InstanceNumber. The spacing
-/// is the distance that the file states.
+/// along z is the distance that the file states.
 void place_by_order(Slices& slices, ImageInfo& info) {
     const bool are_frames = slices.front().file_frames > 1;
     if (!are_frames)

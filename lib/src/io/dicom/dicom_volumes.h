@@ -6,10 +6,10 @@
 
 namespace covol::detail {
 
-/// The planes that form one volume.
+/// The planes that form one volume, one of possibly several in a series.
 struct DicomVolume {
     std::vector<DicomSlice> slices;
-    std::string name;  ///< distinguishes it from the other volumes of the series: "time 2, echo 4.6"
+    std::string name;  ///< distinguishes the volume from the others of the series, for example "time 2, echo 4.6"
 };
 
 /// All planes of the series in a folder, or of the series that a file belongs to. @throws Error InvalidInput (no

@@ -1,4 +1,4 @@
-// RT structure sets of DICOM: PS3.3 A.19.
+// Writes RT structure sets of DICOM: PS3.3 A.19.
 #include <algorithm>
 #include <map>
 #include <string>
@@ -54,7 +54,7 @@ DicomItem observation_item(const std::string& number) {
     return item;
 }
 
-/// @param scale  from the lattice's unit to mm
+/// @param scale  factor that converts the lattice's unit to mm
 DicomItem contour_item(const SliceContour& contour, std::size_t number, double scale,
                        const std::optional<SourcePlane>& plane) {
     std::string text;

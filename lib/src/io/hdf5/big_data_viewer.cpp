@@ -1,5 +1,5 @@
-// BigDataViewer: a group for each time point, which contains a group for each setup (a channel, tile or angle), which
-// contains the levels.
+// The layout of BigDataViewer: the file has a group for each time point, which contains a group for each setup (a
+// channel, tile or angle), which contains the levels.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,7 +23,7 @@ struct Setup {
 };
 
 struct BdvChoice {
-    std::string time, setup;  ///< empty if not chosen
+    std::string time, setup;  ///< names of the time point and of the setup; empty if the user has chosen none
     int level = 0;
 };
 
@@ -58,7 +58,7 @@ std::string cells(const std::string& time, const std::string& setup, std::size_t
     return "/" + time + "/" + setup + "/" + std::to_string(level) + "/cells";
 }
 
-/// Parses "0.4 0.4 1".
+/// Parses three positive numbers, such as "0.4 0.4 1"; nothing if the text is not of this form.
 std::optional<Vec3> to_vector(const std::string& text) {
     std::string_view rest = text;
     Vec3 vector;
@@ -208,7 +208,7 @@ private:
             Vec3 spacing;
             for (int a = 0; a < 3; ++a) spacing[a] = voxel[a] * factor[level][a];
             // A coarse voxel is the mean of finer voxels, so its centre is the centre of the box that they cover. The
-            // centre of the first voxel of the finest level is at world 0.
+            // origin of the world is the centre of the first voxel of the finest level.
             if (int(level) == choice_.level) {
                 info.geometry.spacing = spacing;
                 for (int a = 0; a < 3; ++a) info.geometry.origin[a] = 0.5 * (spacing[a] - voxel[a]);
@@ -216,7 +216,7 @@ private:
             const std::string name = cells(choice_.time, setups_.front(), level);
             try {
                 info.levels.push_back(level_text(name, size_of(setups_.front(), level), spacing));
-            } catch (const Error&) {  // a damaged level is ignored until it is read
+            } catch (const Error&) {  // a level that cannot be read is an error only if it is requested
                 info.levels.push_back(name + ": cannot be read");
             }
         }

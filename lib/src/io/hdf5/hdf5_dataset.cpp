@@ -57,20 +57,21 @@ const char* class_name(H5T_class_t kind) {
     }
 }
 
-/// The type of the numbers. For an enumeration, as h5py stores Python's bool, it is the type of the values.
+/// The type of the numbers in a dataset. For an enumeration, as which h5py stores Python's bool, this is the type of
+/// the enumeration's values.
 Hdf5Id number_type(hid_t type) {
     const bool is_enum = H5Tget_class(type) == H5T_ENUM;
     return {is_enum ? H5Tget_super(type) : H5Tcopy(type), H5Tclose};
 }
 
-/// Call this after H5Dget_chunk_storage_size() has failed. @returns whether it failed because the chunk was never
-/// written, which is an error only in HDF5 1.10, and not because of a damaged index. For a missing chunk, the function
-/// itself reports the error; for a damaged index, a function that it calls. Reading a voxel would show the difference,
-/// too, but fills a whole chunk.
+/// Whether H5Dget_chunk_storage_size(), which has just failed, failed because the chunk was never written. This is an
+/// error only in HDF5 1.10, and no damage. In this case the error stack begins with an error of the function itself; if
+/// the index is damaged, it begins with an error of a function that it calls. Reading a voxel would distinguish the
+/// cases, too, but would fill a whole chunk.
 bool is_of_missing_chunk() {
     const auto look_at_first = [](unsigned, const H5E_error2_t* error, void* found) -> herr_t {
         *static_cast<bool*>(found) = error->func_name == std::string_view("H5D__get_chunk_storage_size");
-        return 1;  // ends the walk
+        return 1;  // ends H5Ewalk2() after the first error of the stack
     };
     bool found = false;
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, look_at_first, &found);
@@ -199,7 +200,8 @@ std::string Hdf5Dataset::filter_names() const {
     return names;
 }
 
-/// Limits the size of a chunk, because it is unpacked as a whole, including all of its channels and frames.
+/// Limits the size of a chunk, because a chunk is unpacked into memory as a whole, including all of its channels and
+/// frames.
 void Hdf5Dataset::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -251,7 +253,8 @@ void Hdf5Dataset::read_fill(hid_t properties) {
         array_.fill = fill;
 }
 
-/// The bytes of a chunk as stored. @returns nothing if the file has no such chunk.
+/// The bytes of a chunk as the file stores them; nothing if the file has no such chunk. `skipped` receives the bit mask
+/// of the filters that were not applied to this chunk.
 std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>& begin, unsigned& skipped) const {
     const std::vector<hsize_t> offset(begin.begin(), begin.end());
     hsize_t stored = 0;

@@ -18,15 +18,16 @@ public:
     Hdf5Dataset(std::shared_ptr<const Hdf5File> file, const std::string& name);
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< "FILE.h5:/name", for messages
-    /// The array, with the chunks of the file; if the dataset has no chunks, with bricks that are read separately.
+    /// The array, with the chunks of the file; if the dataset has no chunks, it is divided into bricks, each of which
+    /// is read separately.
     [[nodiscard]] const ChunkedArray& array() const noexcept { return array_; }
-    /// Position in the file at which all values are stored contiguously; empty if they are not contiguous.
+    /// Position in the file, in bytes, from which all values are stored contiguously; empty if they are not contiguous.
     [[nodiscard]] std::optional<std::uint64_t> offset() const noexcept { return offset_; }
     /// Treats 16-bit integers as unsigned, even if the file declares them as signed.
     void treat_as_unsigned() noexcept;
-    /// "gzip, shuffle"; empty without filters.
+    /// The names of the filters of the chunks, such as "gzip, shuffle"; empty if there are no filters.
     [[nodiscard]] std::string filter_names() const;
-    /// ArrayChunks::elements(). Safe to call from several threads.
+    /// Implements ArrayChunks::elements(). Safe to call from several threads.
     [[nodiscard]] std::optional<Bytes> elements(const std::vector<std::uint64_t>& place) const;
 
 private:
@@ -46,7 +47,7 @@ private:
     Hdf5Id dataset_, type_;
     ChunkedArray array_;
     std::vector<Hdf5Filter> filters_;
-    bool as_packed_ = false;  ///< the HDF5 library reads packed chunks, and undo_filters() unpacks them
+    bool as_packed_ = false;  ///< whether undo_filters() unpacks the chunks; otherwise the HDF5 library does
     std::optional<std::uint64_t> offset_;
 };
 

@@ -31,7 +31,7 @@ herr_t add_name(hid_t, const char* name, const H5L_info_t*, void* list) {
     return names.size() < kMaxNames ? 0 : 1;
 }
 
-/// Number of elements in a simple dataspace; 0 if it is not simple, or has more than `maximum`.
+/// Number of elements in a simple dataspace; 0 if the dataspace is not simple, or has more than `maximum` elements.
 std::uint64_t count_of(const Hdf5Id& space, std::uint64_t maximum) {
     if (!space || H5Sget_simple_extent_type(space.get()) == H5S_NULL) return 0;
     const hssize_t count = H5Sget_simple_extent_npoints(space.get());
@@ -43,7 +43,7 @@ bool holds_numbers(const Hdf5Id& type) {
     return kind == H5T_INTEGER || kind == H5T_FLOAT;
 }
 
-/// The text up to the first zero.
+/// The text up to the first zero byte, with which HDF5 pads texts.
 std::string cut(const char* begin, std::size_t size) { return {begin, std::find(begin, begin + size, '\0')}; }
 
 std::vector<std::string> strings_of(const Hdf5Id& attribute) {
@@ -70,7 +70,7 @@ std::vector<std::string> strings_of(const Hdf5Id& attribute) {
 }  // namespace
 
 Hdf5Lock::Hdf5Lock() {
-    hdf5_module();  // which may throw
+    hdf5_module();  // loads the HDF5 library, and throws if this fails; therefore before the mutex is locked
     if (held_locks++ == 0) library_mutex().lock();
     H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
@@ -100,7 +100,8 @@ Hdf5File::Hdf5File(std::string path) : path_(std::move(path)) {
     std::error_code status;
     bytes_ = std::filesystem::file_size(path_, status);
     const Hdf5Id how(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    // The file stays open until all its objects are closed. It is locked unless the file system does not support this.
+    // The file stays open until all its objects are closed. It is locked against writers unless the file system does
+    // not support locks.
     H5Pset_fclose_degree(how.get(), H5F_CLOSE_WEAK);
     H5Pset_file_locking(how.get(), true, true);
     file_ = Hdf5Id(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, how.get()), H5Fclose);
@@ -166,7 +167,7 @@ std::vector<std::string> Hdf5File::datasets(const std::string& group) const {
     constexpr std::size_t kMaxObjects = 100000;
     const Hdf5Lock lock;
     std::vector<std::string> found, groups{group};
-    std::set<haddr_t> seen;  // hard links may form cycles
+    std::set<haddr_t> seen;  // addresses of the objects seen so far, because hard links may form cycles
     H5O_info_t top{};
     if (H5Oget_info_by_name2(file_.get(), group.c_str(), &top, H5O_INFO_BASIC, access_.get()) >= 0)
         seen.insert(top.addr);

@@ -7,11 +7,12 @@
 
 #include "io/modules/hdf5_calls.h"
 
-// HDF5 files, through the HDF5 library. Their contents are untrusted.
+// Reads HDF5 files with the HDF5 library. Their contents are untrusted, because a file may come from anyone.
 namespace covol::detail {
 
-/// While an object of this class exists, only its thread uses the HDF5 library, which need not be thread-safe, and the
-/// library prints no messages. A thread may hold several objects. Calls of ITK's HDF5 reader need the lock, too.
+/// While an object of this class exists, only its thread uses the HDF5 library, which may have been built without
+/// support for threads, and the library prints no messages. A thread may hold several objects. Calls of ITK's HDF5
+/// reader need the lock, too.
 class Hdf5Lock {
 public:
     Hdf5Lock();
@@ -24,7 +25,7 @@ private:
     void* data_ = nullptr;
 };
 
-/// An object that the library identifies by a number; closed by the destructor.
+/// Owns an object that the HDF5 library identifies by a number (ID). The destructor closes the object.
 class Hdf5Id {
 public:
     using Close = herr_t (*)(hid_t);
@@ -45,7 +46,7 @@ private:
     Close close_ = nullptr;
 };
 
-/// A file that is open for reading. Links into other files are not followed.
+/// A file that is open for reading. Links to other files are not followed.
 class Hdf5File {
 public:
     /// @throws Error InvalidInput (damaged, truncated, not HDF5).
@@ -60,16 +61,17 @@ public:
     [[nodiscard]] bool has_dataset(const std::string& name) const;
     /// @throws Error InvalidInput if there is no such object, or if it is in another file.
     [[nodiscard]] Hdf5Id open(const std::string& name) const;
-    /// The names in a group, sorted; at most 100000. Empty if it is not a group.
+    /// The names in a group, sorted; at most 100000. Empty if `group` is not a group.
     [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
     /// The paths from the root of the datasets in a group and in its subgroups, sorted. Soft links are not followed.
     [[nodiscard]] std::vector<std::string> datasets(const std::string& group) const;
 
-    /// The numbers of an attribute; empty if there is none, or if it has another type or too many elements.
+    /// The numbers of an attribute; empty if there is no such attribute, or if it is not numeric or has more than 4096
+    /// elements.
     [[nodiscard]] std::vector<double> numbers(const std::string& object, const char* attribute) const;
-    /// The text of an attribute, which may be stored as a list of characters; empty if there is none.
+    /// The text of an attribute, which may be stored as a list of characters; empty if there is no such attribute.
     [[nodiscard]] std::string text(const std::string& object, const char* attribute) const;
-    /// The texts of an attribute that is a list.
+    /// The texts of an attribute that is a list of texts; empty if there is no such attribute.
     [[nodiscard]] std::vector<std::string> texts(const std::string& object, const char* attribute) const;
     /// A small dataset of numbers, the last dimension fastest; empty if there is no such dataset.
     [[nodiscard]] std::vector<double> table(const std::string& name) const;

@@ -13,7 +13,7 @@
 namespace covol::detail {
 namespace {
 
-// https://github.com/HDFGroup/hdf5_plugins/blob/master/docs/RegisteredFilterPlugins.md
+// IDs of filters: https://github.com/HDFGroup/hdf5_plugins/blob/master/docs/RegisteredFilterPlugins.md
 constexpr unsigned kLzf = 32000, kBlosc = 32001, kLz4 = 32004, kZstd = 32015;
 
 bool is_packer(unsigned id) {
@@ -24,8 +24,8 @@ Error damaged(const std::string& path, const char* codec) {
     return read_error(Errc::InvalidInput, path, std::string("a chunk is damaged: it is not valid ") + codec + " data");
 }
 
-/// Reverses the shuffle filter, which stores byte b of all elements together, for each b. The bytes of an incomplete
-/// last element stay at the end.
+/// Reverses the shuffle filter, which stores the first bytes of all elements, then their second bytes, and so on. If
+/// the last element is incomplete, the filter leaves its bytes at the end.
 Bytes unshuffle(const Bytes& bytes, std::uint64_t width) {
     if (width < 2) width = 1;
     Bytes out(bytes.size());
@@ -79,7 +79,7 @@ std::uint64_t big_endian(const char* bytes, int width) {
     return value;
 }
 
-/// Unpacks the format of HDF5's LZ4 filter. All numbers are big-endian: the size (8 bytes) and the block size
+/// Unpacks the format of HDF5's LZ4 filter. All numbers are big-endian: the unpacked size (8 bytes) and the block size
 /// (4 bytes), then for each block its packed size (4 bytes) and its data.
 Bytes unpack_lz4(const std::string& path, const Bytes& packed, std::uint64_t expected) {
     constexpr std::uint64_t kHeader = 12, kMaxBlock = std::uint64_t(1) << 30;

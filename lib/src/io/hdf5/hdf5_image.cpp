@@ -82,7 +82,8 @@ private:
             throw read_error(Errc::InvalidInput, dataset.path(),
                              "expected " + std::to_string(layout_.letters.size()) + " dimensions, got " +
                                  std::to_string(shape.size()));
-        if (info_.geometry.size[0] == 0) return dataset;  // the first dataset; it determines the size and type
+        // If the size is 0, this is the first dataset, which determines the size and type of the image.
+        if (info_.geometry.size[0] == 0) return dataset;
         bool same = dataset.array().type == info_.type;
         for (int a = 0; a < 3; ++a) same = same && shape[axes_.space[a]] >= std::uint64_t(info_.geometry.size[a]);
         if (!same)
@@ -115,7 +116,7 @@ private:
         if (*dataset.offset() > file_->bytes() || volumes > file_->bytes() / volume)
             throw read_error(Errc::InvalidInput, dataset.path(), "damaged or truncated: it lies beyond the file's end");
         place.file_offset = *dataset.offset() + volumes * volume;
-        // A large volume that cannot be mapped is read in bricks on demand, not as a whole.
+        // A large volume that cannot be mapped has no PixelPlace, so that bricks of it are read on demand.
         const bool mappable = place.as_stored() && place.file_offset % width == 0;
         if (!mappable && is_worth_mapping(volume)) return std::nullopt;
         return place;

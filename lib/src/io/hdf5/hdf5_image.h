@@ -7,7 +7,7 @@
 
 namespace covol::detail {
 
-/// "FILE.h5:/path/to/dataset", split into its parts.
+/// The parts of a name such as "FILE.h5:/path/to/dataset".
 struct Hdf5Name {
     std::string path, inside;
 };

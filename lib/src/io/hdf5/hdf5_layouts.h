@@ -8,21 +8,23 @@
 #include "covol/image.h"
 #include "io/hdf5/hdf5_dataset.h"
 
-// How programs arrange their images in an HDF5 file.
+// The layouts in which programs store images in HDF5 files.
 namespace covol::detail {
 
 /// An image in one of the layouts. If channels and frames are separate datasets, all have the same type and size.
 struct Hdf5Layout {
-    ImageInfo info;               ///< all members except for size, type, order and chunks
-    std::string letters = "zyx";  ///< of a dataset's dimensions: x, y, z, c, t, or ? for one with a single element
-    bool in_datasets = false;     ///< each channel and frame is a dataset; `info` then has the counts
+    ImageInfo info;  ///< properties of the image; size, type, order and chunk size are not set
+    /// Axes of a dataset's dimensions, slowest first: x, y, z, c, t, or ? for a dimension with a single element.
+    std::string letters = "zyx";
+    /// Each channel and frame is a dataset of its own; `info` then states how many there are.
+    bool in_datasets = false;
     std::function<std::string(std::uint64_t channel, std::uint64_t frame)> dataset;  ///< name of the dataset
     std::vector<std::string> coarser;  ///< names of a pyramid's coarser levels, finest first
-    std::optional<Index3> size;        ///< size without padding, if the datasets may be padded
+    std::optional<Index3> size;        ///< size of the image without padding, if the datasets may be padded
     bool is_unsigned = false;          ///< 16-bit integers are unsigned, even if the file declares them as signed
 };
 
-/// A level of a pyramid: "/name: 512 x 512 x 100, spacing 0.4 x 0.4 x 1".
+/// Describes a level of a pyramid for users: "/name: 512 x 512 x 100, spacing 0.4 x 0.4 x 1".
 std::string level_text(const std::string& name, const Index3& size, const Vec3& spacing);
 
 /// The number that follows `word` in a name such as "TimePoint 12" or "s07"; nothing if the name has another form.

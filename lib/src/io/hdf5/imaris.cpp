@@ -1,5 +1,5 @@
-// Imaris: groups for levels, time points and channels, and attributes whose values are texts, stored as one character
-// per element.
+// The layout of Imaris: groups for levels, time points and channels. The values of attributes are texts, stored as one
+// character per element.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,7 +55,7 @@ public:
         }
     }
     [[nodiscard]] bool is_known() const { return known_; }
-    /// Spacing of the finest level, which has this size.
+    /// The spacing of the finest level, if that level has `size` voxels.
     [[nodiscard]] Vec3 spacing(const Index3& size) const {
         Vec3 spacing{1, 1, 1};
         for (int a = 0; known_ && a < 3; ++a) spacing[a] = side_[a] / size[a];
@@ -91,11 +91,12 @@ std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& g
     return count && *count > 0 ? count : std::nullopt;
 }
 
-/// The size of a level without the padding to whole chunks. It is stated by the channel; otherwise it is derived from
-/// the size in /DataSetInfo/Image, which is that of the finest level.
+/// The size of a level without the padding to whole chunks. It is taken from the attributes of the channel or, if they
+/// do not state it, derived from the size of the finest level in /DataSetInfo/Image.
 struct ImarisSize {
     Index3 size{};
-    std::string field;  ///< the attributes that state the size; empty if there are none: it is then the array's size
+    /// The attributes that state the size; if there are none, it is empty, and `size` is the size of the array.
+    std::string field;
     bool is_known = true;
 };
 
@@ -128,7 +129,8 @@ ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
 }
 
 /// The number of fine voxels that a coarse voxel covers along each axis, a power of two. The ratio of the sizes is
-/// rounded, because an incomplete coarse voxel at the end may be omitted or stored.
+/// rounded to a power of two, because a coarse voxel that is only partly covered at the end of an axis may be stored or
+/// omitted.
 Vec3 factors(const Index3& fine, const Index3& coarse) {
     Vec3 factor;
     for (int a = 0; a < 3; ++a)
@@ -155,7 +157,7 @@ void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& f
             const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0)).size;
             info.levels.push_back(level_text(name, size, times(extent.spacing(fine), factors(fine, size))));
             if (level > choice.level) layout.coarser.push_back(name);
-        } catch (const Error&) {  // a damaged level is ignored until it is read
+        } catch (const Error&) {  // a level that cannot be read is an error only if it is requested
             info.levels.push_back(name + ": cannot be read");
         }
     }
@@ -177,7 +179,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     layout.size = size_of(file, choice->level, time, channel).size;
     const Vec3 factor = factors(fine, *layout.size);
     info.geometry.spacing = times(extent.spacing(fine), factor);
-    // ExtMin is the outer corner of the first voxel; the origin is the voxel's centre.
+    // ExtMin is the outer corner of the first voxel, whereas the origin is the centre of this voxel.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
     // If the stated size of the image exceeds its array, it is unknown how many voxels the extent covers.

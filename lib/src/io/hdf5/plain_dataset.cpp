@@ -1,4 +1,4 @@
-// A single dataset, as written by ilastik, h5py and many others.
+// Reads a single dataset, as ilastik, h5py and many other programs write it.
 #include <algorithm>
 #include <cmath>
 
@@ -16,8 +16,8 @@ std::string shape_text(const std::vector<std::uint64_t>& shape) {
     return text;
 }
 
-/// The only dataset of numbers with at least three dimensions. @throws Error Unsupported if there is none, or several,
-/// which the message lists.
+/// The name of the only dataset of numbers in a group with at least three dimensions. @throws Error Unsupported if
+/// there is none, or several, which the message lists.
 std::string only_dataset(const Hdf5File& file, const std::string& group) {
     constexpr std::size_t kShown = 20;
     std::vector<std::string> names;
@@ -55,7 +55,7 @@ public:
     [[nodiscard]] const std::string& letters() const { return letters_; }
     /// How the axes were determined, such as "axistags: zyxc".
     [[nodiscard]] const std::string& source() const { return source_; }
-    /// Resolution along x, y, z from axistags; 0 if they do not state it.
+    /// Resolution along x, y, z from axistags; 0 if axistags do not state the resolution.
     [[nodiscard]] const Vec3& resolution() const { return resolution_; }
 
 private:
@@ -95,7 +95,8 @@ private:
         return true;
     }
 
-    /// Assumes the order z, y, x. If there are more than three dimensions, those of one element are left out.
+    /// Assumes the order z, y, x. If there are more than three dimensions, dimensions with a single element are not
+    /// counted.
     void by_order() {
         std::vector<std::size_t> wide;
         for (std::size_t d = 0; d < shape_.shape.size(); ++d)
@@ -117,15 +118,15 @@ private:
     Vec3 resolution_{0, 0, 0};
 };
 
-/// Reads the spacing from an attribute with one of the usual names, which has a number for each of z, y, x or for each
-/// dimension; otherwise from axistags.
+/// Reads the spacing from an attribute with one of the usual names, which has one number for each of z, y, x or for
+/// each dimension. If there is no such attribute, the spacing is read from axistags.
 void describe_spacing(const Hdf5File& file, const std::string& name, const Axes& axes, ImageInfo& info) {
     info.spacing_known = {false, false, false};
     const std::string unit = file.text(name, "unit"), units = file.text(name, "units");
     for (const char* attribute : {"element_size_um", "spacing", "resolution", "voxel_size"}) {
         const std::vector<double> numbers = file.numbers(name, attribute);
         const std::string& letters = axes.letters();
-        std::string order;  // the order in which the numbers are given
+        std::string order;  // the axis to which each of `numbers` belongs
         for (const char letter : letters)
             if (numbers.size() == letters.size() || letter == 'x' || letter == 'y' || letter == 'z') order += letter;
         const bool good = numbers.size() == order.size() &&

@@ -1,6 +1,6 @@
-// Image Cytometry Standard, versions 1.0 and 2.0: a text header and voxels in one file, or before version 2 the voxels
-// in a file of their own, .ids. P. Dean, L. Mascio, D. Ow, D. Sudar, J. Mullikin, Cytometry 11 (1990), 561-569; version
-// 2 as written by libics.
+// Reads Image Cytometry Standard, versions 1.0 and 2.0: a text header, followed by the voxels. In version 1.0, the
+// voxels are in a separate file, .ids. P. Dean, L. Mascio, D. Ow, D. Sudar, J. Mullikin, Cytometry 11 (1990), 561-569;
+// version 2.0 as written by libics.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -32,7 +32,8 @@ class IcsHeader {
 public:
     /// @throws Error InvalidInput.
     explicit IcsHeader(std::string path) : path_(std::move(path)) {
-        constexpr std::size_t kMaxHeader = std::size_t(1) << 20;  // programs append long histories
+        // [bytes] The limit is large because programs append their history to the header.
+        constexpr std::size_t kMaxHeader = std::size_t(1) << 20;
         std::ifstream file(path_, std::ios::binary);
         std::string text(kMaxHeader, '\0');
         file.read(text.data(), static_cast<std::streamsize>(text.size()));
@@ -78,8 +79,8 @@ public:
 
 private:
     void read(const std::string& text) {
-        // The first two bytes are the separators of words and of lines; a text editor may have put a carriage return
-        // before the line end.
+        // The first byte separates words, and the second separates lines. If a text editor has put carriage returns
+        // before line ends, the first line end consists of two bytes.
         if (text.size() < 4 || text[0] == text[1]) throw damaged("expected two separators in its first bytes");
         const char between = text[0];
         const bool is_dos = text[1] == '\r' && text[2] == '\n' && between != '\n';
@@ -98,7 +99,7 @@ private:
         std::vector<std::string> words;
         for (std::size_t at = 0; at < line.size();) {
             const std::size_t last = std::min(line.find(between, at), line.size());
-            // Bio-Formats pads the sizes with blanks.
+            // Blanks are removed, because Bio-Formats pads the sizes with them.
             if (const string_view word = trim(line.substr(at, last - at)); !word.empty()) words.emplace_back(word);
             at = last + 1;
         }
@@ -120,7 +121,7 @@ private:
             return false;
         const std::string key = category + " " + lower(words[1]);
         words.erase(words.begin(), words.begin() + 2);
-        lines_[key] = std::move(words);  // the last of several lines counts, as in libics
+        lines_[key] = std::move(words);  // if a key occurs in several lines, the last one is valid, as in libics
         return false;
     }
 
@@ -135,11 +136,11 @@ struct IcsAxes {
     std::uint64_t bits = 0;
     std::array<std::uint64_t, 3> size{1, 1, 1};
     int channels = 1, frames = 1;
-    bool channels_first = true;  ///< channels vary faster than frames
-    std::string order;           ///< fastest first, for example "XYZCT"
+    bool channels_first = true;  ///< whether channels vary faster than frames in the file
+    std::string order;           ///< the axes, the fastest first, for example "XYZCT"
 };
 
-/// Whether this is a name of the axis of channels: of libics, Huygens or Bio-Formats.
+/// Whether this is one of the names that libics, Huygens and Bio-Formats use for the axis of channels.
 bool is_channels(const std::string& name) {
     constexpr std::array kNames{"p", "c", "ch", "channel", "channels", "probe", "probes"};
     return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
@@ -216,7 +217,8 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
                          "expected integers of 8, 16 or 32 bits, or reals of 32 or 64 bits, got the format " +
                              quote(stated) + " with " + std::to_string(bits) + " bits");
     place.type = type->type;
-    // The line gives the significance of each stored byte; 1 is the lowest. "1 2" is little-endian, "2 1" big-endian.
+    // For each byte of a stored number, the line states its significance; 1 is the lowest. "1 2" is little-endian, "2
+    // 1" big-endian.
     const std::vector<std::string>& order = header.values("representation byte_order");
     const std::size_t bytes = bits / 8;
     bool little = true, big = true;
@@ -231,8 +233,8 @@ void set_pixel_type(const std::string& path, const IcsHeader& header, std::uint6
     place.swap = bytes > 1 && big == (std::endian::native == std::endian::little);
 }
 
-/// Sets spacing and origin, converted to the unit of x. libics writes a scale of 1 and the unit "undefined" if the
-/// spacing is not known; a unit of pixels means the same.
+/// Sets spacing and origin, in the unit of x. libics writes a scale of 1 and the unit "undefined" if the spacing is not
+/// known; a unit of pixels means the same.
 void set_geometry(const IcsHeader& header, ImageInfo& info) {
     ImageGeometry& geometry = info.geometry;
     const std::vector<std::string>& units = header.values("parameter units");
@@ -259,7 +261,8 @@ void set_geometry(const IcsHeader& header, ImageInfo& info) {
 /// A file whose channels and frames are whole volumes, stored one after another.
 class IcsFile : public ImageFile {
 public:
-    /// @param volumes  the same voxels as an image with one channel and channels * frames frames
+    /// @param volumes  the same voxels, as an image with a single channel whose frames are all channels and frames of
+    /// `info`
     IcsFile(std::unique_ptr<ImageFile> volumes, const ImageInfo& info, bool channels_first)
         : volumes_(std::move(volumes)), channels_first_(channels_first) {
         info_ = info;

@@ -13,14 +13,14 @@ namespace covol::detail {
 /// NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
 std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run);
 
-/// NIfTI-1 in one file (.nii, .nii.gz). The positions of voxels are taken from the sform if sform_code > 0, else from
-/// the qform if qform_code > 0, else from pixdim with the image's centre at 0, as in nibabel. If the sform is
-/// not invertible, the qform is used and a warning is reported; without a qform this is an error. A warning is also
-/// reported if both codes are positive and the forms differ by more than half a voxel, or if the sform is used and
-/// pixdim states another spacing.
+/// NIfTI-1 in a single file (.nii, .nii.gz). The positions of voxels are taken from the sform if sform_code > 0, else
+/// from the qform if qform_code > 0, else from pixdim with the image's centre at 0, as in nibabel. If the sform is not
+/// invertible, the qform is used and a warning is reported; if the file has no qform, an error is thrown. A warning is
+/// also reported if both codes are positive and sform and qform differ by more than half a voxel, or if the sform is
+/// used and pixdim states another spacing.
 std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
-/// ITK's reader for files with this extension.
+/// The function that opens files with this extension with ITK's reader.
 OpenWithItk* itk_reader_of(const std::string& path);
 
 /// Opens an HDF5 file in ITK's layout or in any other supported layout.

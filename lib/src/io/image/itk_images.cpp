@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Sets the unit, spacing_known, and the header fields that were used.
+/// Sets the unit, spacing_known, and `fields`, the header fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
     std::string unit = header.value_of({"distanceunits", "unit"});
     if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
@@ -62,8 +62,8 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
         if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
 }
 
-/// Position of the pixels of a MetaImage. Empty for variants that ITK reads: ASCII pixels, one file for each slice, a
-/// header of the data file that is skipped.
+/// Position of the pixels of a MetaImage. Empty for variants that are left to ITK: ASCII pixels, one file for each
+/// slice, a header in the data file.
 std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
     const std::string file = header.data_file();
     if (header.has_value("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
@@ -79,8 +79,8 @@ std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// Position of the pixels of a NRRD. Empty for variants that ITK reads: text and bzip2, several data files, skipped
-/// lines or bytes, channels that are not the first axis.
+/// Position of the pixels of a NRRD. Empty for variants that are left to ITK: pixels as text or packed by bzip2,
+/// several data files, lines or bytes to be skipped, channels that are not the first axis.
 std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader& header, PixelType type, int channels) {
     const std::string file = header.data_file(), encoding = lower(header.value("encoding"));
     PixelPlace place;
@@ -100,11 +100,11 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
     return place;
 }
 
-/// Rejects headers without the required fields, because MetaIO prints messages about them on std::cerr.
+/// Rejects headers without the required fields, for which the MetaIO library would print messages on std::cerr.
 void require_meta_header(const TextHeader& header, const std::string& unusable) {
     for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
         if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
-    // MetaIO allocates arrays of any length that this field states.
+    // MetaIO would allocate arrays of any length that NDims states.
     const std::string dimensions = header.value("ndims");
     if (dimensions.size() > 2 || dimensions.find_first_not_of("0123456789") != std::string::npos ||
         std::stoi(dimensions) < 1 || std::stoi(dimensions) > 10)
@@ -170,7 +170,7 @@ public:
 
 private:
     std::string path_, unusable_;
-    std::vector<std::uint64_t> size_;  // along all dimensions
+    std::vector<std::uint64_t> size_;  // in pixels, along all dimensions
     std::unique_ptr<ItkReader> reader_;
     std::uint64_t file_bytes_;
 };
@@ -225,8 +225,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     if (is_meta) require_meta_header(*header, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    // ITK's readers abort or do not terminate if headers are inconsistent, so they run in the separate program; an HDF5
-    // file has already been tried there.
+    // ITK's readers abort or do not terminate if headers are inconsistent, so they run in the separate program. An HDF5
+    // file is read in this process, because try_hdf5() has already read it in the separate program.
     std::unique_ptr<ItkReader> reader = is_hdf5 ? itk_reader_of(path)(path, unusable) : nullptr;
     const ItkHeader image = reader ? reader->header() : header_by_itk(path, unusable);
 

@@ -37,7 +37,8 @@ private:
         if (swap_) swap_bytes(&value, 1, sizeof(T));
         return value;
     }
-    /// Whether the byte order is plausible: in the wrong byte order, small numbers become huge or negative.
+    /// Whether the byte order `swap_` is plausible: with the wrong byte order, the small numbers of the header would be
+    /// huge or negative.
     [[nodiscard]] bool is_sound() const {
         constexpr std::int32_t kHuge = 1 << 24;
         bool sound = integer(kMode) >= 0 && integer(kMode) < 128 && integer(kExtended) >= 0;

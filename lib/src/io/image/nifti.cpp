@@ -1,4 +1,5 @@
-// NIfTI-1. ITK's reader is not used: it rejects sheared lattices, and chooses between sform and qform by another rule.
+// NIfTI-1. ITK's reader is not used: it rejects sheared lattices, and its rule for the choice between sform and qform
+// differs from that of open_nifti().
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -99,7 +100,8 @@ private:
     bool swap_ = false;
 };
 
-/// Position of the pixels; empty if they are in another file or are not grey values. Adds header fields to `info`.
+/// Position of the pixels; empty if the pixels are in another file or are not grey values. Adds header fields to
+/// `info`.
 std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
     const auto type = nifti_type(header.integer(70));
     const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
@@ -141,7 +143,7 @@ NiftiAffine qform_of(const NiftiHeader& header) {
     double b = header.number(nifti::kQuatern), c = header.number(nifti::kQuatern + 4),
            d = header.number(nifti::kQuatern + 8);
     const double square = b * b + c * c + d * d, a = std::sqrt(std::max(0.0, 1 - square));
-    if (square > 1)  // rounding errors of a rotation by 180 degrees
+    if (square > 1)  // for a rotation by 180 degrees, the square is 1, and rounding errors may increase it
         for (double* part : {&b, &c, &d}) *part /= std::sqrt(square);
     NiftiAffine qform;
     qform.matrix = {{{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
@@ -168,7 +170,7 @@ NiftiAffine base_of(const NiftiHeader& header, const Index3& size) {
     return base;
 }
 
-/// The maximum distance between the positions that the two maps give to a corner voxel.
+/// The maximum over the corner voxels of the image of the distance between their positions under the two maps.
 double distance_between(const NiftiAffine& p, const NiftiAffine& q, const Index3& size) {
     double maximum = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -262,7 +264,7 @@ private:
     const RunContext& run_;
 };
 
-/// The type of the rescaled values.
+/// The type of the pixels after they are multiplied by the slope and the intercept is added.
 PixelType rescaled_nifti_type(const PixelPlace& place) {
     if (place.slope == 1 && place.intercept == 0) return place.type;
     return place.type == PixelType::Double ? PixelType::Double : PixelType::Float;

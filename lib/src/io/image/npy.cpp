@@ -12,10 +12,10 @@
 namespace covol::detail {
 namespace {
 
-/// The dictionary in the header.
+/// The entries of the dictionary in the header, as texts.
 struct NpyHeader {
     std::string descr, order, shape;
-    std::uint64_t end = 0;  ///< position of the first value
+    std::uint64_t end = 0;  ///< position in bytes of the first value of the array
 };
 
 /// The value of a key in the header's dictionary, without quotes and without a closing parenthesis; empty if there
@@ -79,7 +79,8 @@ void set_type(const std::string& path, const std::string& descr, PixelPlace& pla
                          "; save array.astype(\"float32\")");
 }
 
-/// Parses a shape such as "(58, 512, 512"; the sizes are in the order of the text.
+/// Parses a shape such as "(58, 512, 512", without the closing parenthesis, which value_of() removes; the sizes are in
+/// the order of the text.
 std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string& shape) {
     std::vector<std::string_view> words;
     std::vector<std::uint64_t> sizes;
@@ -97,7 +98,8 @@ std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string
     return {sizes[0], sizes[1], sizes[2]};
 }
 
-/// An array in Fortran order. It is read as an array in C order whose axes are reversed.
+/// An array in Fortran order. It is read as an array in C order whose axes are in reverse order, which is stored in the
+/// same way.
 class FortranFile : public ImageFile {
 public:
     FortranFile(const std::string& path, const ImageInfo& info, const PixelPlace& place) : path_(path) {

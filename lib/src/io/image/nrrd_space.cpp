@@ -10,7 +10,7 @@
 namespace covol::detail {
 namespace {
 
-/// Parses "(1,0,0) (0,1,0) none": for each axis a vector, or nothing if the axis has no direction. The list is empty if
+/// Parses "(1,0,0) (0,1,0) none": for each axis a vector, or nothing if the header states "none". The list is empty if
 /// the text cannot be parsed.
 std::vector<std::optional<Vec3>> read_vectors(std::string_view text) {
     std::vector<std::optional<Vec3>> vectors;
@@ -87,7 +87,8 @@ std::vector<std::size_t> space_axes(const TextHeader& header, const std::vector<
     return axes.size() == 3 ? axes : std::vector<std::size_t>{0, 1, 2};
 }
 
-/// The unit of each axis, as a multiple of the unit of the first axis; 0 if it is unknown, 1 if there is none.
+/// The unit of each axis, as a multiple of the unit of the first axis: 1 if the axis has no unit of its own, 0 if one
+/// of the two units is not a known unit of length.
 Vec3 unit_factors(const std::array<std::string, 3>& units) {
     Vec3 factors{1, 1, 1};
     const double first = unit_in_metres(units[0]);
@@ -116,7 +117,8 @@ void restore_nrrd_space(const std::string& path, const TextHeader& header, Image
     }
     if (!of_space.empty() || !of_axes.empty()) g.unit = units[0];
     const Vec3 factors = unit_factors(units);
-    std::array<bool, 3> unknown{};  // per world axis if there are "space units", otherwise per image axis
+    // Whether the factor is unknown, for each world axis if there are "space units", otherwise for each image axis.
+    std::array<bool, 3> unknown{};
     for (std::size_t a = 0; a < 3; ++a) {
         unknown[a] = factors[a] == 0;
         if (unknown[a])

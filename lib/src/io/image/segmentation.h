@@ -13,7 +13,7 @@ namespace covol::detail {
 std::unique_ptr<ImageFile> open_segment(const std::string& path, std::unique_ptr<ImageFile> file,
                                         const std::string& name);
 
-/// How to choose one of the segments of a file that has several layers, for messages; empty for other files.
+/// Advice, for messages, to choose a segment by its name, if the file has at least two segments; otherwise empty.
 std::string advice_on_segments(const std::string& path);
 
 }  // namespace covol::detail

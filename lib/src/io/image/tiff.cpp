@@ -33,7 +33,8 @@ PixelType pixel_type(const std::string& path, const TiffPage& page) {
                          " bits in sample format " + std::to_string(page.format));
 }
 
-/// Position of the pixels of an uncompressed page; empty if they are not contiguous.
+/// Position in bytes of the pixels of a page; empty if they are compressed, in tiles, not contiguous, or of several
+/// samples.
 std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const TiffPage& page) {
     if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return std::nullopt;
     if (tiff.tag<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) != FILLORDER_MSB2LSB) return std::nullopt;
@@ -141,7 +142,8 @@ private:
 
     void fill_info(const std::string& axes) {
         const bool colour = kind_.samples > 1;
-        // In colour images, the samples of a pixel are the channels. OME counts them in SizeC, too.
+        // In colour images, the samples of a pixel are the channels, which OME counts in SizeC. Another number of
+        // channels would mean several colour images, which are not supported.
         if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
             throw read_error(Errc::Unsupported, path_, "expected one sample for each pixel of a channel, got several");
         if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
@@ -170,7 +172,7 @@ private:
             info_.chunk_size = tiff_chunk_size(*tiff_, frame_of_kind());
     }
 
-    /// The properties that all channels and frames have in common; the slices are not set.
+    /// The properties that all channels and frames have in common; `slices` and `sample`, which differ, are not set.
     [[nodiscard]] TiffFrame frame_of_kind() const {
         TiffFrame frame;
         frame.path = path_;
@@ -203,7 +205,7 @@ private:
                             stack_.files[plane.file] + ": damaged or truncated at page " + std::to_string(plane.page));
     }
 
-    /// Opens `file` instead of the current one.
+    /// Opens the file with this index, unless it is the file that is open already.
     void switch_file(std::uint32_t file) {
         if (file == open_) return;
         tiff_ = open_for_reading(stack_.files[file]);
@@ -235,7 +237,8 @@ private:
         }
     }
 
-    /// Whether the image is large, in one file, and uncompressed according to its first page.
+    /// Whether map() may succeed: the box is large, and the pixels are in one file, in this machine's byte order, with
+    /// one sample each, and uncompressed according to the first page.
     [[nodiscard]] bool may_map(const PixelRequest& request) const {
         return is_worth_mapping(std::uint64_t(request.box.size()[2]) * kind_.bytes()) && stack_.files.size() == 1 &&
                kind_.samples == 1 && TIFFIsByteSwapped(tiff_->get()) == 0 &&
@@ -250,7 +253,7 @@ private:
         return pixels_in_one_piece(*tiff_, kind_);
     }
 
-    /// Maps the slices if they are evenly spaced in the file.
+    /// Maps the slices of the box into memory; empty if they are not evenly spaced in the file.
     [[nodiscard]] std::optional<Pixels> map(const PixelRequest& request) const {
         const VoxelBox& box = request.box;
         const std::uint64_t width = pixel_bytes(info_.type);
@@ -265,7 +268,7 @@ private:
             if (begins[n] < begins[n - 1] || begins[n] - begins[n - 1] != step) return std::nullopt;
         const std::uint64_t bytes = begins.back() + kind_.bytes() - begins.front();
         if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_))
-            return std::nullopt;  // read() then reports the slice that is missing
+            return std::nullopt;  // if the file is truncated, read() reports the missing slice
         const auto slab = map_file(path_, begins.front(), bytes);
         const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * kind_.row_bytes() +
                             std::uint64_t(box.min[0]) * width;
@@ -275,8 +278,8 @@ private:
     std::string path_;
     std::unique_ptr<Tiff> tiff_;
     std::uint32_t open_ = 0;        ///< index in stack_.files of the file that is open as tiff_
-    TiffPage kind_;                 ///< the first page; all others have the same properties
-    std::vector<TiffPage> pages_;   ///< pages of the open file; empty for a single directory
+    TiffPage kind_;                 ///< properties of the first page, which all other pages must have, too
+    std::vector<TiffPage> pages_;   ///< pages of the open file; empty if the stack has a single directory
     std::uint64_t contiguous_ = 0;  ///< position of the pixels in a stack with a single directory
     TiffStack stack_;
 };

@@ -1,4 +1,4 @@
-// Large TIFFs that cannot be mapped: parts of pages are read on demand.
+// Reads parts of pages on demand, for large TIFFs that cannot be mapped into memory.
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -11,16 +11,18 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;  // minimum size of a chunk
-constexpr std::size_t kMaxHandles = 64;                       // maximum number of idle open files
-constexpr std::int32_t kBrick = 256;                          // strips are divided into columns of this width
+// Minimum size of a chunk in bytes, unless the page is smaller.
+constexpr std::uint64_t kMinBytes = std::uint64_t(64) << 10;
+constexpr std::size_t kMaxHandles = 64;  // maximum number of idle open files
+// Maximum width and height in pixels of a chunk that is a part of a strip.
+constexpr std::int32_t kBrick = 256;
 
 /// A pool of open files, because a libtiff handle can be used by only one thread at a time.
 class TiffHandles {
 public:
     struct Handle {
         std::uint32_t file = 0;
-        std::uint64_t page = 0;  ///< offset of the current directory; 0 if unknown
+        std::uint64_t page = 0;  ///< offset in the file of the directory that libtiff has read last; 0 if unknown
         std::unique_ptr<Tiff> tiff;
     };
 
@@ -48,7 +50,8 @@ public:
         idle_.push_back(std::move(handle));
     }
 
-    /// The offsets of the pages of a file, 0 for pages of another kind. The pages are listed only once.
+    /// The offsets of the pages of a file, 0 for pages whose properties differ from `kind`. The pages of each file are
+    /// listed only once.
     std::vector<std::uint64_t> pages(std::uint32_t file, const TiffPage& kind) {
         const std::lock_guard<std::mutex> lock(listing_);
         auto found = pages_.find(file);
@@ -73,7 +76,8 @@ public:
     TiffChunks(const TiffFrame& frame, const Index3& chunk_size)
         : ChunkSource(frame.path, frame.type, frame.size, chunk_size), frame_(frame), handles_(frame.files) {
         if (frame.contiguous > 0) return;
-        // All offsets are determined in advance; otherwise reading a slice would go through all previous directories.
+        // All offsets are determined in advance. Otherwise libtiff would go through all previous directories for each
+        // slice.
         std::uint32_t listed = std::numeric_limits<std::uint32_t>::max();
         std::vector<std::uint64_t> pages;
         for (const TiffStack::Plane& plane : frame.slices) {
@@ -88,13 +92,14 @@ public:
         return true;
     }
 
-    /// Chunks of one slice are read together: a strip is as wide as the page, and is unpacked once for neighbours.
+    /// Chunks of one slice are read together, because a strip is as wide as the page: it is then unpacked once for all
+    /// chunks that it intersects.
     [[nodiscard]] bool in_layers() const noexcept override { return true; }
 
     void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const override {
         const Index3& n = chunk_size();
-        // Neighbouring chunks of a row are read together: a strip is unpacked once for all of them, and only if it is
-        // needed.
+        // Each range of neighbouring chunks in a row is read as one box, so that a strip is unpacked once for all of
+        // them.
         for (std::size_t first = 0; first < chunks.size();) {
             std::size_t last = first + 1;
             while (last < chunks.size() && chunks[last][1] == chunks[first][1] &&
@@ -127,7 +132,7 @@ private:
             "damaged or truncated at page " + std::to_string(plane.page) + (why.empty() ? "" : " (" + why + ")"));
     }
 
-    /// A part of one slice.
+    /// Reads a box within one slice.
     void read_box(const VoxelBox& box, char* out) const {
         const auto k = std::size_t(box.min[2]);
         const TiffStack::Plane& plane = frame_.slices[k];
@@ -175,7 +180,7 @@ Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame) {
         chunk[0] = up_to(tiff.tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0), frame.size[0]);
         chunk[1] = up_to(tiff.tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0), frame.size[1]);
     } else if (frame.contiguous == 0) {
-        // The height of a chunk is a multiple of the height of a strip if strips are small.
+        // If strips are small, a chunk consists of several strips, so that it has about kMinBytes.
         const auto rows = std::uint64_t(
             up_to(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, std::uint32_t(frame.size[1])), frame.size[1]));
         const std::uint64_t minimum = std::max<std::uint64_t>(kMinBytes / width / std::uint64_t(chunk[0]), 1);

@@ -13,7 +13,7 @@ namespace covol::detail {
 /// A libtiff handle that keeps the first error message instead of printing it.
 class Tiff {
 public:
-    /// @param largest_allocation  maximum size of one block, in bytes; 0: no limit
+    /// @param largest_allocation  maximum size in bytes of one block of memory that libtiff allocates; 0: no limit
     Tiff(const std::string& path, const char* mode, std::uint64_t largest_allocation) {
         TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
         TIFFOpenOptionsSetErrorHandlerExtR(options, &Tiff::keep_message, this);

@@ -24,7 +24,8 @@ public:
 
     /// Returns false if the page is damaged or truncated.
     bool read(char* out) {
-        // A tile may be larger than the page, but only by this number of pixels per side.
+        // A tile may be larger than the page. If it exceeds the page by more than this number of pixels, the file is
+        // damaged.
         constexpr std::uint64_t kSlack = 65536;
         if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack)
             return false;
@@ -42,9 +43,11 @@ public:
     }
 
 private:
-    /// Upper bound for the unpacked bytes of the file, from its size.
+    /// Upper bound for the number of unpacked bytes of the whole file, computed from its size. Larger blocks are
+    /// rejected before memory is allocated.
     [[nodiscard]] std::uint64_t max_in_file() const {
-        constexpr std::uint64_t kMaxOfByte = 32768;  // for zstd; other codecs have lower ratios
+        // Maximum number of unpacked bytes for each byte of the file, by zstd; other codecs have lower ratios.
+        constexpr std::uint64_t kMaxOfByte = 32768;
         const std::uint64_t bytes = TIFFGetSizeProc(tiff_.get())(TIFFClientdata(tiff_.get()));
         const bool packed = tiff_.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE;
         return packed ? kMaxOfByte * bytes : bytes;
@@ -110,7 +113,8 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status)
         throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
-    // "m" prevents libtiff from mapping the file: mapped pages of packed tiles would stay in memory.
+    // "m" prevents libtiff from mapping the file: the mapped memory would keep compressed tiles in memory after they
+    // are unpacked.
     auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kMinLimit, 4 * bytes));
     if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, path + ": not a usable TIFF file");
     return tiff;

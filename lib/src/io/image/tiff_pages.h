@@ -30,7 +30,8 @@ struct TiffPage {
 
 TiffPage current_page(const Tiff& tiff);
 
-/// Opens a file for reading; the file's size limits libtiff's own allocations. @throws Error Io, InvalidInput.
+/// Opens a file for reading; the maximum size of a block of memory that libtiff allocates is derived from the file's
+/// size. @throws Error Io, InvalidInput.
 std::unique_ptr<Tiff> open_for_reading(const std::string& path);
 
 /// All full-resolution pages, which must all have the same properties. @throws Error Unsupported, InvalidInput.
@@ -48,13 +49,14 @@ struct TiffFrame {
     TiffPage kind;                         ///< properties that all pages have
     std::uint64_t sample = 0;              ///< index of the sample that is read of each pixel
     std::vector<std::string> files;        ///< paths of the files of the image
-    std::vector<TiffStack::Plane> slices;  ///< position of each slice
-    std::uint64_t contiguous = 0;          ///< if not 0, position of contiguous slices with a single directory
-    bool swapped = false;                  ///< contiguous slices have the opposite of this machine's byte order
+    std::vector<TiffStack::Plane> slices;  ///< the file and page of each slice
+    /// If not 0, position in the file of the first of several contiguous slices that have a single directory.
+    std::uint64_t contiguous = 0;
+    bool swapped = false;  ///< contiguous slices have the opposite of this machine's byte order
 };
 
-/// The chunk size: tiles, or parts of strips, of at least about 64 KiB. The current page of `tiff` has to be one of the
-/// frame's pages.
+/// The size of chunks in voxels. Chunks are one or several tiles, or parts of strips, of at least about 64 KiB. The
+/// current page of `tiff` has to be one of the frame's pages.
 Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame);
 std::shared_ptr<const ChunkSource> tiff_chunks(const TiffFrame& frame, const Index3& chunk_size);
 

@@ -1,4 +1,4 @@
-// Descriptions of the pages of a TIFF as written by ImageJ, tifffile and OME.
+// Interprets the descriptions of the pages of a TIFF that ImageJ, tifffile and OME write.
 #include "io/image/tiff_stack.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Maximum number of planes, more than any microscope acquires; a damaged description may claim more.
+// Maximum number of planes. No microscope acquires so many; more can only be the claim of a damaged description.
 constexpr std::uint64_t kMaxPlanes = std::uint64_t(1) << 24;
 
 double to_number(const std::string& text) {
@@ -27,7 +27,8 @@ double to_number(const std::string& text) {
     return status == std::errc() && std::isfinite(value) ? value : 0;
 }
 
-/// The absolute value, because some programs state a negative distance between slices for descending stacks.
+/// The absolute value of the number, because some programs state a negative distance between slices if the stack is
+/// descending.
 double to_length(const std::string& text) { return std::abs(to_number(text)); }
 
 /// Rounds to 13 digits, which removes rounding errors of unit conversions.
@@ -67,8 +68,8 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     for (std::size_t a = 0; a < 2; ++a) {
         const float spacing = 1.0F / facts.resolution[a];
         if (!std::isfinite(spacing) || !(spacing > 0)) continue;
-        // libtiff returns single precision. The shortest text that represents this float is the decimal number that the
-        // writer intended, for example 0.35.
+        // libtiff returns single precision. The shortest text that represents `spacing` is usually the decimal number
+        // that the writer intended, for example 0.35.
         std::array<char, 32> text{};
         const auto end = std::to_chars(text.data(), text.data() + text.size(), spacing).ptr;
         std::from_chars(text.data(), end, stack.spacing[a]);
@@ -109,15 +110,15 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
     if (units[0].empty() && facts.resolution_unit == kInch) units[0] = "inch";
     if (units[0].empty() && facts.resolution_unit == kCentimetre) units[0] = "cm";
     const std::string depth = value("spacing");
-    // A resolution of 1 without a unit means that the writer did not know the spacing.
+    // A resolution of 1 without a unit is what programs write if they do not know the spacing.
     const bool known = !units[0].empty() || facts.resolution[0] != 1.0F || !depth.empty();
     if (!known) return;
     read_resolution(facts, stack);
     stack.spacing[2] = to_length(depth);
-    // ImageJ omits a distance of 1 between slices.
+    // ImageJ omits the distance between slices if it is 1.
     if (stack.spacing[2] == 0 && stack.spacing[0] > 0) stack.spacing[2] = 1;
     unify_units(stack, units);
-    // ImageJ's origin is the position, in voxels, of the world's point 0.
+    // ImageJ's origin is the position, in voxels, of the point 0 of the world.
     const std::array<std::string, 3> origin{value("xorigin"), value("yorigin"), value("zorigin")};
     for (int a = 0; a < 3; ++a)
         if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
@@ -161,7 +162,7 @@ void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     }
     if (json.contains("unit") && json.at("unit").is_string())
         stack.unit = normal_unit(json.at("unit").get<std::string>());
-    // tifffile writes the resolution 1/1 if it is not known.
+    // tifffile writes the resolution 1/1 if it does not know the spacing.
     if (facts.resolution[0] != 1.0F && facts.resolution_unit == 1) read_resolution(facts, stack);
 }
 
@@ -215,9 +216,9 @@ double ome_unit_in_metres(const std::string& text) {
     return 0;
 }
 
-/// Sets the unit: that of the axes if it is the same for all and unit_in_metres() knows it, otherwise the micrometre.
-/// An axis whose unit the schema does not define has no spacing. There is no unit if that of all axes is "reference
-/// frame" or that of all is "pixel".
+/// Sets the unit of the image: the unit of the axes if all axes have the same unit and unit_in_metres() knows it,
+/// otherwise the micrometre. An axis whose unit the schema does not define has no spacing. The image has no unit if all
+/// axes have the unit "reference frame", or all have the unit "pixel".
 void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
     const bool alike = texts[0] == texts[1] && texts[1] == texts[2];
     if (alike && (texts[0] == "reference frame" || texts[0] == "pixel")) return;
@@ -237,7 +238,7 @@ void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
 
 /// A <TiffData> element, which assigns planes to pages.
 struct TiffData {
-    std::string ifd, plane_count, file;  ///< as written; empty if absent
+    std::string ifd, plane_count, file;  ///< attributes as in the XML; empty if absent
     std::uint64_t z = 0, c = 0, t = 0;
 };
 
@@ -245,7 +246,7 @@ struct OmePixels {
     XmlTag pixels;
     std::vector<std::string> channels;
     std::vector<TiffData> data;
-    std::string metadata_file;  ///< set if the XML is in another file
+    std::string metadata_file;  ///< name of the file with the XML; empty if the XML is in this file
     int images = 0;
 };
 
@@ -257,7 +258,8 @@ OmePixels parse_ome(const std::string& xml) {
     while (tags.next(tag)) {
         if (tag.closing) continue;
         if (tag.name == "BinaryOnly") ome.metadata_file = tag.value("MetadataFile");
-        // Only <Pixels> of the first <Image>, or before any <Image>, is used: some writers omit <Image>.
+        // Only <Pixels> of the first <Image> is used, or <Pixels> before any <Image>, because some writers omit
+        // <Image>.
         if (tag.name == "Image") ++ome.images;
         if (ome.images > 1) continue;
         if (tag.name == "Pixels" && ome.pixels.name.empty()) ome.pixels = tag;
@@ -313,8 +315,8 @@ public:
     }
 
 private:
-    /// Assigns names of files to file numbers. If all planes are in one file of another name that does not exist, this
-    /// file has been renamed, so the name refers to it.
+    /// Assigns the names of files to file numbers. If all planes are in one file, and this file does not exist, the
+    /// file that is being read has been renamed: the name then refers to it.
     void name_files(const std::vector<TiffData>& data) {
         const std::string own = fs::path(facts_.path).filename().string();
         numbers_[""] = numbers_[own] = 0;
@@ -370,7 +372,8 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
         const std::string unit = value(key + "Unit");
         units[a] = unit.empty() ? "\xC2\xB5m" : unit;  // micrometre, the default of the OME schema
     }
-    // An axis without a spacing gets the unit of another axis, so that it does not affect the common unit.
+    // An axis without a spacing gets the unit of another axis, so that it does not affect the choice of the common
+    // unit.
     for (int a = 0; a < 3; ++a)
         if (stack.spacing[a] == 0) units[a] = units[stack.spacing[0] > 0 ? 0 : stack.spacing[1] > 0 ? 1 : 2];
     read_ome_units(units, stack);
@@ -456,7 +459,8 @@ void rename_axes(const std::string& path, const std::string& axes, TiffStack& st
                          "the file's axes of planes (" +
                              (list.empty() ? "none" : list) + ") before YX, such as ZCYX; got '" + axes + "'");
     if (stack.slices == 1) {
-        // The planes become slices, whose distance is known only if the file states it; the default is discarded.
+        // The planes become slices. Their distance is known only if the file states it, so ImageJ's default of 1 is
+        // discarded.
         const bool stated = std::any_of(stack.fields.begin(), stack.fields.end(), [](const auto& field) {
             return field.first == "spacing" || field.first == "PhysicalSizeZ";
         });

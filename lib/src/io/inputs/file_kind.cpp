@@ -32,7 +32,8 @@ constexpr std::array<std::string_view, 18> kPointEndings{".xyz",   ".csv", ".tsv
 constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
 constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
 
-/// Whether a file holds a mesh. A file that is neither a mesh nor points is reported as a broken mesh.
+/// Whether a file in a format for both meshes and points holds triangles. If the file can be read neither as a mesh nor
+/// as points, the error of the mesh reader is thrown.
 bool holds_triangles(const std::string& path) {
     try {
         return !read_mesh(path).empty();

@@ -18,7 +18,8 @@ namespace {
 
 /// Reads the triangles of all meshes of a .glb file, and translates them as their nodes state.
 class GlbReader {
-    static constexpr std::uint64_t kMaxReuse = 8;  // maximum number of times that data may be used on average
+    // Maximum number of bytes that accessors read in total, as a multiple of the size of the binary chunk.
+    static constexpr std::uint64_t kMaxReuse = 8;
 
 public:
     GlbReader(Source& source, std::string_view text) : source_(source), builder_(source), text_(text) {}
@@ -29,7 +30,7 @@ public:
         if (!required.empty()) unsupported("the extension " + required.dump().substr(0, 60));
         const std::vector<Vec3> translations = read_nodes();
         for (std::size_t n = 0; n < translations.size(); ++n) {
-            if (translations[n] != translation_) first_vertex_.clear();  // read vertices again
+            if (translations[n] != translation_) first_vertex_.clear();  // the known vertices have another translation
             translation_ = translations[n];
             for (const Json& primitive : member(list("meshes")[n], "primitives", Json::array())) add(primitive);
         }
@@ -96,7 +97,8 @@ private:
         return value.get<std::uint64_t>();
     }
 
-    /// The translation of each mesh by its nodes. Files with coordinates far from 0 use translations.
+    /// The translation of each mesh by its nodes. Files with coordinates far from 0 use translations, because glTF
+    /// stores positions in single precision.
     [[nodiscard]] std::vector<Vec3> read_nodes() const {
         std::vector<Vec3> translations(list("meshes").size(), Vec3{0, 0, 0});
         std::vector<bool> is_placed(translations.size(), false);
@@ -149,8 +151,8 @@ private:
         return result;
     }
 
-    /// Counts the bytes that are read. Meshes may use the same data repeatedly, but the sum is limited, because a small
-    /// file could otherwise yield a huge mesh.
+    /// Counts the bytes that are read. Meshes may use the same data repeatedly, but the sum is limited to kMaxReuse
+    /// times the size of the binary chunk, because a small file could otherwise yield a huge mesh.
     void take(const Accessor& data, std::uint64_t width) {
         if (data.count * width > unread_) source_.fail("its meshes use the same data too often");
         unread_ -= data.count * width;
@@ -168,7 +170,7 @@ private:
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
                 const Vec3 at{translation_[0] + p[0], translation_[1] + p[1], translation_[2] + p[2]};
-                builder_.vertex({at[0], -at[2], at[1]});  // glTF prescribes that y points up; here, z does
+                builder_.vertex({at[0], -at[2], at[1]});  // in glTF, y points up; in a TriangleMesh, z does
             }
         }
         return {known->second, data.count};
@@ -199,7 +201,8 @@ private:
         const std::size_t width = data.component == 5121 ? 1 : data.component == 5123 ? 2 : 4;
         take(data, width);
         for (std::uint64_t n = 0; n < data.count; ++n) {
-            std::uint32_t vertex = 0;  // smaller indices are copied to its first bytes: the machine is little-endian
+            // Indices of 8 or 16 bits are copied to the low bytes of `vertex`, because the machine is little-endian.
+            std::uint32_t vertex = 0;
             std::memcpy(&vertex, data.bytes.data() + n * data.stride, width);
             corner(vertex);
         }
@@ -210,7 +213,7 @@ private:
     std::string_view text_, binary_;
     Json json_;
     std::uint64_t unread_ = 0;
-    Vec3 translation_{0, 0, 0};  ///< of the current mesh
+    Vec3 translation_{0, 0, 0};  ///< translation of the current mesh
     std::unordered_map<std::uint64_t, std::uint64_t> first_vertex_;
 };
 
@@ -279,7 +282,6 @@ std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& js
 
 TriangleMesh read_glb(Source& source, std::string_view text) { return GlbReader(source, text).read(); }
 
-/// glTF 2.0 in one file: a JSON chunk that describes the binary chunk.
 void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments) {
     nlohmann::json json{
         {"asset",

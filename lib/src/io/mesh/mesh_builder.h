@@ -46,7 +46,7 @@ public:
     void face(const std::vector<std::uint32_t>& corners) override {
         if (corners.size() == 3) return triangle(corners[0], corners[1], corners[2]);
         for (const std::uint32_t v : corners)
-            if (v >= vertex_count()) {  // the vertex may follow later in the file
+            if (v >= vertex_count()) {  // vertex v may follow later in the file; finish() then adds the face
                 waiting_.push_back(corners);
                 return;
             }

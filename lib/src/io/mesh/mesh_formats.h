@@ -39,11 +39,12 @@ std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOpt
     return p;
 }
 
-/// Reports the origin of a mesh that is lost because the format stores only single precision.
+/// Warns that the origin of a mesh is not 0 if the format (binary STL) cannot store it, because it has only single
+/// precision.
 void report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
-/// write_ply_header() writes the beginning of a PLY file, up to its vertices. @throws Error Unsupported (more than
-/// 2^31 - 1 vertices or triangles).
+/// The numbers of vertices and triangles that write_ply_header() writes. This function writes a PLY file up to its
+/// vertices. @throws Error Unsupported (more than 2^31 - 1 vertices or triangles).
 struct PlyCounts {
     std::uint64_t vertices, triangles;
 };

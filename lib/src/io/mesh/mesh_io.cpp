@@ -17,8 +17,8 @@
 #include "io/mesh/mesh_formats.h"
 #include "mesh/vertex_normals.h"
 
-// These readers and writers replace those of OpenMesh: its readers trust the counts in a file's header, drop triangles
-// that are not manifold and print messages about it, and its writers do not support comments.
+// These readers and writers replace those of OpenMesh: its readers trust the counts in a file's header, omit triangles
+// that would make the mesh non-manifold and print messages about them, and its writers do not support comments.
 namespace covol {
 namespace {
 

@@ -22,7 +22,7 @@ class Output {
 public:
     Output() = default;
     /// @param name  of the file in error messages
-    /// @throws Error Io if the file cannot be written, as do all other functions.
+    /// @throws Error Io if the file cannot be written; all other functions throw this error, too.
     Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) {
         check();
     }
@@ -43,7 +43,8 @@ public:
     void pad(std::size_t multiple, char fill) {
         while ((flushed_ + data_.size()) % multiple != 0) data_ += fill;
     }
-    /// The contents of the buffer: all bytes if there is no file on the disk, otherwise those not written to it yet.
+    /// The contents of the buffer: all bytes if there is no file on the disk, otherwise the bytes that are not written
+    /// to the file yet.
     [[nodiscard]] const std::string& data() const { return data_; }
     /// Number of bytes written so far.
     [[nodiscard]] std::uint64_t size() const { return flushed_ + data_.size(); }
@@ -85,7 +86,8 @@ Output& operator<<(Output& out, const std::array<Real, 3>& p) {
     return out << p[0] << " " << p[1] << " " << p[2];
 }
 
-/// Writes positions: in single precision if the mesh's origin is 0, otherwise in double precision with it added.
+/// Writes positions: in single precision if the mesh's origin is 0, otherwise in double precision, with the origin
+/// added.
 class PositionWriter {
 public:
     explicit PositionWriter(const Vec3& origin) : origin_(origin) {}

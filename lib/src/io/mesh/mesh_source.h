@@ -13,7 +13,7 @@
 
 namespace covol::mesh_io {
 
-/// A file in memory that is read as lines or as bytes. Error messages state the line.
+/// A file in memory that is read as lines or as bytes. Error messages state the number of the line.
 class Source {
 public:
     /// @param reader  name of the function, which messages begin with; path and text must outlive this object
@@ -31,7 +31,7 @@ public:
         return line;
     }
 
-    /// The next line that is neither blank nor a comment, without its comment; false at the end of the file.
+    /// The next line that is neither blank nor a comment, without the comment at its end; false at the end of the file.
     bool next_content(std::string_view& line) { return lines_.next_content(line); }
     std::string_view content_line() {
         std::string_view line;
@@ -39,7 +39,7 @@ public:
         return line;
     }
 
-    /// The next `count` bytes. After this call, messages do not state a line.
+    /// The next `count` bytes. After this call, error messages state no line, because the file is binary.
     std::string_view bytes(std::size_t count) {
         is_text_ = false;
         if (count > bytes_left()) fail("the file is truncated");

@@ -28,7 +28,8 @@ private:
     Output out_;
 };
 
-/// Writes PLY and OBJ. The faces are stored in a temporary file until all vertices have been written.
+/// Writes PLY and OBJ. Triangles may arrive before the last vertex, but follow the vertices in the file, so they are
+/// stored in a temporary file until finish().
 class IndexedStream : public MeshStream {
 public:
     IndexedStream(const std::string& path, const std::string& name, bool ply, const PlyCounts& counts,
@@ -68,7 +69,7 @@ public:
         faces_.close();
         std::ofstream whole(path_, std::ios::binary | std::ios::app);
         std::ifstream faces(faces_file_, std::ios::binary);
-        // `<<` would set the error state if the temporary file were empty.
+        // If the temporary file were empty, `<<` would set the error state of `whole`.
         if (faces.peek() != std::ifstream::traits_type::eof()) whole << faces.rdbuf();
         whole.close();
         if (!whole || faces.bad()) throw Error(Errc::Io, name_ + ": cannot be written");

@@ -12,7 +12,7 @@ namespace covol::mesh_io {
 
 class MeshStream {
 public:
-    /// @param path  to write to; a temporary file
+    /// @param path  the file to write, which has a temporary name
     /// @param name  of the final file, whose extension determines the format: .ply, .stl or .obj
     /// @param origin  of the mesh; vertices are relative to it
     /// @throws Error Io, Unsupported (more than the format can hold).

@@ -1,4 +1,4 @@
-// OBJ: vertices, their normals, polygons.
+// Reads and writes OBJ meshes: vertices, their normals, and polygons. Other elements of a file are ignored.
 #include <string>
 #include <vector>
 
@@ -34,7 +34,8 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
         source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
 }
 
-/// The next line. After a backslash at its end, the next line is appended to it. @param joined  buffer for the result
+/// The next line. If it ends with a backslash, the following line is appended to it. @param joined  buffer for the
+/// result
 std::string_view whole_line(Source& source, std::string& joined) {
     std::string_view line = source.line();
     if (!line.ends_with('\\') || line.starts_with('#')) return line;

@@ -32,7 +32,8 @@ std::size_t read_count(const Source& source, std::string_view& line, const std::
     const auto count = to_number(word);
     if (!count)
         source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
-    // The limit is increased by one, for a last line without a line end; if data is missing, reading it fails later.
+    // The limit is one more than the division yields, because the last line may lack its line end. A file that is too
+    // short is then detected when its lines are read.
     if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / min_bytes + 1))
         source.fail("the file is truncated: a file of this size cannot contain " + quote(word) + " " + what);
     return std::size_t(*count);

@@ -1,4 +1,5 @@
-// PLY in ASCII and in both binary byte orders. Elements and properties that do not belong to the mesh are skipped.
+// Reads and writes PLY meshes. Files in ASCII and in both binary byte orders are read; elements and properties that do
+// not belong to the mesh are skipped.
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -19,9 +20,9 @@ namespace {
 
 enum class PlyType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
 struct PlyProperty {
-    std::string name;  ///< in lower case
+    std::string name;  ///< name in lower case
     PlyType type = PlyType::Float;
-    std::optional<PlyType> count;  ///< type of the length if the property is a list
+    std::optional<PlyType> count;  ///< if the property is a list, the type of the number of its entries
 };
 struct PlyElement {
     std::string name;
@@ -98,8 +99,8 @@ public:
     }
 
 private:
-    /// Position of a property in the current row: the index of its first word (ASCII) or byte (binary), in a list after
-    /// the length, and the number of its entries.
+    /// The position of a property in the current row, as the index of its first word (ASCII) or byte (binary), and the
+    /// number of its entries. For a list, this is the position of its first entry, which follows the number of entries.
     struct Place {
         std::size_t at = 0, count = 1;
     };
@@ -174,8 +175,8 @@ private:
     }
 
     /// Calls visit() for each row; value() and values() then refer to that row.
-    /// @param wanted  number of properties, from the first, that every line of an ASCII file must have. Later ones may
-    ///                be missing; but if a list in the last line is incomplete, the file is truncated
+    /// @param wanted  number of leading properties that every line of an ASCII file must have. The other properties may
+    /// be missing, but an incomplete list in the last line is an error, because the file is then truncated
     template <typename Visit>
     void for_each_row(const PlyElement& element, std::size_t wanted, const Visit& visit) {
         if (element.properties.empty()) return;
@@ -336,7 +337,7 @@ private:
     PlyFormat format_ = PlyFormat::Ascii;
     bool swap_ = false;
     std::vector<PlyElement> elements_;
-    // the current row
+    // The current row: its words (ASCII) or its first byte (binary), and the places of its properties.
     std::vector<std::string_view> words_;
     const char* row_ = nullptr;
     std::vector<Place> places_;

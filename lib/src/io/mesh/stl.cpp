@@ -1,4 +1,4 @@
-// STL, ASCII and binary.
+// Reads and writes STL meshes, in ASCII and binary.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -19,7 +19,8 @@ class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
     void corner(const Vec3& p) {
-        const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };  // so that -0 equals 0
+        // Adding 0 turns -0 into 0, whose bits differ.
+        const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };
         const std::array<float, 3> held = mesh_.held(p);
         const auto [at, is_new] =
             known_.try_emplace({bits(held[0]), bits(held[1]), bits(held[2])}, std::uint32_t(mesh_.vertex_count()));

@@ -3,9 +3,9 @@
 
 #include "io/modules/modules.h"
 
-// Wrappers with the names of the HDF5 library's functions. In namespace covol::detail, name lookup finds them before
-// the functions, which are in a module that is loaded by the first call. If a function that is missing in this list is
-// called, linking a program fails.
+// Wrappers with the names of the HDF5 library's functions. The library is in a module that is loaded by the first call.
+// Code in namespace covol::detail calls the wrappers, because name lookup finds them before the global functions. A
+// call of a function that is missing in this list calls the library directly, so that linking a program fails.
 // clang-format off
 #define COVOL_HDF5_FUNCTIONS(X) \
     X(H5open) X(H5check_version) X(H5Aclose) X(H5Aexists_by_name) X(H5Aget_space) X(H5Aget_type) \

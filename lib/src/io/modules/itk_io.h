@@ -10,8 +10,8 @@
 
 namespace covol::detail {
 
-/// Prevents ITK from printing warnings while this object exists. With default visibility, there is one class for all
-/// modules, so that they use the same count of existing objects (WhileAny).
+/// Prevents ITK from printing warnings while this object exists. The class has default visibility, so that all modules
+/// use the same class, and the same count of its objects in WhileAny.
 class __attribute__((visibility("default"))) QuietItk {
 public:
     QuietItk() { itk::Object::SetGlobalWarningDisplay(false); }
@@ -42,7 +42,7 @@ void with_itk(const std::string& unusable, Call&& call) {
         throw Error(Errc::InvalidInput, unusable + " (" + one_line(e.GetDescription()) + ")");
     } catch (const std::exception& e) {
         throw Error(Errc::InvalidInput, unusable + " (" + one_line(e.what()) + ")");
-    } catch (...) {  // HDF5's own exceptions have no base class
+    } catch (...) {  // HDF5's C++ exceptions are not derived from std::exception
         throw Error(Errc::InvalidInput, unusable);
     }
 }
@@ -64,7 +64,8 @@ inline PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase&
     }
 }
 
-/// A reader of ITK, of the class Io. ITK's factories are not used, because a static library does not register them.
+/// Reads an image with `Io`, one of the classes of ITK such as itk::NrrdImageIO. ITK's factories are not used, because
+/// a static library does not register them.
 template <typename Io>
 class ItkIo : public ItkReader {
 public:

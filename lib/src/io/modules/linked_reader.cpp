@@ -1,5 +1,5 @@
-// For a static library: covol-reader is in ../lib/covol-VERSION relative to the program's folder, if it exists there,
-// otherwise in the folder that the build has set.
+// Locates covol-reader if covol is a static library: in ../lib/covol-VERSION relative to the program's folder if it
+// exists there, otherwise in the folder that the build has set.
 #include <filesystem>
 
 #include "covol/version.h"

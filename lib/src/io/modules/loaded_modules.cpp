@@ -1,4 +1,4 @@
-// The modules of the shared library, loaded from a folder next to it.
+// Loads the modules of the shared library covol from a folder next to it.
 #include <dlfcn.h>
 
 #include <filesystem>

@@ -7,8 +7,9 @@
 #include "covol/image.h"
 
 // ITK, GDCM and HDF5 are loaded when a file first needs them, because they depend on about sixty other libraries, whose
-// loading takes as long as a small computation. Each is wrapped by a module, a shared library that does not depend on
-// the other parts of covol. If covol is a static library, and in the tests, the modules are linked instead.
+// loading takes as long as a small computation. Each of the three is wrapped by a module, a shared library that does
+// not depend on the other parts of covol. If covol is a static library, and in the tests, the modules are linked
+// instead.
 namespace covol::detail {
 
 /// The header of an image as ITK reports it; lists have one entry for each dimension.
@@ -18,9 +19,9 @@ struct ItkHeader {
     bool is_rgb = false;
     std::vector<std::uint64_t> size;
     std::vector<double> spacing, origin;
-    std::vector<std::vector<double>> axes;  ///< directions, one for each dimension
-    std::int64_t bytes = 0;                 ///< size of all pixels
-    double slope = 1, intercept = 0;        ///< rescaling that is applied to a DICOM file's pixels when they are read
+    std::vector<std::vector<double>> axes;  ///< direction of each dimension, as a vector
+    std::int64_t bytes = 0;                 ///< size of all pixels in bytes
+    double slope = 1, intercept = 0;        ///< rescaling that GDCM applies to a DICOM file's pixels when they are read
 };
 
 /// An image file whose header ITK has read.
@@ -41,7 +42,7 @@ protected:
 };
 
 /// Opens an image file with one of ITK's readers and reads its header. @throws Error InvalidInput if ITK cannot read
-/// it, with a message that begins with `unusable`; Unsupported if its values are not of one of the types in PixelType.
+/// the file, with a message that begins with `unusable`; Unsupported if its values have none of the types in PixelType.
 using OpenWithItk = std::unique_ptr<ItkReader>(const std::string& path, const std::string& unusable);
 
 /// ITK's readers of NRRD and MetaImage, which depend on few libraries.
@@ -52,7 +53,7 @@ struct ItkModule {
 struct GdcmModule {
     OpenWithItk* open;
 };
-/// The HDF5 library, and ITK's reader for files in its own layout.
+/// The HDF5 library, and ITK's reader of HDF5 files in the layout that ITK writes.
 struct Hdf5Module {
     OpenWithItk* open_itk;
     const struct Hdf5Calls* calls;

@@ -80,7 +80,8 @@ std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const 
         if (!trials[n].answer.empty()) std::memcpy(&flat, trials[n].answer.data(), sizeof flat);
         if (const auto error = reading_error(trials[n], files[n].path, library_of(task))) {
             if (error->code() == Errc::Io)
-                throw Error(*error);  // a module is missing, so nothing is known about the file
+                // A module cannot be loaded. This is no property of the file, so the whole call fails.
+                throw Error(*error);
             headers.emplace_back(*error);
         } else if (const auto header = flat.header())
             headers.emplace_back(*header);

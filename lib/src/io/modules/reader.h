@@ -15,14 +15,14 @@ namespace covol::detail {
 /// Path of covol-reader. @throws Error Io if it cannot be determined.
 std::string reader_program();
 
-/// The formats that the modules read, for messages.
+/// The formats that each module reads, for messages.
 inline constexpr const char *kOfItk = "NRRD and MetaImage", *kOfGdcm = "compressed DICOM", *kOfHdf5 = "HDF5";
 
 /// Checks whether covol-reader exists and may be executed; `problem` of the result is empty if so.
 ReaderPart check_reader_program();
 
-/// What covol-reader does with a file. Piece::detail is the beginning of the error message of ITK or GDCM, or the name
-/// of the dataset in an HDF5 file.
+/// What covol-reader does with a file. Piece::detail is the beginning of the error message for the tasks of ITK and
+/// GDCM, and the name of the dataset for Hdf5.
 enum class ReaderTask : std::uint32_t {
     ItkHeader,
     ItkPixels,
@@ -31,7 +31,7 @@ enum class ReaderTask : std::uint32_t {
     Hdf5,  ///< reads the header and one voxel
 };
 
-/// An ItkHeader of fixed size, for shared memory.
+/// An ItkHeader of fixed size without pointers, so that it can be copied to shared memory.
 class FlatHeader {
 public:
     /// Copies `header`. @returns false, without copying, if it has too many dimensions
@@ -65,12 +65,13 @@ public:
     [[nodiscard]] char* of(std::size_t n) const { return memory_.data() + begin_[n]; }
 
 private:
-    std::vector<std::uint64_t> begin_;  ///< position of each file's pixels in memory_, and the end of the last
+    /// Position in bytes of each file's pixels in memory_, and the end of the last file's pixels.
+    std::vector<std::uint64_t> begin_;
     SharedMemory memory_;
 };
 
-/// Tries to read an HDF5 file in covol-reader. @throws Error InvalidInput (the library crashes), Io, or the error that
-/// reading the file causes.
+/// Tries to read one voxel of an HDF5 file in covol-reader. @throws Error InvalidInput (the library crashes), Io, or
+/// the error that reading the file causes.
 void try_hdf5(const std::string& path, const std::string& inside);
 
 }  // namespace covol::detail

@@ -43,12 +43,13 @@ ChunkCache::Chunk ChunkCache::fill_of(const ChunkSource& source) {
     return fill;
 }
 
-/// Records the memory of a chunk that was just decoded, and evicts the least recently used chunks if necessary.
+/// Adds the size of a chunk that was just decoded to the size of the cache, and evicts the least recently used chunks
+/// if necessary.
 void ChunkCache::count(const Key& key, std::uint64_t bytes) {
     const std::lock_guard lock(mutex_);
     ++decoded_;
     const auto own = entries_.find(key);
-    if (own == entries_.end()) return;  // evicted meanwhile: only the caller uses it
+    if (own == entries_.end()) return;  // The chunk has been evicted meanwhile, so only the caller holds it.
     own->second.bytes = bytes;
     bytes_ += bytes;
     while (bytes_ > max_bytes_ && order_.size() > 1) {

@@ -9,14 +9,15 @@
 
 namespace covol::detail {
 
-/// The most recently used chunks of one or several sources, up to a total size. Thread-safe: a chunk that two threads
-/// request is decoded once.
+/// The most recently used chunks of one or several sources, up to a total size. Thread-safe: if two threads request the
+/// same chunk, it is decoded once.
 class ChunkCache {
 public:
     /// The voxels of a chunk, as read by ChunkSource::read(). They remain valid after the cache has evicted the chunk.
     using Chunk = std::shared_ptr<const char[]>;
 
-    /// @param max_bytes  of all chunks together; a larger chunk is kept until the next one is decoded
+    /// @param max_bytes  maximum size in bytes of all chunks together; a chunk that is larger than this is kept until
+    /// the next one is decoded
     explicit ChunkCache(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
 
     /// @param source  has to outlive the cache
@@ -37,7 +38,7 @@ private:
     struct Hash {
         [[nodiscard]] std::size_t operator()(const Key& key) const noexcept;
     };
-    /// A chunk; the mutex is locked while it is decoded.
+    /// A chunk. The mutex is locked while the chunk is decoded, so that other threads wait for it.
     struct Slot {
         std::mutex mutex;
         Chunk voxels;
@@ -56,7 +57,8 @@ private:
     mutable std::mutex mutex_;
     std::list<Key> order_;  ///< most recently used first
     std::unordered_map<Key, Entry, Hash> entries_;
-    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< by source: fill values, for all missing chunks
+    /// A chunk of fill values for each source, which represents all its missing chunks.
+    std::unordered_map<const ChunkSource*, Chunk> fills_;
     std::uint64_t bytes_ = 0, decoded_ = 0;
 };
 

@@ -101,7 +101,7 @@ struct ChunkedVoxels::Table {
     struct Entry {
         std::once_flag once;
         std::unique_ptr<char[]> own;   ///< null if the file has no such chunk
-        const char* voxels = nullptr;  ///< own, or fill values
+        const char* voxels = nullptr;  ///< points to `own`, or to fill values
         std::atomic<bool> is_there{false};
     };
     std::once_flag filled;
@@ -195,7 +195,8 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
             for (std::int32_t j = around.min[1]; j <= around.max[1]; ++j)
                 for (std::int32_t i = around.min[0]; i <= around.max[0]; ++i) {
                     const std::uint64_t number = number_of({i, j, k});
-                    // This skips most repetitions: consecutive boxes are often in the same chunk.
+                    // Most repetitions are skipped here, because consecutive boxes are often in the same chunk;
+                    // std::unique() removes the others.
                     if ((missing.empty() || missing.back() != number) && !is_there(number)) missing.push_back(number);
                 }
     }
@@ -212,7 +213,7 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
         if (!joins) groups.emplace_back();
         groups.back().push_back(number);
     }
-    // The calling thread reports the progress after each batch.
+    // Groups are decoded in batches, so that the calling thread can report the progress after each batch.
     const auto batch = std::size_t(tbb::this_task_arena::max_concurrency()) * (source_->in_layers() ? 2 : 32);
     for (std::size_t first = 0; first < groups.size(); first += batch) {
         run.check();
@@ -252,7 +253,8 @@ void ChunkedVoxels::copy(const VoxelBox& box, void* out) const {
 }
 
 double ChunkedVoxels::at(const Index3& voxel) const {
-    // The last chunk is remembered, because loops request many voxels of the same chunk one after another.
+    // Each thread remembers the chunk of its last call, because loops request many voxels of the same chunk one after
+    // another.
     struct Last {
         std::uint64_t serial = 0, number = 0;
         const void* voxels = nullptr;

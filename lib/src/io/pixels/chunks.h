@@ -22,11 +22,11 @@ public:
     /// the image are undefined. Thread-safe. @returns false if the file has no such chunk: its voxels are fill_value(),
     /// and `out` is unchanged. @throws Error InvalidInput (damaged), Io, Unsupported.
     [[nodiscard]] virtual bool read(const Index3& chunk, void* out) const = 0;
-    /// Value of chunks that the file does not have.
+    /// The value of all voxels in chunks that the file does not have.
     [[nodiscard]] virtual double fill_value() const noexcept { return 0; }
     /// Like read(), but writes fill values if the file has no such chunk.
     void read_or_fill(const Index3& chunk, void* out) const;
-    /// Writes a chunk of fill values.
+    /// Sets the voxels of one chunk at `out` to fill_value().
     void fill(void* out) const;
 
     /// Whether decoding all chunks with the same k takes little longer than decoding one of them. ChunkedVoxels::load()
@@ -37,7 +37,7 @@ public:
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
     [[nodiscard]] PixelType type() const noexcept { return type_; }
-    [[nodiscard]] const Index3& size() const noexcept { return size_; }              ///< of the image, in voxels
+    [[nodiscard]] const Index3& size() const noexcept { return size_; }              ///< size of the image in voxels
     [[nodiscard]] const Index3& chunk_size() const noexcept { return chunk_size_; }  ///< voxels along i, j, k; >= 1
 
 protected:
@@ -58,7 +58,7 @@ private:
 /// it.
 void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk);
 
-/// Maximum size of an unpacked chunk. Zarr's own codecs are limited to 2 GiB; the usual size is below 16 MiB.
+/// Maximum size of an unpacked chunk. The usual size is below 16 MiB; the codecs of Zarr cannot unpack more than 2 GiB.
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t(1) << 30;
 
 /// The chunks of a source. A chunk is decoded when its first voxel is requested, and is kept in memory. All chunks that
@@ -71,19 +71,20 @@ public:
     ChunkedVoxels& operator=(const ChunkedVoxels&) = delete;
 
     [[nodiscard]] const ChunkSource& source() const noexcept { return *source_; }
-    [[nodiscard]] std::uint64_t chunk_count() const noexcept;                   ///< in the whole image
+    [[nodiscard]] std::uint64_t chunk_count() const noexcept;                   ///< number of chunks in the whole image
     [[nodiscard]] std::uint64_t read_count() const noexcept { return reads_; }  ///< number of chunks decoded so far
 
     /// Copies the values of `box`, i fastest, in the source's type. @throws as ChunkSource::read, and InvalidInput at a
     /// value that is NaN or infinite.
     void copy(const VoxelBox& box, void* out) const;
     [[nodiscard]] double at(const Index3& voxel) const;
-    /// Decodes the chunks that intersect the boxes and are not decoded yet, in the file's order and in parallel. at()
-    /// and copy() have the same results without it, but decode one chunk after another. Reports "image".
+    /// Decodes the chunks that intersect the boxes and are not decoded yet, in the file's order and in parallel.
+    /// Without load(), at() and copy() have the same results, but decode one chunk after another. Reports the progress
+    /// as "image".
     /// @throws as copy(), and Error Cancelled, InvalidOptions if the chunks need more than run.memory_budget.
     void load(const std::vector<VoxelBox>& boxes, const RunContext& run) const;
-    /// The numbers of the chunks that were requested so far, ascending. They depend only on the requests, not on the
-    /// number of threads. Must not be called while other threads decode chunks.
+    /// The numbers of the chunks that were requested so far, ascending. The numbers depend only on the requests, not on
+    /// the number of threads. This function must not be called while other threads decode chunks.
     [[nodiscard]] std::vector<std::uint64_t> read_chunks() const;
     /// The box of a chunk's voxels within the image.
     [[nodiscard]] VoxelBox box_of(std::uint64_t chunk) const noexcept;
@@ -107,7 +108,8 @@ private:
     mutable std::atomic<std::uint64_t> reads_{0};
 };
 
-/// The voxels of `box`. A small box is decoded immediately; the chunks of a large box are decoded on demand.
+/// The voxels of `box`. The chunks of a small box are decoded immediately; the chunks of a large box are decoded on
+/// demand.
 [[nodiscard]] Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run);
 
 /// An image file in a format that always stores images in chunks.

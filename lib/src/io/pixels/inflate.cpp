@@ -7,7 +7,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kAnyHeader = 15 + 32;  // accepts headers of gzip and zlib
+// [zlib windowBits] The maximum window (15); adding 32 accepts headers of gzip and zlib.
+constexpr int kAnyHeader = 15 + 32;
 constexpr int kNoHeader = -15;
 constexpr std::size_t kWindow = 32768;
 constexpr std::uint64_t kMinGap = std::uint64_t(8) << 20;
@@ -46,7 +47,7 @@ void Inflater::step() {
         if (stream_.avail_in == 0) good_ = false;
     }
     const int status = good_ ? inflate(&stream_, Z_NO_FLUSH) : Z_OK;
-    // A gzip file may contain several streams, one after another.
+    // A file may contain several gzip streams, one after another; the next stream begins here.
     if (status == Z_STREAM_END)
         good_ = inflateReset(&stream_) == Z_OK;
     else if (status != Z_OK && status != Z_BUF_ERROR) {
@@ -76,8 +77,8 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
     places_.push_back(std::move(begin));
     std::uint64_t packed = 0, done = 0, reported = 0;
     bool first = true, ended = false;
-    // After the last byte, zlib continues to the end of the stream, which verifies the checksum; the checksum may be
-    // missing.
+    // After the last requested byte, decompression continues to the end of the stream, where zlib verifies the
+    // checksum. A file that ends before the checksum is accepted.
     while (done < unpacked || (to_the_end && !ended)) {
         if (stream.avail_in == 0) {
             run.check();
@@ -103,7 +104,8 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
         } else if (status != Z_OK && status != Z_BUF_ERROR) {
             throw damaged();
         }
-        if (all_there && done > unpacked) return;  // more data follows, so there is no checksum here
+        // The stream continues after the requested bytes, so no checksum follows them.
+        if (all_there && done > unpacked) return;
         const bool at_block = (stream.data_type & 128) != 0 && (stream.data_type & 64) == 0 && status == Z_OK;
         if (at_block && done >= places_.back().unpacked + gap) {
             Place place;

@@ -8,7 +8,7 @@
 
 #include "covol/run.h"
 
-// Decompression of gzip and zlib streams; several streams may follow one another.
+// Decompression of gzip and zlib streams; a file may contain several streams one after another, which are read as one.
 namespace covol::detail {
 
 /// Decompresses a stream in a file sequentially.
@@ -21,7 +21,7 @@ public:
 
     /// Reads `count` unpacked bytes; returns false if the stream has fewer, or is damaged.
     bool read(char* out, std::uint64_t count);
-    /// Returns false only if a checksum follows the last byte that was read, and is wrong.
+    /// Returns false if the checksum after the last byte that was read is wrong; true if it is correct or missing.
     bool checksum_fits();
 
 private:
@@ -34,21 +34,23 @@ private:
     bool damaged_ = false;
 };
 
-/// Positions at which decompression of a stream can begin, each with the preceding 32 KiB of unpacked bytes, to which
-/// the following data may refer, as in M. Adler's zran.c, an example of zlib. They are at least 8 MiB of unpacked bytes
-/// apart; there are at most about 4096.
+/// Positions in a stream at which decompression can begin. Each is stored with the preceding 32 KiB of unpacked bytes,
+/// to which the following data may refer, as in zran.c by M. Adler, an example of zlib. The positions are at least 8
+/// MiB of unpacked bytes apart; there are at most about 4096.
 class InflateIndex {
 public:
     struct Place {
-        std::uint64_t unpacked = 0;  ///< number of unpacked bytes before it
+        std::uint64_t unpacked = 0;  ///< number of unpacked bytes before this position
         std::uint64_t packed = 0;    ///< offset in the file of the first byte that belongs wholly to the following data
         int bits = 0;                ///< number of bits of the preceding byte that belong to the following data
-        bool at_header = false;      ///< this is the beginning of the stream, with its header
+        /// Whether this is the beginning of the stream, where its header precedes the data.
+        bool at_header = false;
         std::vector<unsigned char> window;
     };
 
-    /// Decompresses the first `unpacked` bytes of the stream at `offset` once, and verifies the checksum after them if
-    /// `to_the_end`. Reports "image". @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
+    /// Decompresses the first `unpacked` bytes of the stream at `offset` once, and verifies the checksum after these
+    /// bytes if `to_the_end` is set. Reports the progress as "image". @throws Error InvalidInput (damaged, truncated),
+    /// Io, Cancelled.
     InflateIndex(std::string path, std::uint64_t offset, std::uint64_t unpacked, bool to_the_end,
                  const RunContext& run);
 
@@ -66,7 +68,7 @@ private:
     std::vector<Place> places_;
 };
 
-/// Decompresses a stream from any of its unpacked bytes on.
+/// Decompresses a stream from the unpacked byte with the index `begin` on.
 class IndexedInflater {
 public:
     IndexedInflater(const InflateIndex& index, std::uint64_t begin);
@@ -87,7 +89,8 @@ private:
     std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
     std::vector<char> skipped_;
     z_stream stream_{};
-    bool raw_ = false;  ///< started within the stream, so zlib does not handle the header and checksum
+    /// Decompression began within the stream, without its header, so zlib does not skip the checksum at its end.
+    bool raw_ = false;
     bool good_ = true;
 };
 

@@ -15,13 +15,13 @@ std::vector<NrrdSegment> read_nrrd_segments(const std::string& path) {
     const std::string end = extension(path);
     std::error_code status;
     if ((end != ".nrrd" && end != ".nhdr") || !std::filesystem::is_regular_file(path, status)) return {};
-    std::map<std::string, NrrdSegment> found;  // by the prefix of the keys, such as "Segment3"
+    std::map<std::string, NrrdSegment> found;  // segments by the prefix of their keys, such as "Segment3"
     std::vector<std::string> order;
     std::ifstream file = open_regular_file(path);
     std::string line;
     for (std::size_t n = 0; n < kMaxLines && std::getline(file, line); ++n) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.empty()) break;  // the pixels follow
+        if (line.empty()) break;  // an empty line ends the header
         const std::size_t value = line.find(":="), field = line.find('_');
         if (!line.starts_with("Segment") || value == std::string::npos || field > value) continue;
         const std::string name = line.substr(0, field), key = line.substr(field + 1, value - field - 1),

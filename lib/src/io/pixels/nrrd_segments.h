@@ -16,8 +16,8 @@ struct NrrdSegment {
 /// files that cannot be read.
 [[nodiscard]] std::vector<NrrdSegment> read_nrrd_segments(const std::string& path);
 
-/// Splits "FILE.seg.nrrd:name" into {"FILE.seg.nrrd", "name"}. The name is empty if none is given, or if there is a
-/// file whose name is the whole text.
+/// Splits "FILE.seg.nrrd:name" into {"FILE.seg.nrrd", "name"}. The name is empty if the text contains none, or if a
+/// file has the whole text as its name.
 [[nodiscard]] std::pair<std::string, std::string> split_segment_name(const std::string& text);
 
 }  // namespace covol::detail

@@ -8,7 +8,8 @@
 namespace covol::detail {
 namespace {
 
-// Bricks have few slices, because all slices of a brick are decompressed, up to its last row, to read it.
+// Size of a brick in voxels. It has few slices because reading a brick decompresses each of its slices, up to the last
+// row of the brick, as a whole.
 constexpr Index3 kBrick{64, 64, 16};
 
 class PackedChunks : public ChunkSource {

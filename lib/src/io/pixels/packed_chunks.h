@@ -9,20 +9,20 @@ namespace covol::detail {
 
 /// One channel and frame of a compressed stream.
 struct PackedFrame {
-    PixelType type = PixelType::UInt8;  ///< of the image; PixelPlace::type is the type of the stored values
+    PixelType type = PixelType::UInt8;  ///< type of the image; PixelPlace::type is the type of the stored values
     Index3 size{0, 0, 0};
     std::uint64_t components = 1;  ///< number of values per pixel in the file, of which `channel` is read
     std::uint64_t channel = 0;
     std::uint64_t begin = 0;  ///< number of unpacked bytes before the frame
-    bool is_last = true;      ///< only the checksum follows the frame
+    bool is_last = true;      ///< the frame is the last one, so only the checksum follows it
 };
 
 /// The size in voxels of the chunks into which an image of this size is divided.
 Index3 packed_chunk_size(const Index3& size);
 
 /// Bricks of a compressed frame, decoded in layers of a few slices from the nearest position at which decompression can
-/// begin. This function decompresses the stream once up to the end of the frame, which detects damage, and keeps at
-/// most 32 KiB for every 8 MiB.
+/// begin. This function decompresses the stream once up to the end of the frame, which detects damage. The positions
+/// need at most 32 KiB of memory for every 8 MiB of unpacked bytes.
 /// @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
 std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,
                                                  const PackedFrame& frame, const RunContext& run);

@@ -22,9 +22,10 @@ namespace covol::detail {
 namespace {
 
 // Maximum ratio of unpacked to packed size that is accepted. Deflate reaches 1032 and LZW about 2700; newer codecs of
-// TIFF exceed these on constant slices.
+// TIFF exceed these ratios on constant slices.
 constexpr std::uint64_t kMaxCompression = 20000;
-// Minimum number of bytes that are mapped. Mapping fewer bytes saves little, and reading reports disk errors at once.
+// Minimum number of bytes that are mapped. Mapping fewer bytes saves little, whereas reading them reports errors of the
+// disk immediately.
 constexpr std::uint64_t kMapFrom = std::uint64_t(256) << 20;
 
 struct Unit {
@@ -68,7 +69,7 @@ public:
     bool read(std::uint64_t count, char* out) {
         return packed_ ? inflater_->read(out, count) : bool(file_.read(out, static_cast<std::streamsize>(count)));
     }
-    /// Returns false only if a checksum follows the last byte that was read, and is wrong.
+    /// Returns false if the checksum after the last byte that was read is wrong; true if it is correct or missing.
     bool checksum_fits() { return !packed_ || inflater_->checksum_fits(); }
 
 private:
@@ -139,7 +140,8 @@ private:
         return place_.skip + request.frame * frame_bytes_;
     }
 
-    /// Whether the box is mapped: the pixels must be stored as they are needed, and its slices must be large enough.
+    /// Whether the box is mapped into memory: the pixels must be stored as they are needed, uncompressed and aligned,
+    /// and the slices of the box must be large enough.
     [[nodiscard]] bool is_mapped(const PixelRequest& request) const {
         const std::uint64_t slices = std::uint64_t(request.box.size()[2]);
         const bool aligned = (place_.file_offset + frame_begin(request)) % place_.stored_bytes() == 0;
@@ -252,7 +254,8 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
                  : ::mmap(nullptr, bytes + before, PROT_READ, MAP_PRIVATE, file, static_cast<off_t>(offset - before));
     if (file >= 0) ::close(file);
     if (begin == MAP_FAILED) throw read_error(Errc::Io, path, "cannot be mapped into memory");
-    ::madvise(begin, bytes + before, MADV_RANDOM);  // no read-ahead: the data around a row is usually not needed
+    // The system need not read ahead, because the data around a row is usually not needed.
+    ::madvise(begin, bytes + before, MADV_RANDOM);
     const auto unmap = [begin, length = bytes + before](const void*) { ::munmap(begin, length); };
     return {static_cast<const char*>(begin) + before, unmap};
 }
@@ -334,7 +337,7 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
                           "roi");
     };
     if (bytes > memory) throw refuse();
-    // malloc does not write to large blocks, so they occupy physical memory only when pixels are written.
+    // malloc does not write to large blocks, so a block occupies physical memory only where pixels are written to it.
     void* data = std::malloc(std::max<std::uint64_t>(bytes, 1));
     if (data == nullptr) throw refuse();
     return {data, std::free};

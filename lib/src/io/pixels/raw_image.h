@@ -18,7 +18,7 @@ class ChunkSource;
 /// the image.
 struct Pixels {
     std::shared_ptr<const void> data;
-    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< in pixels
+    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< distance in pixels between neighbours along i, j, k
     bool mapped = false;
     std::shared_ptr<const ChunkedVoxels> chunks{};
     std::optional<ChunkCount> chunk_count{};  ///< empty if the image is not stored in chunks
@@ -45,12 +45,14 @@ public:
     /// Number of bytes that read() allocates: the size of the whole box, unless a format overrides this.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
 
-    /// The chunks of a channel and frame, each of which can be decoded separately; null if a file has none.
+    /// The chunks of a channel and frame, each of which can be decoded separately; null if the file is not stored in
+    /// chunks.
     [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const;
     /// The coarser levels of a pyramid, finest first, as names that read_image() accepts.
     [[nodiscard]] virtual std::vector<std::string> coarser_levels() const { return {}; }
 
-    /// Files that are read in addition to the given one, or the files of the given folder.
+    /// Files that are read in addition to the file that the caller named, or the files of the folder that the caller
+    /// named.
     [[nodiscard]] const std::vector<std::string>& files() const noexcept { return files_; }
     void refer_to(std::vector<std::string> files) { files_ = std::move(files); }
 
@@ -101,19 +103,19 @@ Error not_finite(const std::string& path, const Index3& voxel);
 /// @throws Error InvalidInput unless the image has at least two voxels along each axis.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
-/// Allocates memory for the pixels, after checking that a file of `file_bytes` can contain them (0: unknown, because
-/// they are in another file) and that the memory of the machine suffices. @throws Error InvalidInput, Unsupported.
+/// Allocates memory for the pixels, after checking that a file of `file_bytes` bytes can contain them (0: no check,
+/// because the size is unknown) and that the memory of the machine suffices. @throws Error InvalidInput, Unsupported.
 std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pixels, PixelType type,
                                       std::uint64_t file_bytes);
 
-/// Position of the pixels in a file, frame after frame, i fastest. ITK's readers are not used for them: they read the
-/// whole file, and report no error if a truncated file lacks pixels. Moreover, ITK's NIfTI reader uses the pixels of
-/// a.nii for a.nii.gz if both exist.
+/// Position of the pixels in a file, frame after frame, i fastest. ITK's readers are not used for such pixels: they
+/// read the whole file, and report no error if a truncated file lacks pixels. Moreover, ITK's NIfTI reader uses the
+/// pixels of a.nii for a.nii.gz if both exist.
 struct PixelPlace {
     std::string path;
-    std::uint64_t file_offset = 0;  ///< of the pixels, or of the packed stream
+    std::uint64_t file_offset = 0;  ///< position in bytes of the pixels, or of the packed stream
     std::uint64_t skip = 0;         ///< number of unpacked bytes before the pixels
-    bool packed = false;            ///< gzip or zlib
+    bool packed = false;            ///< the pixels are a stream packed by gzip or zlib
     bool swap = false;              ///< the byte order is not that of this machine
     bool half = false;              ///< 16-bit floats, converted to Float
     PixelType type = PixelType::UInt8;
@@ -137,10 +139,10 @@ void convert_pixels(const PixelPlace& place, const void* stored, std::uint64_t s
 /// InvalidInput if the file is too short.
 std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place);
 
-/// Maps this number of bytes of a file at `offset`; they must exist. @throws Error Io.
+/// Maps `bytes` bytes of a file at `offset` into memory; the file must be large enough. @throws Error Io.
 std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes);
 
-/// Whether a part of this size is mapped or decoded on demand, not read as a whole.
+/// Whether a part of an image of this size is mapped or decoded on demand; smaller parts are read as a whole.
 bool is_worth_mapping(std::uint64_t bytes);
 
 /// Advises the operating system to read mapped pages in advance.

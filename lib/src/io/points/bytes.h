@@ -9,7 +9,7 @@
 
 namespace covol::detail {
 
-/// Reads numbers and parts from the bytes of a file, with bounds checks.
+/// Reads numbers and ranges of bytes from the contents of a file, with bounds checks.
 class Bytes {
 public:
     /// @param name  of the file, for messages; `data` and `name` must outlive this object
@@ -17,7 +17,7 @@ public:
         : data_(data), name_(name), swap_(order != std::endian::native) {}
 
     [[nodiscard]] std::uint64_t size() const { return data_.size(); }
-    /// @throws Error InvalidInput if it extends beyond the end.
+    /// @throws Error InvalidInput if the number extends beyond the end of the file.
     template <typename T>
     [[nodiscard]] T at(std::uint64_t offset) const {
         return load<T>(part(offset, sizeof(T)).data(), swap_);

@@ -23,11 +23,12 @@ struct Line {
     std::string name;
     std::string shape;
     std::vector<Vec3> points;
-    std::vector<double> places;  ///< vertex-index of each point, if the file has one
-    std::string structure;       ///< name of the structure; empty if no column states it
+    /// The number in the column vertex-index for each point; empty if the file has no such column.
+    std::vector<double> places;
+    std::string structure;  ///< name of the structure; empty if no column states it
 };
 
-/// Sorts the marks of a line by their vertex-index.
+/// Sorts the marks of a line by their numbers in the column vertex-index, if the file has this column.
 void sort_by_place(Line& line) {
     if (line.places.size() != line.points.size()) return;
     std::vector<std::size_t> order(line.points.size());
@@ -40,7 +41,8 @@ void sort_by_place(Line& line) {
     line.points = std::move(sorted);
 }
 
-/// The ellipse inscribed in a box that is given by its four corners.
+/// Points on the ellipse that is inscribed in a rectangle. napari stores an ellipse as the four corners of this
+/// rectangle.
 std::vector<Vec3> ellipse_in(const std::vector<Vec3>& corners) {
     Vec3 centre, u, v;
     for (int a = 0; a < 3; ++a) {
@@ -127,16 +129,17 @@ std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::s
     return std::nullopt;
 }
 
-/// Whether all vectors have the length 1 or 0. In columns without names, these are normals; others may be colours.
+/// Whether all vectors have the length 1 or 0. In columns without names, such vectors are taken as normals; other
+/// numbers may be colours.
 bool are_unit_vectors(const std::vector<Vec3>& all) {
-    constexpr double kTolerance = 0.02;  // allows for two decimals
+    constexpr double kTolerance = 0.02;  // allows for normals that are written with two decimals
     return std::all_of(all.begin(), all.end(), [](const Vec3& n) {
         const double length = std::hypot(n[0], n[1], n[2]);
         return length == 0 || std::abs(length - 1) < kTolerance;
     });
 }
 
-/// Converts coordinates from the units that the header or each row states to the first unit that is stated.
+/// Converts coordinates to a common unit: the first unit that the header or, if it states none, a row states.
 class RowUnits {
 public:
     explicit RowUnits(const Columns& columns) : columns_(columns) {
@@ -170,10 +173,10 @@ public:
     TableBegin(std::string path, bool counted, std::string structures_by)
         : path_(std::move(path)), structures_by_(std::move(structures_by)), counted_(counted) {}
 
-    /// @returns whether the line is the header or the first row of numbers; `fields` then holds its fields.
+    /// @returns whether the line is the header or the first row of numbers; `fields` then holds the fields of the line.
     bool take(std::size_t number, string_view line, std::vector<string_view>& fields) {
         const string_view trimmed = trim(line);
-        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // a line in which Excel states the delimiter
+        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel states the delimiter in this line
         for (const bool named : {true, false})
             for (const char candidate : named ? kDelimitersOfNames : kDelimitersOfNumbers) {
                 if (candidate != ' ' && trimmed.find(candidate) == string_view::npos) continue;
@@ -186,7 +189,8 @@ public:
         note(number, trimmed, fields);
         return false;
     }
-    /// @throws Error InvalidInput with the reason why the first line that was not accepted is not part of a table
+    /// @throws Error InvalidInput with the reason why the first line that is neither a header nor a row of numbers was
+    /// not accepted
     [[noreturn]] void refuse() const { fail(path_, line_, why_.empty() ? "expected points, got none" : why_); }
     [[nodiscard]] bool has_title() const { return title_ > 0; }
 
@@ -236,7 +240,8 @@ private:
         if (title_ > 0)
             columns.rule += ", below " + std::to_string(title_) + (title_ > 1 ? " lines" : " line") + " of title";
     }
-    /// Records a line that is neither the header nor a row of numbers, as a title or as the reason for an error.
+    /// Records a line that is neither the header nor a row of numbers, as a title, and as the reason for an error if no
+    /// table follows.
     void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
         constexpr std::size_t kMaxTitle = 100;
         std::vector<string_view> fields = fields_;
@@ -247,7 +252,7 @@ private:
             }
         const bool has_number =
             std::any_of(fields.begin(), fields.end(), [](string_view f) { return table_number(f).has_value(); });
-        // Formats such as .pts may begin with the number of points.
+        // In formats such as .pts, the number of points may precede the table. This line is not a title.
         if (counted_ && fields.size() == 1 && has_number && title_ == 0) return;
         if (why_.empty()) {
             line_ = number;
@@ -265,13 +270,13 @@ private:
     }
 
     std::string path_, structures_by_, why_;
-    bool counted_;  ///< the number of points may precede the table
+    bool counted_;  ///< whether a line with the number of points may precede the table
     bool is_table_without_names_ = false, is_word_only_ = true;
     std::size_t line_ = 1, title_ = 0;
 };
 
-/// Whether a row after the header is not data but repeats names or states units, as in TrackMate's three additional
-/// rows. Stores units in `columns`.
+/// Whether a row after the header is not data but repeats names or states units. TrackMate writes three such rows.
+/// Stores units in `columns`.
 bool continues_header(const std::vector<string_view>& fields, Columns& columns) {
     std::array<std::string, 3> units;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -324,7 +329,8 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
         units->apply(fields, point);
         if (columns.kind) {
             const std::optional<MarkKind> kind = read_kind(fields, *columns.kind);
-            if (!kind) {  // the column "kind" has another meaning in this file
+            // A value that is no kind of mark shows that the column "kind" has another meaning in this file.
+            if (!kind) {
                 columns.kind.reset();
                 table.kinds.clear();
             } else {

@@ -48,7 +48,8 @@ PointTable parse_one_roi(const std::string& path, const std::string& bytes, cons
     return parse_roi(path, bytes, fs::path(path).stem().string(), by);
 }
 
-/// Adapts a parser to the common signature if its format does not name structures.
+/// Adapts a parser to the signature of the other parsers. Its format does not name structures, so the third argument is
+/// ignored.
 template <PointTable (*parse)(const std::string&, const std::string&)>
 PointTable of_one(const std::string& path, const std::string& content, const std::string&) {
     return parse(path, content);
@@ -114,7 +115,7 @@ void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, c
 }
 
 void name_structure(PointTable& table, const std::string& path, const std::string& name) {
-    constexpr std::size_t kMax = 254;  // limit of a label image
+    constexpr std::size_t kMax = 254;  // maximum number of labels of a label image
     auto& names = table.structures;
     const bool is_last = !table.structure.empty() && names[table.structure.back()] == name;
     const auto found = is_last ? names.begin() + table.structure.back() : std::find(names.begin(), names.end(), name);

@@ -13,20 +13,21 @@ namespace covol::detail {
 struct PointTable {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;
-    std::vector<MarkKind> kinds;  ///< none, or one for each point
-    std::vector<Vec3> normals;    ///< none, or one for each point, from normal_of()
+    std::vector<MarkKind> kinds;  ///< empty, or one for each point
+    std::vector<Vec3> normals;    ///< empty, or one for each point, normalized by normal_of()
     std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
-    std::string unit;                      ///< of lengths, as returned by normal_unit(); empty if not stated
+    /// Unit of lengths, as returned by normal_unit(); empty if the file states none.
+    std::string unit;
     std::vector<std::string> structures;   ///< names of the marks' structures, in the file's order
-    std::vector<std::uint32_t> structure;  ///< index of each point's structure; empty if they were not requested
+    std::vector<std::uint32_t> structure;  ///< index of each point's structure; empty if structures were not requested
     std::string rule;                      ///< text for users: the columns or elements that were used
 };
 
 /// Chooses the reader by the file name's extension.
 /// @param structures_by  as in read_structures_of_points(); empty: structures are ignored
-/// @throws as read_points(), which calls this.
+/// @throws as read_points(), which calls this function.
 PointTable read_point_table(const std::string& path, const std::string& structures_by = {});
 
 /// Assigns the points at the end of the table that have no structure yet to the structure with this name.

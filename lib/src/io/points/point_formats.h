@@ -32,26 +32,27 @@ PointTable parse_cell_counter(const std::string& path, const std::string& text, 
 /// @param structures_by  "label" of each point, "node" (the markup's own name; not for .fcsv), or empty
 PointTable parse_markups(const std::string& path, const std::string& text, const std::string& structures_by = {});
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by = {});
-/// Landmarks as for c3d -landmarks-to-spheres: lines "x y z label", in RAS; a label that is a word may come first.
+/// Landmarks as for c3d -landmarks-to-spheres: lines "x y z label", in RAS; if the label is not a number, it may also
+/// precede x.
 PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// .csl, sections of bodies in planes of any direction. A header "CSLC" and the numbers of planes and labels are
-/// followed by each plane: its number, the counts of its vertices and contours, A B C D of A x + B y + C z + D = 0, the
-/// vertices, and for each contour its count of vertices ("12", or "12h0" for a hole in contour 0), its label, and the
-/// indices of its vertices from 0.
-/// @param structures_by  "label": each label is a structure; empty: there may be only one
+/// followed by each plane: its number, the counts of its vertices and contours, the numbers A B C D of its equation A x
+/// + B y + C z + D = 0, the vertices, and for each contour its count of vertices ("12", or "12h0" for a hole in contour
+/// 0), its label, and the indices of its vertices from 0.
+/// @param structures_by  "label": each label is a structure; empty: a file with several labels is an error
 PointTable parse_sections(const std::string& path, const std::string& text, const std::string& structures_by = {});
 
 /// DICOM RT structure sets: contours of ROIs in mm, LPS. A hole that is joined to its outline by a keyhole, a channel
 /// of zero width, becomes a separate line.
-/// @param structures_by  "roi": each ROI is a structure; empty: there may be only one
+/// @param structures_by  "roi": each ROI is a structure; empty: a file with several ROIs is an error
 PointTable parse_rt_structures(const std::string& path, const std::string& bytes,
                                const std::string& structures_by = {});
 
 /// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners have integer coordinates.
 PointTable parse_annotations(const std::string& path, const std::string& text);
 
-/// Leica's text format of scans: columns, rows, the scanner's position and axes, and a matrix precede the points of
-/// each scan.
+/// Leica's text format of scans (.ptx). Each scan begins with its numbers of columns and rows, the scanner's position
+/// and axes, and a matrix; its points follow.
 [[nodiscard]] bool is_ptx(const std::string& text);
 PointTable parse_ptx(const std::string& path, const std::string& text);
 

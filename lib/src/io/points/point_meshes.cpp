@@ -1,4 +1,5 @@
-// The vertices of meshes as clouds, with their normals: PLY, OBJ and OFF, read with the readers of meshes.
+// Reads the vertices of PLY, OBJ and OFF files, with their normals, as clouds. The parsers are those of the mesh
+// readers.
 #include <string>
 
 #include "io/mesh/mesh_formats.h"

@@ -3,7 +3,7 @@
 
 #include "covol/points.h"
 
-/// Conversion of a file's coordinates to positions. No member of `reading` is Unstated.
+/// Conversion of a file's coordinates to positions. The functions require that no member of `reading` is Unstated.
 namespace covol::detail {
 
 /// The coordinate system of the result of read_as() for coordinates in the system `read_as`.

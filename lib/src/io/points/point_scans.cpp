@@ -28,7 +28,8 @@ struct PcdHeader {
     std::vector<PcdField> fields;
     std::uint64_t points = 0;
     std::optional<Vec3> viewpoint;
-    /// whether the points are rows of pixels of a camera, which is at 0 unless a viewpoint is stated
+    /// Whether the points are the pixels of a depth camera, row by row; the camera is at 0 unless a viewpoint is
+    /// stated.
     bool is_organised = false;
     std::string data;
 
@@ -127,7 +128,8 @@ double pcd_value(const std::string& path, const char* data, const PcdField& fiel
                                        std::to_string(field.size) + " of " + field.type);
 }
 
-/// Unpacks Marc Lehmann's LZF: runs of literal bytes, and references to earlier output. Returns false if it is damaged.
+/// Unpacks Marc Lehmann's LZF: runs of literal bytes, and references to earlier output. Returns false if the data are
+/// damaged.
 bool lzf_decompress(string_view in, std::string& out) {
     std::size_t at = 0, done = 0;
     while (at < in.size()) {
@@ -149,7 +151,8 @@ bool lzf_decompress(string_view in, std::string& out) {
         back += static_cast<unsigned char>(in[at++]) + std::size_t(1);
         count += 2;
         if (back > done || count > out.size() - done) return false;
-        for (; count > 0; --count, ++done) out[done] = out[done - back];  // the ranges may overlap
+        // Bytes are copied one by one, because the range that is read may overlap the range that is written.
+        for (; count > 0; --count, ++done) out[done] = out[done - back];
     }
     return done == out.size();
 }
@@ -189,7 +192,8 @@ void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lin
     }
 }
 
-/// @param planar  whether all values of a field are stored together, instead of all fields of a point
+/// @param planar  whether the values of a field are stored together for all points; otherwise the fields of a point are
+/// stored together
 void read_pcd_binary(const std::string& path, const PcdHeader& header, string_view data, bool planar, PointTable& table,
                      std::size_t& invalid) {
     const std::vector<std::size_t> at = pcd_columns(path, header);
@@ -215,7 +219,8 @@ void read_pcd_binary(const std::string& path, const PcdHeader& header, string_vi
 std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_view data) {
     const Bytes bytes(data, path, std::endian::little);
     const std::uint64_t packed = bytes.at<std::uint32_t>(0), size = bytes.at<std::uint32_t>(4);
-    constexpr std::uint64_t kLargestRatio = 264;  // upper bound for LZF, in which 3 bytes encode at most 264
+    // Maximum ratio of unpacked to packed bytes in LZF, in which three bytes encode at most 264 bytes.
+    constexpr std::uint64_t kLargestRatio = 264;
     const std::uint64_t stride = header.stride();
     if (size > kLargestRatio * packed || stride == 0 || size / stride < header.points)
         fail(path, std::to_string(packed) + " packed bytes cannot hold " + std::to_string(header.points) + " points");
@@ -226,8 +231,8 @@ std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_
 
 // ---------------------------------------------------------------------------------------------- PTX
 
-/// The header of a scan: numbers of columns and rows, the scanner's position and axes, and a 4 x 4 matrix. A point is
-/// multiplied, as a row vector, by the matrix.
+/// The header of a scan: numbers of columns and rows, the scanner's position and axes, and a 4 x 4 matrix. The position
+/// of a point is its row vector (x, y, z, 1) times the matrix.
 struct PtxHeader {
     std::uint64_t columns = 0, rows = 0;
     Vec3 scanner{};
@@ -331,7 +336,7 @@ bool is_ptx(const std::string& text) {
         for (const string_view word : words)
             if (!to_number(word)) return false;
     }
-    // The last number of the matrix is 1 for a rigid motion.
+    // The last line of the header is the last row of the matrix. For a rigid motion, its last number is 1.
     return to_number(words[3]) == 1.0;
 }
 

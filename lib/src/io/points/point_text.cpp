@@ -34,8 +34,8 @@ void append_utf8(std::string& text, std::uint32_t code) {
     }
 }
 
-/// The index (0 or 1) of the byte that is 0 in nearly all pairs of bytes while the other never is, as in UTF-16 text of
-/// Latin letters and digits; -1 if there is none.
+/// The index (0 or 1) of the byte that is 0 in more than 90 % of the pairs of bytes while the other byte is never 0.
+/// This is so in UTF-16 text of Latin letters and digits. -1 if there is none.
 int zero_byte(string_view text) {
     constexpr std::size_t kMaxChecked = 400;
     std::size_t zeros[2] = {0, 0}, pairs = 0;
@@ -98,7 +98,7 @@ std::optional<double> table_number(string_view field) {
     if (text.starts_with(kMinus)) text.replace(0, kMinus.size(), "-");
     const std::size_t comma = text.rfind(','), point = text.rfind('.');
     if (comma != std::string::npos) {
-        // A comma without a digit after it, as in "1,", separates columns.
+        // A comma that no digit follows, as in "1,", separates columns; the field is then not a number.
         const bool between = comma > 0 && comma + 1 < text.size() && is_digit(text[comma + 1]);
         if (!between) return std::nullopt;
         const bool is_decimal = text.find(',') == comma && (point == std::string::npos || point < comma);

@@ -62,7 +62,7 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
-/// Splits a table by structure, together with its lines.
+/// Splits a table into one table for each structure, with the points and lines that belong to it.
 std::vector<detail::PointTable> parts_of(detail::PointTable table) {
     const std::vector<Vec3> points = std::exchange(table.points, {}), normals = std::exchange(table.normals, {});
     const std::vector<MarkKind> kinds = std::exchange(table.kinds, {});

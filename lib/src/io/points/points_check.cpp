@@ -17,10 +17,10 @@ namespace {
 struct Reading {
     ReadPointsOptions options;
     int changes = 0;     ///< number of differences from the current reading
-    std::string advice;  ///< the options that select it, as messages name them
+    std::string advice;  ///< the options that select this reading, as messages name them
 };
 
-/// Factors between common units; the more likely ones first.
+/// Factors between common units of length, the more likely factors first.
 constexpr std::array<double, 15> kScales{1.0,  1e3, 1e-3, 1e6, 1e-6, 10,   0.1,     100,
                                          0.01, 1e4, 1e-4, 1e5, 1e-5, 25.4, 1 / 25.4};
 
@@ -63,7 +63,8 @@ class Checker {
 public:
     Checker(const PointCloud& cloud, const ImageGeometry& geometry)
         : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
-        if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that does not come from a file
+        // A cloud that was not read from a file states no reading, so its space and the order x, y, z are assumed.
+        if (now_.space == PointSpace::Unstated) now_.space = cloud.space;
         if (now_.order == PointOrder::Unstated) now_.order = PointOrder::XYZ;
         world_ = to_world(cloud, geometry);
     }
@@ -78,7 +79,7 @@ public:
     }
 
     /// The readings with the fewest changes that put every point inside the image. Readings with other units have the
-    /// lowest priority, because all points are inside if they are scaled down enough.
+    /// lowest priority, because they are weak evidence: if points are scaled down enough, all of them are inside.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
         const auto rank = [&](const Reading& r) {
@@ -106,16 +107,18 @@ public:
 
     [[nodiscard]] std::string name(const Reading& reading) const { return name_of(reading, now_); }
 
-    /// The most plausible reading, if it is more plausible than the current one: it puts all marks on voxel centres
-    /// along more axes. Marks that were set with the mouse are on slices and often on voxel centres.
+    /// The most plausible reading, if it is more plausible than the current reading; otherwise empty. A reading is more
+    /// plausible if it puts all points on voxel centres along more axes, because marks that were set with the mouse lie
+    /// on slices and often on voxel centres.
     [[nodiscard]] std::vector<Reading> more_plausible() const {
-        constexpr std::size_t kMinPoints = 8;  // fewer may be on voxel centres by chance
+        constexpr std::size_t kMinPoints = 8;  // fewer points may lie on voxel centres by chance
         if (world_.size() < kMinPoints || cloud_.stated || now_.scale != 1) return {};
         const int axes = axes_on_centres(now_);
         std::vector<Reading> best;
         int maximum = axes;
         for (const Reading& reading : others()) {
-            // Readings with more channels are excluded, because their slice numbers are rounded to integers.
+            // Readings with another number of channels are excluded: they round slice numbers to integers, so that all
+            // points lie on centres along z.
             if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
                 reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
@@ -140,7 +143,7 @@ private:
     /// The position of a cloud's point under another reading.
     [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
         const PointSpace space = detail::space_after(reading.space);
-        // A scale that the user gives replaces the file's unit.
+        // A scale that differs from the current one replaces the file's unit.
         const double unit = reading.scale == now_.scale ? detail::unit_factor(cloud_, geometry_) : 1;
         const Vec3 read = detail::read_as(reading, detail::undo(now_, point));
         return detail::to_world(space, detail::scaled(space, read, unit), geometry_);
@@ -159,11 +162,12 @@ private:
     }
 
     /// Whether the points are scaled down so much that being inside the image is no evidence for the reading. The limit
-    /// is stricter for unusual factors.
+    /// `minimum` is stricter for unusual factors.
     [[nodiscard]] bool is_too_small(const Reading& reading, int rank) const {
         constexpr std::size_t kMinPoints = 8;
         const bool is_odd = rank > 2;
-        const double minimum = is_odd ? 0.2 : 0.02;  // fraction of the image's edge
+        // Minimum side of the bounding box of the points, as a fraction of the side of the image.
+        const double minimum = is_odd ? 0.2 : 0.02;
         if (is_odd && cloud_.points.size() < kMinPoints) return true;
         const WorldBox box = index_box(reading);
         for (int a = 0; a < 3; ++a)
@@ -171,13 +175,14 @@ private:
         return true;
     }
 
-    /// Whether all points are within the size of one voxel, as if small lengths were taken for voxels.
+    /// Whether all points lie within a box smaller than one voxel. Such a reading is improbable: it takes small lengths
+    /// for voxels.
     [[nodiscard]] bool is_in_one_voxel(const Reading& reading) const {
         return cloud_.points.size() > 1 && longest_side(index_box(reading)) < 1;
     }
 
-    /// Number of axes along which all points are on voxel centres, without axes along which all points have the same
-    /// position.
+    /// Number of axes along which all points lie on voxel centres. Axes along which all points have the same position
+    /// are not counted.
     [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
         constexpr double kTolerance = 0.01;  // voxels
         std::array<bool, 3> on{true, true, true}, differ{false, false, false};
@@ -199,10 +204,11 @@ private:
         return reading.space == PointSpace::Index || reading.space == PointSpace::IndexOne;
     }
 
-    /// All other readings, fewest changes first.
+    /// The readings that differ from the current reading in one or two options, those with one change first.
     [[nodiscard]] std::vector<Reading> others() const {
         std::vector<Reading> list;
-        if (now_.channels != 1) return list;  // undo() cannot invert slice numbers that count channels
+        // undo() cannot be used: a slice number that counts channels does not determine the position.
+        if (now_.channels != 1) return list;
         const bool lengths = !in_voxels(now_);
         const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
         for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras,

@@ -30,7 +30,7 @@ bool means_voxels(const std::string& unit) {
 
 namespace {
 
-/// Finds the columns of a header by their names; of columns with the same name, the first.
+/// Finds the columns of a header by their names. If several columns have the same name, the first is found.
 class Header {
 public:
     explicit Header(const std::vector<string_view>& fields) : fields_(fields) {
@@ -119,7 +119,7 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
     columns.rule = header.names(columns.at);
     if (in_voxels) {
         columns.space = PointSpace::Index;
-        columns.order = PointOrder::XYZ;  // the names are unambiguous
+        columns.order = PointOrder::XYZ;  // the columns have names, so their order is known
         if (slices) columns.rule += ", slices from 0";
     } else if (slices) {
         // Fiji's Results tables: slices count from 1; X and Y are in the unit of the image, if it has one.

@@ -11,7 +11,7 @@
 /// The meaning of the columns of a table, derived from their names.
 namespace covol::detail {
 
-/// The columns that hold a point, and those that identify its line.
+/// The indices of the columns that hold a point, its line and its other properties.
 struct Columns {
     std::array<std::size_t, 3> at{0, 1, 2};
     PointSpace space = PointSpace::Unstated;
@@ -20,11 +20,11 @@ struct Columns {
     std::optional<std::array<std::size_t, 3>> normal;
     bool normal_is_assumed = false;        ///< `normal` is an assumption, because the columns have no names
     std::vector<std::size_t> line;         ///< rows with equal values in these columns form one line
-    std::optional<std::size_t> shape;      ///< napari's shape-type
-    std::optional<std::size_t> vertex;     ///< position of a mark in its line
+    std::optional<std::size_t> shape;      ///< the column shape-type that napari writes
+    std::optional<std::size_t> vertex;     ///< the column with the position of a mark in its line
     bool closed = true;                    ///< whether lines are closed that have no shape-type
-    std::array<std::string, 3> unit{};     ///< of each coordinate, if a header names a unit of length
-    std::optional<std::size_t> kind;       ///< kind of each mark: surface, inside or outside
+    std::array<std::string, 3> unit{};     ///< unit of each coordinate; empty if the header names no unit of length
+    std::optional<std::size_t> kind;       ///< the column with the kind of each mark: surface, inside or outside
     std::optional<std::size_t> row_unit;   ///< the column that names each row's unit
     std::optional<std::size_t> structure;  ///< the column that names each row's structure
     std::string rule;
@@ -45,8 +45,8 @@ struct ColumnName {
 [[nodiscard]] ColumnName parse_name(std::string_view text);
 [[nodiscard]] bool means_voxels(const std::string& unit);
 
-/// Finds the columns that the fields of a header name. Nothing if these are neither x, y and z (or slice) nor napari's
-/// axes.
+/// Finds the columns that the fields of a header name. The result is empty if the names include neither x, y and z (or
+/// slice) nor napari's axes.
 [[nodiscard]] std::optional<Columns> find_columns(const std::vector<std::string_view>& fields);
 
 }  // namespace covol::detail

@@ -39,7 +39,8 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
 }
 
-/// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}. The letters replace the description of a TIFF's planes.
+/// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}. The letters replace the order of the planes that a TIFF's
+/// description states.
 std::pair<std::string, std::string> split_axes(const std::string& given) {
     const std::size_t colon = given.rfind(':');
     std::error_code status;
@@ -98,7 +99,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     return detail::open_vdb_image(path, grid);
 }
 
-/// Warns about a problem with the spacing, and names the option that corrects it.
+/// Warns about axes whose spacing the file does not state, and names the option that sets it.
 void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunContext& run) {
     std::string axes;
     for (int a = 0; a < 3; ++a)
@@ -108,7 +109,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
              ": 1 is used instead, so lengths, volumes and shapes may be wrong; set it with `spacing = sx,sy,sz`");
 }
 
-/// The file's information with the corrections that `options` contains, after the final checks.
+/// The properties of the image with the spacing that `options` gives, and 1 for unknown spacings. Checks the geometry.
 ImageInfo corrected_info(const std::string& path, const ImageFile& file, const ReadImageOptions& options,
                          const RunContext& run) {
     ImageInfo info = file.info();
@@ -158,7 +159,7 @@ PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const
 ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options, std::uint64_t max_bytes,
                               const RunContext& run) {
     ImageLevels whole(image);
-    if (image.view()) return whole;  // all voxels are in memory or mapped
+    if (image.view()) return whole;  // all voxels are in memory or mapped, so no chunks have to be read
     RunContext quiet = run;          // warnings have already been reported when the image was read
     quiet.log = nullptr;
     const auto chunks_of = [&](const std::string& path, ImageGeometry& geometry) {

@@ -1,4 +1,4 @@
-// The tasks of covol-reader.
+// The tasks of the program covol-reader: enum ReaderTask in modules/reader.h.
 #include "io/reader/serve.h"
 
 #include <cstring>
@@ -43,7 +43,7 @@ void try_voxel(const PieceAtWork& piece) {
         try {
             (void)file->read({{{0, 0, 0}, {0, 0, 0}}}, alone);
         } catch (const Error&) {
-            // This voxel cannot be read, but other channels or frames may be readable.
+            // The error of this voxel is ignored, because other channels or frames may be readable.
         }
     });
 }

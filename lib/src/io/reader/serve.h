@@ -3,7 +3,8 @@
 
 namespace covol {
 
-/// The main function of covol-reader. @returns 2 if the library did not start it.
+/// The main function of covol-reader. @returns 2 if the program was not started by run_pieces(); otherwise it does not
+/// return.
 COVOL_API int serve_reader(int count, char** arguments);
 
 }  // namespace covol

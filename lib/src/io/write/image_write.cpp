@@ -1,4 +1,4 @@
-// Writing of images.
+// write_image() and the checks that all formats need.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -63,7 +63,8 @@ bool is_ome_tiff(const std::string& path) {
     return detail::extension(name) == ".ome";
 }
 
-/// Upper bound for the displacement of a voxel by rounding to single precision, in voxels.
+/// The maximum displacement of a voxel along an axis of the lattice, in voxels, if the geometry is rounded to single
+/// precision. It is evaluated at the corners of the image.
 double moved_by_rounding(const ImageGeometry& geometry) {
     double maximum = 0;
     for (int corner = 0; corner < 8; ++corner) {
@@ -83,7 +84,8 @@ double moved_by_rounding(const ImageGeometry& geometry) {
 /// Warns if single precision, in which NIfTI-1 stores positions, is too coarse because the image is far from 0. @throws
 /// Error Unsupported if voxels would be displaced by more than half a voxel
 void check_precision(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
-    constexpr double kMaxReported = 0.01, kMax = 0.5;  // voxels
+    // [voxels] Displacements above kMaxReported are reported; those above kMax are errors.
+    constexpr double kMaxReported = 0.01, kMax = 0.5;
     const double moved = moved_by_rounding(geometry);
     const std::string what = path + ": NIfTI-1 stores positions in single precision, which displaces voxels by up to " +
                              detail::number(moved) + " of their size at this distance from 0";

@@ -11,9 +11,9 @@ namespace covol::detail {
 void write_raw(const std::string& path, const std::string& extension, const PixelSource& source,
                const WriteImageOptions& options, const RunContext& run);
 
-/// One page per z, deflated: classic with strips, or BigTIFF with tiles. Spacing, unit and origin as in ImageJ's files.
-/// TIFF cannot store a direction.
-/// @param ome  OME-TIFF: with its XML instead of ImageJ's description, without an origin
+/// One deflated page for each slice: a classic TIFF with strips, or a BigTIFF with tiles. Spacing, unit and origin are
+/// stored as ImageJ stores them. TIFF cannot store a direction.
+/// @param ome  writes an OME-TIFF, with XML instead of ImageJ's description, without an origin
 /// @param classic_limit  a BigTIFF is written if the unpacked size in bytes is larger than this
 inline constexpr std::uint64_t kClassicTiff = std::uint64_t(4000) << 20;
 void write_tiff(const std::string& path, const PixelSource& source, bool ome, const RunContext& run,

@@ -12,8 +12,8 @@
 namespace covol::detail {
 namespace {
 
-/// Sets `out` to the packed bytes. @param runs  search only for runs of equal bytes: for labels of one byte, zlib is
-/// then 2.3 times as fast as with its default strategy, and the result is a third smaller
+/// Sets `out` to the packed bytes. @param runs  whether zlib searches only for runs of equal bytes (Z_RLE). For labels
+/// of one byte, this is 2.3 times as fast as its default strategy, and the result is a third smaller
 void deflate_into(std::string& out, const std::string& bytes, BlockPacking packing, bool runs) {
     constexpr int kWindow = 15, kMemory = 9, kLevel = 6;
     z_stream stream{};
@@ -49,7 +49,8 @@ void pad_rows(const Index3& size, const Index3& stored, std::uint64_t width, cha
     const auto row = [&](std::uint64_t length, int rows, int j, int k) {
         return values + (std::uint64_t(k) * std::uint64_t(rows) + std::uint64_t(j)) * length;
     };
-    // The last row is moved first, because rows move towards the end and must not overwrite rows that follow them.
+    // The last row is moved first, because each row moves towards the end, where it must not overwrite rows that have
+    // not been moved yet.
     for (int k = size[2] - 1; k >= 0; --k)
         for (int j = stored[1] - 1; j >= 0; --j) {
             const bool has_voxels = j < size[1];
@@ -104,7 +105,8 @@ BlockPacker::Shared BlockPacker::pack(const BlockPlace& place) {
 
 void BlockPacker::pack_all(std::uint64_t count, const std::function<BlockPlace(std::uint64_t)>& place,
                            const std::function<void(std::uint64_t, const PackedBlock&)>& take, const RunContext& run) {
-    // Number of blocks that are packed in parallel and then written; this limits the memory.
+    // Number of blocks that are packed in parallel before they are written. A limit is needed because all of them are
+    // in memory.
     constexpr std::uint64_t kAtOnce = 64;
     std::vector<Shared> blocks(std::min(count, kAtOnce));
     for (std::uint64_t first = 0; first < count; first += kAtOnce) {

@@ -11,13 +11,15 @@
 
 #include "covol/image_stream.h"
 
-// Blocks (boxes of voxels), which are packed in parallel and written in order.
+// Writes images as blocks (boxes of voxels), which are packed in parallel and written in order.
 namespace covol::detail {
 
 /// How a block's bytes are packed.
 enum class BlockPacking {
     None,
-    Gzip,   ///< deflated, ends at a byte, so that consecutive blocks form one stream; `check` is the CRC-32
+    /// Each block is a part of a Deflate stream and ends at the end of a byte, so that consecutive blocks form one
+    /// stream; `check` is the CRC-32.
+    Gzip,
     Adler,  ///< as Gzip, but `check` is the Adler-32
     Zlib    ///< each block is a complete zlib stream
 };
@@ -29,14 +31,15 @@ struct PackedBlock {
     bool is_zero = false;        ///< whether all bytes are 0
 };
 
-/// A box of the image, and the size of the lattice in which its voxels are stored; the remaining voxels of that lattice
-/// are 0.
+/// A box of the image, and the size of the block in which its voxels are stored. The block may be larger than the box,
+/// as tiles and chunks at the end of an image are; its other voxels are then 0.
 struct BlockPlace {
     VoxelBox box;
-    Index3 stored;  ///< voxels along i, j, k
+    Index3 stored;  ///< size of the block in voxels along i, j, k
 };
 
-/// Fills and packs boxes of a source. Uniform boxes of the same value and size are packed once.
+/// Fills and packs boxes of a source. Boxes in which all voxels have the same value are packed once for each value and
+/// size.
 class BlockPacker {
 public:
     BlockPacker(const PixelSource& source, BlockPacking packing) : source_(source), packing_(packing) {}
@@ -45,7 +48,7 @@ public:
     void pack_all(std::uint64_t count, const std::function<BlockPlace(std::uint64_t)>& place,
                   const std::function<void(std::uint64_t, const PackedBlock&)>& take, const RunContext& run);
 
-    /// Packs bytes that are not voxels in the same way.
+    /// Packs bytes that are not voxels, such as a header, in the same way.
     [[nodiscard]] PackedBlock packed(const std::string& bytes) const;
 
 private:
@@ -58,8 +61,8 @@ private:
     std::map<std::pair<double, std::uint64_t>, Shared> uniform_;  // packed uniform blocks by value and size in bytes
 };
 
-/// Moves the contiguous voxels of a box to their places in a larger lattice; the other voxels become 0. In both, i is
-/// fastest.
+/// Moves the contiguous voxels of a box of `size` voxels to their positions in a larger lattice of `stored` voxels,
+/// whose other voxels become 0. In both, i is the fastest axis.
 /// @param values  as many bytes as the lattice has; initially the box's voxels, followed by zeros
 /// @param width  bytes of a voxel
 void pad_rows(const Index3& size, const Index3& stored, std::uint64_t width, char* values);

@@ -19,7 +19,7 @@ namespace {
 
 using detail::shortest;
 
-/// A quoted field of a CSV table.
+/// The text as a quoted field of a CSV table, in which quotes are doubled.
 std::string quoted_field(const std::string& text) {
     std::string field = "\"";
     for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -51,7 +51,7 @@ std::string to_slicer(const std::vector<NamedMark>& marks, const ImageGeometry& 
     return file.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-/// Writes a number at the position `at`, big-endian as in Java.
+/// Writes a number at the position `at`, big-endian as Java, in which ImageJ is written, stores numbers.
 template <typename T>
 void put(std::string& bytes, std::size_t at, T value) {
     using Bits = std::conditional_t<sizeof(T) == 1, std::uint8_t,
@@ -74,7 +74,9 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
             low[a] = m == 0 ? marks[m].index[a] : std::min(low[a], marks[m].index[a]);
             high[a] = m == 0 ? marks[m].index[a] : std::max(high[a], marks[m].index[a]);
         }
-    constexpr double kFarthest = 32766;  // pixels: the range of a signed 16-bit number, minus one
+    // [pixels] The edges of the bounding box, which are one larger than the maximum coordinate, are stored in 16 bits
+    // with a sign.
+    constexpr double kFarthest = 32766;
     if (high[0] > kFarthest || high[1] > kFarthest)
         throw Error(Errc::Unsupported, path + ": coordinates of a Fiji selection are at most 32766 pixels, got (" +
                                            shortest(high[0]) + ", " + shortest(high[1]) + "); write .csv or .mrk.json");
@@ -85,14 +87,14 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
     std::string bytes(counters + 4 * n, '\0');
     bytes.replace(0, 4, "Iout");
     put<std::int16_t>(bytes, 4, 227);
-    put<std::uint8_t>(bytes, 6, 10);  // type: points
+    put<std::uint8_t>(bytes, 6, 10);  // type of the ROI: points
     const auto left = std::int16_t(std::floor(low[0])), top = std::int16_t(std::floor(low[1]));
     put<std::int16_t>(bytes, 8, top);
     put<std::int16_t>(bytes, 10, left);
     put<std::int16_t>(bytes, 12, std::int16_t(std::ceil(high[1]) + 1));
     put<std::int16_t>(bytes, 14, std::int16_t(std::ceil(high[0]) + 1));
     put<std::uint16_t>(bytes, 16, std::uint16_t(n));
-    put<std::int16_t>(bytes, 50, 128);  // option: sub-pixel coordinates are stored, too
+    put<std::int16_t>(bytes, 50, 128);  // option bit: the file also stores coordinates with fractions of pixels
     put<std::uint32_t>(bytes, 60, std::uint32_t(second));
     put<std::uint32_t>(bytes, second + 48, std::uint32_t(counters));
     for (std::size_t m = 0; m < n; ++m) {
@@ -101,7 +103,8 @@ std::string to_fiji(const std::string& path, const std::vector<NamedMark>& marks
         put<std::int16_t>(bytes, 64 + 2 * n + 2 * m, std::int16_t(std::lround(y) - top));
         put<float>(bytes, reals + 4 * m, float(x));
         put<float>(bytes, reals + 4 * n + 4 * m, float(y));
-        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);  // slice from 1, counter 0
+        // Bits 0 to 7: the counter, 0; from bit 8 on: the slice, counted from 1.
+        put<std::int32_t>(bytes, counters + 4 * m, std::int32_t(std::lround(z) + 1) << 8);
     }
     return bytes;
 }

@@ -1,4 +1,4 @@
-// NRRD, MetaImage, NIfTI-1 and NumPy's .npy: a header, followed by all voxels.
+// Writes NRRD, MetaImage, NIfTI-1 and NumPy's .npy: a header, followed by all voxels.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +24,7 @@ std::string joined(const Numbers& numbers, const char* between) {
     return text;
 }
 
-/// The direction of axis `a`: a column of the matrix.
+/// The direction of axis `a`: column a of the matrix.
 Vec3 axis_of(const ImageGeometry& g, std::size_t a) {
     return {g.direction[0][a], g.direction[1][a], g.direction[2][a]};
 }
@@ -81,7 +81,7 @@ std::string nrrd_header(const PixelSource& source, bool pack) {
         "\nspace directions: " + directions + "\nkinds: domain domain domain\n";
     if (pixel_bytes(source.type()) > 1) text += "endian: little\n";
     text += std::string("encoding: ") + (pack ? "gzip" : "raw") + "\nspace origin: (" + joined(g.origin, ",") + ")\n";
-    // NRRD requires this line after "space".
+    // NRRD requires the field "space" to precede the field "space units".
     const std::string unit = "\"" + quoted(g.unit) + "\"";
     if (!g.unit.empty()) text += "space units: " + unit + " " + unit + " " + unit + "\n";
     for (const auto& [key, value] : source.metadata()) text += escaped(key) + ":=" + escaped(value) + "\n";
@@ -93,7 +93,8 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     std::string matrix;
     for (std::size_t a = 0; a < 3; ++a) matrix += (a == 0 ? "" : " ") + joined(axis_of(g, a), " ");
     std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n";
-    // The number is padded to the maximum width, because it is known only at the end and then overwritten.
+    // The number of packed bytes is known only after all voxels are written, and then overwrites this text in place. It
+    // is therefore padded to the maximum width.
     std::string count = std::to_string(packed_bytes);
     constexpr std::size_t kWidest = 20;
     count.insert(0, kWidest - count.size(), ' ');
@@ -105,14 +106,15 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     return text + "ElementType = " + names_of(source.type()).meta + "\nElementDataFile = LOCAL\n";
 }
 
-/// The unit quaternion (b, c, d; a >= 0) of a rotation. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
+/// The parts b, c and d of the unit quaternion a + bi + cj + dk of a rotation, with a >= 0.
+/// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
 std::array<double, 3> quaternion(const Matrix3& r) {
     const double trace = 1 + r[0][0] + r[1][1] + r[2][2];
     if (trace > 0.5) {
         const double a = 0.5 * std::sqrt(trace);
         return {0.25 * (r[2][1] - r[1][2]) / a, 0.25 * (r[0][2] - r[2][0]) / a, 0.25 * (r[1][0] - r[0][1]) / a};
     }
-    // The largest of b, c and d is computed first, because the others are divided by it.
+    // The largest of b, c and d is computed first, because the other two are obtained by a division by it.
     std::size_t i = 0;
     for (std::size_t n = 1; n < 3; ++n)
         if (r[n][n] > r[i][i]) i = n;
@@ -137,9 +139,11 @@ bool is_sheared(const Matrix3& direction) {
     return maximum > 1e-3;
 }
 
-/// Whether the sform or qform of the input, whichever readers use, describes the same lattice as the new header.
+/// Whether the stated transform of the input (the sform if it has a code, otherwise the qform) describes the same
+/// lattice as the new header.
 bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
-    constexpr double kRounding = 1e-3;  // relative to the spacing, and for quaternions
+    // Tolerance of positions relative to the spacing, and of the parts of quaternions.
+    constexpr double kRounding = 1e-3;
     const auto own = [&](std::size_t at, std::size_t n) {
         float value = 0;
         std::memcpy(&value, header.data() + at + n * sizeof(value), sizeof(value));
@@ -158,16 +162,16 @@ bool still_holds(const NiftiSpace& space, const std::string& header, double spac
         return true;
     };
     const bool same_side = (space.qfac < 0) == (own(kPixdim, 0) < 0);
-    // For a rotation by 180 degrees, both signs of the axis mean the same rotation.
+    // For a rotation by 180 degrees (a = 0), (b, c, d) and (-b, -c, -d) are the same rotation.
     const bool turn = turns_alike(1) || (square > 1 - kRounding && turns_alike(-1));
-    // Readers use the sform if it has a code.
+    // Readers use the sform if sform_code is positive.
     if (space.codes[1] > 0) return lies_alike(space.sform, kSrow, 0);
     return space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3);
 }
 
-/// The 348 bytes of a NIfTI-1 header and four zeros, which mean that there is no extension; the world is RAS.
+/// The 348 bytes of a NIfTI-1 header and four zeros, which mean that no extension follows. World coordinates are RAS.
 /// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
-/// @param like  path of the input, whose codes and forms are kept if they describe the same lattice
+/// @param like  path of the input, whose codes, qform and sform are kept if they describe the same lattice as `source`
 std::string nifti_header(const std::string& path, const PixelSource& source, const std::string& like) {
     const ImageGeometry& g = source.geometry();
     for (const std::int32_t n : g.size)
@@ -206,7 +210,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     put_float(112, 1);    // slope
     const auto unit = std::find(kNiftiUnits.begin() + 1, kNiftiUnits.end(), g.unit);
     header[123] = char(unit == kNiftiUnits.end() ? 0 : unit - kNiftiUnits.begin());
-    // A qform cannot represent sheared axes.
+    // A qform cannot represent sheared axes; its code 0 means that it is not stated.
     put(kCodes, std::int16_t(is_sheared(g.direction) ? 0 : 1));
     put(kCodes + 2, std::int16_t(1));
     const std::optional<NiftiSpace> stated = read_nifti_space(like);
@@ -269,8 +273,8 @@ private:
 class Layers {
 public:
     Layers(const Index3& size, std::uint64_t pixel) : size_(size) {
-        // Size of a block in bytes: so small that many blocks are uniform, and so large that the time to start packing
-        // a block is negligible.
+        // [bytes] Size of a block. It is small, so that many blocks are uniform and are packed only once, but large
+        // enough that the time to start packing a block is negligible.
         constexpr std::uint64_t kBlock = 1U << 18;
         const std::uint64_t row = std::uint64_t(size[0]) * pixel, slice = row * std::uint64_t(size[1]);
         slices_ = std::int32_t(std::clamp<std::uint64_t>(kBlock / slice, 1, std::uint64_t(size[2])));
@@ -324,13 +328,13 @@ void add_voxels(GrowingFile& file, const PixelSource& source, BlockPacking packi
     packer.pack_all(
         layers.count(), [&](std::uint64_t n) { return layers.place(n); },
         [&](std::uint64_t, const PackedBlock& block) { add(block); }, run);
-    // The blocks do not end the Deflate stream, so an empty last block follows.
+    // The blocks do not contain the mark of the last block of a Deflate stream, so an empty last block follows.
     if (gzip || adler) file.add(std::string("\x03\x00", 2));
     if (gzip) file.add(bytes_of(std::uint32_t(check), false) + bytes_of(std::uint32_t(unpacked), false));
     if (adler) file.add(bytes_of(std::uint32_t(check), true));
 }
 
-/// The header, padded to `length` bytes by a comment, with the blank line that ends it.
+/// The header, padded by a comment to a total of `length` bytes, including the blank line that ends a NRRD header.
 std::string filled(std::string header, std::size_t length) {
     header += "#";
     header.resize(length - 2, ' ');
@@ -344,7 +348,8 @@ void write_nrrd(GrowingFile& file, const PixelSource& source, bool pack, const R
         file.add(widest + "\n");
         return add_voxels(file, source, packing, run);
     }
-    // The extents of segments are known only after all voxels are written, so the header is overwritten at the end.
+    // The metadata contain the extents of segments, which are known only after all voxels are written. The header is
+    // then overwritten in place.
     constexpr std::size_t kShortestComment = 2, kBlank = 1;
     const std::size_t length = widest.size() + kShortestComment + kBlank;
     file.add(filled(widest, length));

@@ -12,18 +12,18 @@
 namespace covol::detail {
 namespace {
 
-/// The resolution that is stored for a spacing, rounded to single precision as in libtiff.
+/// The resolution (pixels per unit) that is stored for a spacing, rounded to single precision as libtiff does.
 double resolution(double spacing) { return double(float(1.0 / spacing)); }
 
-/// @param range  the values that ImageJ displays as black and as white; without it, masks with values 0 and 1 appear
-/// black, because 255 is white
+/// @param range  the values that ImageJ displays as black and as white; without a range, 255 is white, so masks with
+/// the values 0 and 1 appear black
 std::string imagej_description(const ImageGeometry& geometry, const std::optional<std::array<double, 2>>& range) {
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
     if (geometry.spacing_known) description += "spacing=" + shortest(geometry.spacing[2]) + "\n";
-    // ImageJ's origin is the position of the world's point 0 in voxels of the spacing that ImageJ will read,
-    // which is rounded for x and y.
+    // ImageJ's origin is the position of the point 0 of the world, in voxels. For x and y, the spacing that ImageJ will
+    // read is rounded, so the rounded value is used here.
     for (std::size_t a = 0; a < 3; ++a) {
         const double per_length = a < 2 ? resolution(geometry.spacing[a]) : 1 / geometry.spacing[a];
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)
@@ -37,7 +37,7 @@ std::string imagej_description(const ImageGeometry& geometry, const std::optiona
 /// The strips or tiles of all pages, in the file's order.
 struct PageParts {
     Index3 size;
-    Index3 part;  ///< voxels of a strip or a tile
+    Index3 part;  ///< size of a strip or a tile in voxels
     bool tiled;
 
     [[nodiscard]] std::uint64_t across() const { return std::uint64_t((size[0] - 1) / part[0] + 1); }
@@ -54,7 +54,8 @@ struct PageParts {
 };
 
 PageParts parts_of(const Index3& size, std::uint64_t pixel, bool big) {
-    // Tiles are used only for BigTIFF, because ImageJ opens neither tiles nor BigTIFF.
+    // ImageJ opens neither tiles nor BigTIFF. Classic TIFFs have strips so that ImageJ can open them; BigTIFFs may have
+    // tiles.
     constexpr std::int32_t kTile = 256;
     constexpr std::uint64_t kStrip = 1U << 18;
     if (big) return {size, {kTile, kTile, 1}, true};

@@ -49,7 +49,7 @@ std::string dtype_of(PixelType type) {
     });
 }
 
-/// The name of a unit in OME-Zarr, which uses the names of UDUNITS; empty if there is none.
+/// The name of a unit in OME-Zarr, which uses the names of UDUNITS; empty if there is no such name.
 std::string unit_name(const std::string& unit) {
     static constexpr std::array<std::array<const char*, 2>, 8> kNames{{{"pm", "picometer"},
                                                                        {"angstrom", "angstrom"},
@@ -132,7 +132,8 @@ private:
             Vec3 scale{}, translation{};
             for (int a = 0; a < 3; ++a) {
                 scale[a] = g.spacing[a] * levels_[n].scale[a];
-                // The centre of the first coarse voxel is the centre of the fine voxels that it covers.
+                // The centre of the first coarse voxel lies in the middle of the fine voxels that it covers, not at the
+                // centre of the first fine voxel.
                 translation[a] = g.origin[a] + (scale[a] - g.spacing[a]) / 2;
             }
             datasets.push_back({{"path", std::to_string(n)},
@@ -175,7 +176,8 @@ private:
                 {"dimension_separator", "/"}};
     }
 
-    /// Writes a chunk and all chunks of finer levels within it; chunks of zeros are omitted.
+    /// Writes a chunk and all chunks of finer levels within it; chunks of zeros are omitted, because the fill value of
+    /// the arrays is 0.
     Voxels make(std::size_t level, const Index3& place) {
         const VoxelBox box = box_of(level, place);
         const VoxelBox fine = finest_box(levels_[level], box, source_.geometry().size);
@@ -203,7 +205,7 @@ private:
         return made;
     }
 
-    /// The positions of the finer level's chunks that a chunk covers.
+    /// The positions of the chunks of the next finer level that a chunk of this level covers.
     [[nodiscard]] std::vector<Index3> below(std::size_t level, const Index3& place) const {
         const Index3 factor = levels_[level].factor, count = chunks(level - 1);
         std::vector<Index3> places;
@@ -288,7 +290,7 @@ private:
     std::vector<PyramidLevel> levels_;
     std::atomic<std::uint64_t> done_ = 0;
     std::mutex lock_;
-    std::map<double, std::string> uniform_;  // packed uniform chunks by value
+    std::map<double, std::string> uniform_;  // packed chunks in which all voxels have the same value, by value
 };
 
 }  // namespace

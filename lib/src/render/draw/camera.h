@@ -13,7 +13,8 @@ struct Basis {
     Vec3 right, up, to_eye;
 };
 
-/// Azimuth 0 looks from the front, along +y, and 90 from +x; elevation 90 from above, along -z. Degrees.
+/// The basis of a view, with angles in degrees: azimuth 0 is a view from the front in the direction +y, azimuth 90 one
+/// from the right in the direction -x, and elevation 90 one from above in the direction -z.
 [[nodiscard]] Basis view_basis(double azimuth, double elevation);
 
 /// Extent of an object along a basis' axes, world units.
@@ -28,7 +29,7 @@ struct Extent {
 struct Camera {
     Basis basis;
     Vec3 center;       ///< world; projected to the middle of `at`
-    double pixel = 1;  ///< world units
+    double pixel = 1;  ///< size of a pixel, world units
     Rect at;
 
     /// x and y on the picture, pixels, and how much closer to the eye than the center, world units.
@@ -37,8 +38,8 @@ struct Camera {
     [[nodiscard]] Vec3 place(double x, double y) const;
 };
 
-/// A camera that shows the whole extent in `at`, with a margin on each side that is this fraction of `at`, enlarged by
-/// `zoom`.
+/// A camera that shows the whole extent in `at` for a `zoom` of 1, which is an additional magnification.
+/// @param margin  on each side, as a fraction of `at`
 [[nodiscard]] Camera frame(const Basis& basis, const Extent& extent, const Rect& at, double margin, double zoom);
 
 }  // namespace covol::figure

@@ -8,7 +8,8 @@
 namespace covol::figure {
 namespace {
 
-/// Visits the pixels of `clip` and of the picture that a shape may touch.
+/// Calls visit(column, row, x, y), with the position of the centre, for the pixels in `clip` and in the picture that a
+/// shape with the corners (x0, y0) and (x1, y1) may touch.
 template <typename Visit>
 void visit_pixels(double x0, double y0, double x1, double y1, const Rect& clip, const Rect& whole, const Visit& visit) {
     const auto low = [](double v, int a, int b) { return int(std::floor(std::max(v - 1, double(std::max(a, b))))); };

@@ -25,7 +25,7 @@ public:
     [[nodiscard]] int height() const { return height_; }
     [[nodiscard]] Rect whole() const { return {0, 0, width_, height_}; }
     [[nodiscard]] Color& at(int x, int y) { return pixels_[std::size_t(y) * width_ + x]; }
-    /// Blends the colour over a fraction of a pixel.
+    /// Covers a fraction of a pixel, 0 to 1, with the colour.
     void blend(int x, int y, const Color& color, double fraction);
 
     void fill(const Rect& rect, const Color& color, double fraction = 1);

@@ -7,7 +7,7 @@
 
 namespace covol::figure {
 
-/// Red, green, blue in [0,1], as a screen takes them.
+/// Red, green and blue in [0,1]: the bytes of a picture divided by 255.
 using Color = std::array<float, 3>;
 
 inline Color gray(double v) { return {float(v), float(v), float(v)}; }
@@ -21,7 +21,7 @@ inline Color to_color(const std::array<std::uint8_t, 3>& c) {
     return {float(c[0]) / 255, float(c[1]) / 255, float(c[2]) / 255};
 }
 
-/// Okabe and Ito, Color universal design (2008).
+/// Colours of the palette of Okabe and Ito, Color universal design (2008).
 inline constexpr Color kSkyBlue{0.337F, 0.706F, 0.914F}, kVermillion{0.835F, 0.369F, 0.0F}, kGreen{0.0F, 0.62F, 0.451F},
     kBlue{0.0F, 0.447F, 0.698F};
 

@@ -78,7 +78,7 @@ void draw_scale_bar(Canvas& canvas, double x, double y, double available, double
 void draw_axes(Canvas& canvas, double x, double y, double length, const Basis& basis,
                const std::array<std::string, 3>& names, double text, const Color& ink) {
     const Color colors[3] = {kVermillion, kGreen, kBlue};
-    // Axes that point away from the eye are drawn first.
+    // Axes that point away from the eye are drawn first, so that the others cover them.
     std::array<int, 3> order{0, 1, 2};
     std::sort(order.begin(), order.end(), [&](int a, int b) { return basis.to_eye[a] < basis.to_eye[b]; });
     const double width = std::max(1.5, 0.12 * text);

@@ -21,7 +21,7 @@ namespace covol::figure {
 struct BarStyle {
     Color color{1, 1, 1};
     double text = 16;  ///< size of the font, pixels
-    double rim = 0;    ///< width of a darker rim, pixels: for bars on images
+    double rim = 0;    ///< width of a dark rim, pixels, which makes bars on images visible
 };
 /// A bar of a round length, 13 to 32 % of `available` (pixels), with its text above; its lower right corner is at x, y.
 void draw_scale_bar(Canvas& canvas, double x, double y, double available, double pixel, const std::string& unit,

@@ -10,13 +10,13 @@
 namespace covol::figure {
 namespace {
 
-constexpr double kUnits = 512;  // units of the outlines per font size
+constexpr double kUnits = 512;  // units of the outlines per em, the size of the font
 constexpr std::uint32_t kUnknown = 0xfffd;
 
 using Place = std::array<double, 2>;
 struct Glyph {
     double advance = 0;
-    std::vector<std::array<Place, 2>> sides;  // of its closed outlines, units of the font
+    std::vector<std::array<Place, 2>> sides;  // of the glyph's closed outlines, units of 1/512 em
 };
 
 class Reader {
@@ -78,7 +78,7 @@ const Glyph& glyph_of(std::uint32_t code) {
     return found != font.end() ? found->second : font.at(kUnknown);
 }
 
-/// Bytes that are not UTF-8 become the replacement character.
+/// The code points of a text. Bytes that are not UTF-8 become the replacement character.
 std::vector<std::uint32_t> code_points(const std::string& utf8) {
     std::vector<std::uint32_t> codes;
     for (std::size_t n = 0; n < utf8.size();) {
@@ -143,7 +143,7 @@ private:
         for (int x = int(std::floor(x0)); x <= int(std::floor(x1)); ++x) {
             const double low = std::max(x0, double(x)), high = std::min(x1, double(x + 1));
             const double part = span > 1e-12 ? height * std::max(0.0, high - low) / span : height;
-            const double rest = part * (x + 1 - 0.5 * (low + high));  // covers this cell to its right end
+            const double rest = part * (x + 1 - 0.5 * (low + high));  // area between the side and the cell's right end
             const int cell = std::clamp(x, 0, width_);
             float* const cells = cells_.data() + std::size_t(row) * (width_ + 2) + cell;
             cells[0] += float(rest);

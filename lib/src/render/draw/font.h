@@ -6,7 +6,7 @@
 
 namespace covol::figure {
 
-/// The outlines, in font_data.cpp, which describes their format.
+/// The outlines of all letters. They are defined in font_data.cpp, which describes their format.
 extern const char* const kGlyphs;
 
 enum class Align { Left, Center, Right };
@@ -16,7 +16,7 @@ struct TextStyle {
     double size = 16;  ///< of the font, pixels
     Color color{0, 0, 0};
     Align align = Align::Left;  ///< which part of the text is at x
-    double halo = 0;            ///< width of a rim around the letters, pixels: for text on images
+    double halo = 0;            ///< width of a rim around the letters, pixels, which makes text on images legible
     Color halo_color{0, 0, 0};
 };
 

@@ -97,7 +97,7 @@ Split split(const Rect& available, double aspect, int rim, const std::vector<Til
                 best = {view, parts, way};
                 is_beside = beside;
             }
-    // Moves the parts to the far side and enlarges the view by the space that they leave.
+    // Moves the parts to the right or lower end of `available`, and enlarges the view by the space that becomes free.
     int& corner = is_beside ? best.parts.bounds.x : best.parts.bounds.y;
     const int moved =
         (is_beside ? available.right() - best.parts.bounds.width : available.bottom() - best.parts.bounds.height) -

@@ -15,7 +15,8 @@ struct Cell {
 /// Columns of parts at one scale, each filled from the top.
 struct Tiling {
     std::vector<std::vector<Cell>> columns;
-    /// Pixel positions, column by column, and the scale at which the tiling fits into `available`, centred.
+    /// The positions of the parts in pixels, column by column, and the scale at which the tiling, centred, fits into
+    /// `available`.
     struct Placed {
         std::vector<Rect> at;
         Rect bounds;
@@ -24,8 +25,8 @@ struct Tiling {
     [[nodiscard]] Placed place(const Rect& available, int gap) const;
 };
 
-/// Ways to arrange three parts, in order: the first and the third in a column and the second beside; the first and,
-/// beside it, the others in a column; all in a column; all in a row.
+/// The four ways to arrange three parts, in this order: the first above the third, and the second beside them; the
+/// first, and beside it the second above the third; all in a column; all in a row.
 [[nodiscard]] std::vector<Tiling> ways_for_three(const std::array<Cell, 3>& parts);
 /// Ways to arrange equal parts in columns.
 [[nodiscard]] std::vector<Tiling> ways_for_equals(double width, double height, int count);
@@ -36,7 +37,8 @@ struct Split {
     Tiling::Placed parts;
     int way = 0;  ///< index of the chosen tiling among those given
 };
-/// The split of `available` in which view and parts are largest and leave little empty; the view has more weight.
+/// The split of `available` in which view and parts are as large as possible and leave little empty space; the size of
+/// the view has more weight.
 /// @param aspect  width of the view's content divided by its height
 /// @param rim     pixels below the view's content, for a scale bar
 [[nodiscard]] Split split(const Rect& available, double aspect, int rim, const std::vector<Tiling>& ways, int gap);

@@ -39,7 +39,7 @@ struct Maker {
     [[nodiscard]] const SegmentOptions& options() const { return problem.options; }
     [[nodiscard]] const RunContext& run() const { return problem.run; }
 
-    /// @param is_field  u is the field of a cloud
+    /// @param is_field  whether u is the field of a cloud, which is not a distance
     void take_level_set(FloatGridPtr u, const FloatGridPtr& known, bool is_field) {
         if (known) {
             made.level_set = known;
@@ -104,12 +104,13 @@ struct Maker {
             TreatedHoles open = trimmed();
             double rims = 0;
             for (const BoundaryLoop& loop : open.report.loops) rims += loop.length;
-            // The part that closes a sheet is at least as large as the sheet itself. Points along curves support no
-            // sheet but narrow strips, whose area is small relative to the length of their rims.
+            // If the points lie on an open sheet, the part that closes it, which is without points, is at least as
+            // large as the sheet. Points along curves leave as much surface without points, but the parts near them are
+            // narrow strips, whose area is small relative to the length of their rims.
             const bool is_sheet = measure(open.mesh).area > 2 * distance * rims;
             if (is_sheet && open.report.fraction > 0.5) return open;
         } catch (const Error& error) {
-            // Points along curves support no surface anywhere: the surface that curvature makes is kept.
+            // Everything was trimmed, for example because the points lie along curves: the closed surface is kept.
             if (error.code() != Errc::InvalidInput) throw;
         }
         return {};
@@ -121,7 +122,7 @@ struct Maker {
         HolesReport& holes = made.holes;
         const double automatic = choose_hole_distance(points, choices.h),
                      distance = requested.distance.value_or(automatic);
-        const double slack = 0.5 / kHoles.far * std::min(automatic, distance);  // half a spacing at most
+        const double slack = 0.5 / kHoles.far * std::min(automatic, distance);  // at most half of the points' spacing
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.fraction_without_points = measure_fraction_beyond(made.mesh, made.distance_to_points, distance);
         holes.distance = distance;
@@ -177,7 +178,7 @@ struct Maker {
     void make_and_measure_mesh() {
         take_mesh();
         if (may_have_holes()) treat_holes();
-        // Both at the same time, because parts of each run on a single thread.
+        // The two measurements run at the same time, because parts of each use a single thread.
         tbb::parallel_invoke([&] { made.measures = measure(made.mesh); },
                              [&] {
                                  if (!points.empty()) made.mark_distances = detail::distances_to(made.mesh, made.marks);

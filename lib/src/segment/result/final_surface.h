@@ -10,7 +10,7 @@ struct Surface {
     FloatGridPtr u;                         ///< the level set from which the surface is made; null without fields
     FloatGridPtr level_set;                 ///< the signed distance to the surface
     TriangleMesh mesh;                      ///< empty without a mesh
-    std::vector<float> distance_to_points;  ///< at the mesh's vertices; for points without an image
+    std::vector<float> distance_to_points;  ///< at the mesh's vertices; only for points without an image
     std::vector<Vec3> marks;                ///< Choices::measured_marks without those that are likely wrong
     std::vector<double> mark_distances;     ///< from `marks` to the surface; empty if no points attract
     std::int64_t active_voxels = 0, leaf_count = 0;

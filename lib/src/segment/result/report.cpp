@@ -93,10 +93,10 @@ private:
                  "there, or give a position outside the body (`outside`)");
     }
 
-    /// Noise scatters points in all directions within its range. If the nearest points lie on sheets although the
-    /// surface was smoothed for noise, the points are folds: the deviation of twelve neighbouring points from a quadric
-    /// is 0.11 to 0.247 of their reach in folds, 0.26 or more if the noise is as large as the distance between nearest
-    /// points, and 0.33 if they fill a ball.
+    /// Detects folds of the surface that were taken for noise. Noise scatters points in all directions: if the nearest
+    /// points lie on sheets although the surface was smoothed for noise, they are folds. The deviation of twelve
+    /// neighbouring points from a quadric is 0.11 to 0.247 of their reach in folds, 0.26 or more if the noise is as
+    /// large as the distance between nearest points, and 0.33 if they fill a ball.
     void find_folds() {
         const CloudReport& cloud = solution_.start.cloud;
         if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
@@ -134,7 +134,7 @@ private:
             Vec3 normal{};
             for (std::size_t a = 0; a < 3; ++a) normal[a] = levels[first + 2 * a + 1] - levels[first + 2 * a];
             const double length = std::hypot(normal[0], normal[1], normal[2]);
-            if (!(length > 0.5 * h_)) continue;  // outside of the band
+            if (!(length > 0.5 * h_)) continue;  // the mark lies outside of the band
             for (double& c : normal) c /= length;
             found.places.push_back(marks_[n]);
             found.normals.push_back(normal);
@@ -219,7 +219,7 @@ private:
 
     void find_holes() {
         const HolesReport& holes = surface_.holes;
-        // A surface that ends where the points end is correct, and its choice is reported elsewhere.
+        // With the policy Open, the surface ends where the points end, so that no part of it is without points.
         if (surface_.fraction_without_points <= kCommon.negligible || holes.policy == Holes::Open) return;
         warn(number(std::round(1000 * surface_.fraction_without_points) / 10) + " % of the surface is farther than " +
              number(holes.distance) + " from every point: " +

@@ -7,7 +7,7 @@ namespace covol::pipeline {
 
 /// The end of the flow on coarse levels, as a start on the fine lattice.
 struct CoarsePass {
-    int levels = 0;                                   ///< requested
+    int levels = 0;                                   ///< number of levels requested
     FloatGridPtr u;                                   ///< null if no level was solved, or its surface vanished
     std::vector<SegmentReport::CoarseLevel> reports;  ///< the coarsest first
     StepReport report;

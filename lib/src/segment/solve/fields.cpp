@@ -17,8 +17,8 @@ namespace {
 int edge_reach(StartOrigin origin) {
     switch (origin) {
         case StartOrigin::Guess:
-        case StartOrigin::Contours: return 5;     // lies close to the result
-        case StartOrigin::CoarseLevel: return 4;  // lies closer still
+        case StartOrigin::Contours: return 5;     // these starts lie close to the result
+        case StartOrigin::CoarseLevel: return 4;  // the result of a coarser level lies closer still
         default: return 12;
     }
 }
@@ -52,7 +52,8 @@ double diagonal(const WorldBox& a, const WorldBox& b) {
     return std::sqrt(squares);
 }
 
-/// Gradient of the body's level by central differences over h, not normalised.
+/// Central differences of the body's level over the length h along each axis, which are not divided by h: only the
+/// direction of the gradient is used.
 Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     Vec3 slope;
     for (int a = 0; a < 3; ++a) {
@@ -73,7 +74,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
             for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
-            inside += body.level(side) < -0.5 * reach;  // no wall is closer than half of this distance
+            inside += body.level(side) < -0.5 * reach;  // inside, and no wall is closer than half of `reach`
         }
         if (2 * inside > places.size()) return reach;
     }
@@ -140,7 +141,8 @@ EdgeChoice choose_edge_feature(const Problem& problem, const Choices& choices) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    // Three standard deviations of the smoothing away from a mark, the values at the mark hardly affect the image.
+    // Farther from a mark than three standard deviations of the smoothing, the values at the mark hardly affect the
+    // smoothed image.
     const double reach =
         reach_within(*body, places, normals, 3 * std::max(choices.edge.sigma.value_or(0), choices.h), choices.h);
     const MarkedFeature found = detect_feature(*problem.image, places, normals, reach);
@@ -174,7 +176,7 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
     if (!options.intensities)
         remarks.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles",
                        problem.run);
-    // Fixed from here on, because g must keep its meaning while the band moves.
+    // K and the intensity range are fixed from here on, because g must keep its meaning while the band moves.
     edges.options.edge_k = e.edge_k;
     edges.options.edge_contrast.reset();
     edges.options.intensities = {e.low, e.high};

@@ -15,7 +15,7 @@
 namespace covol::pipeline {
 namespace {
 
-/// Adds the cost of the previous steps to the total; all other values are those of the later steps.
+/// Adds the cost of the previous steps to `total`, the report of the later steps, which keeps all its other values.
 void add(const EvolveReport& before, EvolveReport& total) {
     const double sweeps = before.sweeps_per_step * before.steps + total.sweeps_per_step * total.steps;
     total.steps += before.steps;
@@ -27,8 +27,8 @@ void add(const EvolveReport& before, EvolveReport& total) {
     total.seconds_sweeps += before.seconds_sweeps;
 }
 
-// With an image, edges of other structures may lie between the tagged surface and the points: at first only the points
-// attract.
+// The first part of the flow from a tagged surface, in which only the points attract: edges of other structures in the
+// image may lie between the tagged surface and the points.
 EvolveReport approach(const StartFacts& start, FloatGrid& u, EvolveFields fields, const RunContext& run) {
     if (start.origin != StartOrigin::Tagged || !uses_points(start.flow) || !uses_image(start.flow)) return {};
     EvolveOptions alone = start.flow;
@@ -86,8 +86,8 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     GuidanceOptions options;
     options.mark_precision = problem.options.mark_precision;
     options.weight = start.flow.rho;
-    // The range is not estimated from the image: if the image matched at the border of another structure, it would
-    // imply that the body between contours has a large error.
+    // For the body between contours, the range of the search is not estimated from the image: if the image matched at
+    // the border of another structure, a large error of the body and therefore a large range would be estimated.
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     options.error_slope = start.inference.error_slope;
@@ -171,7 +171,7 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
 bool has_lost(const Solution& solution, const FloatGrid& start) {
     if (solution.has_vanished()) return true;
     if (solution.start.origin == StartOrigin::Grown)
-        return 2 * inside_volume(*solution.u) < inside_volume(start);  // the flow lost more than it kept
+        return 2 * inside_volume(*solution.u) < inside_volume(start);  // lost more than half of its volume
     const std::vector<Vec3>& trusted = solution.start.marks.trusted;
     return mean_distance(trusted, *solution.u) >
            mean_distance(trusted, start) + kAutomatic.noticeable_voxels * solution.h();

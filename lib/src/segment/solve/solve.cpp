@@ -34,7 +34,8 @@ Solution flow_by_levels(const Problem& problem, StartSurface start, const EdgeOp
     return solution;
 }
 
-/// Keeps the report of the solution that `later` replaces.
+/// The solution `later` with the remarks, times and coarse levels of the solution `earlier` that it replaces, and with
+/// the fields of `earlier` that it lacks.
 Solution after(const Solution& earlier, Solution later) {
     StepReport report = earlier.report;
     report.add(later.report);
@@ -46,8 +47,9 @@ Solution after(const Solution& earlier, Solution later) {
     return later;
 }
 
-/// Returns to a usable start, in place of a flow that made it worse: has_lost().
-/// @param u  of that start
+/// The replacement for a flow that made a usable start worse (has_lost()): a grown start itself, or the flow from the
+/// body between contours with slopes instead of lines as edges.
+/// @param u  the level set of the start
 Solution start_instead(const Problem& problem, const Solution& lost, const FloatGridPtr& u, Reached* reached) {
     if (lost.start.origin == StartOrigin::Grown) {
         Solution kept = lost;

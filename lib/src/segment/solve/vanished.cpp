@@ -43,9 +43,9 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     const WorldBox box = bounding_box(points);
     Vec3 side;
     for (int a = 0; a < 3; ++a) side[a] = box.max[a] - box.min[a];
-    const double radius = 0.5 * std::hypot(side[0], side[1], side[2]);  // of the ball around the box
-    // In units of the mean distance between nearest points. Of n random points on a surface, the expected number that
-    // have a wider gap beside them is 1/n.
+    const double radius = 0.5 * std::hypot(side[0], side[1], side[2]);  // of the ball around the points' box
+    // Width of the widest gap to be expected, in units of the mean distance between nearest points: of n random points
+    // on a surface, the expected number without another point within this distance is 1/n.
     const double gap = 2 * std::sqrt(2 * std::log(double(std::max<std::size_t>(points.size(), 2))) / std::numbers::pi);
     const double layer = std::min(gap * measure_spacing(points).mean, radius);
     text << (is_line   ? "the points lie on a line"

@@ -1,4 +1,4 @@
-// The start from a cloud, which is the surface itself.
+// The start from a cloud. In the guided model it is already the final surface, see is_final_start().
 #include <openvdb/openvdb.h>
 
 #include <cmath>
@@ -14,8 +14,8 @@
 namespace covol::pipeline {
 namespace {
 
-// The obstacle of the flow, `depth` inside the start: in the holes of a scan no points hold the surface, which would
-// otherwise slide along the adjoining walls.
+// The obstacle of the flow: the start moved inward by `depth`, inside which the surface must not move. In the holes of
+// a scan no points hold the surface, which would otherwise slide along the adjoining walls.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
     FloatGridPtr obstacle = start.deepCopy();
     for (auto leaf = obstacle->tree().beginLeaf(); leaf; ++leaf)

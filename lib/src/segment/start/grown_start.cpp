@@ -1,4 +1,4 @@
-// Grows a start inside an object to the object's edges if the image alone decides.
+// Grows a start inside an object to the object's edges if there are no points, so that only the image attracts.
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
 #include "start/grow.h"

@@ -40,13 +40,13 @@ GuessOptions guess_options(const Problem& problem, double h, const std::vector<V
     options.inside = requested.inside;
     options.outside = requested.outside;
     options.outside.insert(options.outside.end(), requested.exterior_seeds.begin(), requested.exterior_seeds.end());
-    // Other normals from a file are not used, because they may point inwards or in any direction.
+    // Only normals that are known to point outwards are used: others from a file may have any direction.
     if (requested.hints.is_outward && requested.hints.normals.size() == marks.size())
         options.normals = requested.hints.normals;
     return options;
 }
 
-/// Estimate of the surface's area: the sum of three sides of the box, about the area of a ball that fills it.
+/// Estimate of the surface's area: the total area of three sides of the box, about the area of a ball that fills it.
 double largest_area(const WorldBox& box) {
     double area = 0;
     for (int a = 0; a < 3; ++a) {

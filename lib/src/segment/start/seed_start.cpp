@@ -1,4 +1,4 @@
-// The start from seeds alone; from there the image decides.
+// The start from seeds alone. There are no marks, so that only the image moves the surface from there.
 #include <utility>
 
 #include "covol/start.h"

@@ -31,8 +31,8 @@ struct StartFacts {
     bool encloses = true;                  ///< of tagged points: whether they enclose something at D
     std::vector<Vec3> on_surface;          ///< of a guess: its marks, without those in the cut at the image's end
     std::vector<char> border_inside;       ///< of a start that the caller specified: inside_on_border(); else empty
-    CorrectionOptions correction_options;  ///< as used
-    std::shared_ptr<const GuessCorrection> correction;  ///< of another tool's result, or null
+    CorrectionOptions correction_options;  ///< the options with which `correction` was made
+    std::shared_ptr<const GuessCorrection> correction;  ///< made if another tool's result was corrected, or null
     GuessReport guess;
     InferenceReport inference;  ///< of a guess in an image
     CloudReport cloud;

@@ -34,7 +34,7 @@ void correct_start(const Problem& problem, StartSurface& start);
 /// The surface halfway between the seeds, for input without marks.
 [[nodiscard]] StartSurface start_from_seeds(const Problem& problem, const Choices& choices, MarkSets marks);
 
-/// Grows a start inside an object to the object's edges if the image alone decides and shows any.
+/// Grows a start inside an object to the object's edges, if there are no points and the image shows clear edges.
 void grow_to_edges(const Problem& problem, const Choices& choices, StartSurface& start);
 
 /// The domain of a start that flows: for a rotated image it extends a little beyond the image on all sides.

@@ -122,8 +122,8 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
                      "the marks' section on the image's end slices is continued beyond it");
         if (body) return body;
     }
-    // Only points near a face are mirrored: a wider gap beside a face is a hole, and does not show that it cuts the
-    // body.
+    // Only points near a face of the image are mirrored. A wide gap between a face and the points may be a hole in the
+    // points, and does not show that the face cuts the body.
     std::vector<Vec3> images = detail::mirrored(points, faces, kHoles.far * measure_spacing(points).median);
     if (images.empty() || encloses_alone(tagger, points, domain)) return {};
     return tag_with(tagger, points, domain, std::move(images),
@@ -132,7 +132,7 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
 
 /// The marks and the points that continue them beyond the image, without those at an end slice that lie deep inside the
 /// body: these only show that the body extends beyond the image, and do not lie on the surface.
-/// @param beyond  the points that continue them
+/// @param beyond  the points that continue the marks beyond the image
 MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
                   const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
     const double deep = kInference.off_cells * start.h();
@@ -156,8 +156,8 @@ MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSu
     return marks;
 }
 
-// Starts from a body that the image cuts off, if there is one. Without this, the flood would enter through the cut, or
-// stop between a face and a surface that leaves the image at a small angle.
+// Starts from a body that the image cuts off, if there is one. Ordinary tagging would fail there: the flood would enter
+// the body through the cut, or would not reach between a face of the image and a surface at a small angle to it.
 std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choices& choices, const MarkSets& marks) {
     const Problem& problem = tagger.problem;
     if (problem.image == nullptr || problem.options.roi) return {};
@@ -221,7 +221,8 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
     facts.tag_distance = problem.options.tag_distance;
     if (!facts.tag_distance) {
         const Timed timed(facts.report.seconds.tag);
-        // Wide enough for any D below a quarter of the cloud's size; the final domain is made once D is known.
+        // A domain that is wide enough for any D below a quarter of the cloud's size. The final one is made once D is
+        // known.
         const double margin = 0.25 * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h;
         facts.tag = tagger.choose(points, problem.domain_with_margin(h, points, margin));
         facts.tag_distance = facts.tag.tag_distance;

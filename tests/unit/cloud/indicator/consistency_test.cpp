@@ -14,7 +14,7 @@ double mean(const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
-/// The normals, reversed if `where` holds.
+/// The normals of the sample, reversed at the points for which `where` is true.
 template <typename Where>
 std::vector<Vec3> turned(const test::SurfaceSample& s, Where where) {
     std::vector<Vec3> normals = s.normals;
@@ -48,13 +48,13 @@ TEST_CASE("Consistency: normals of a solid's border are the most consistent ones
             INFO("right " << right << ", wrong " << wrong << ", noise " << noise);
             CHECK(right < 0.8 * wrong);
         };
-        check_truth_is_better(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });  // a part
-        check_truth_is_better(test::shell(1, 0.6),
-                              [](const Vec3& p) { return test::norm(p) < 0.8; });  // the wall of a cavity
-        check_truth_is_better(test::block({0.8, 0.5, 0.06}),
-                              [](const Vec3& p) { return p[2] > 0; });  // both faces to one side
-        check_truth_is_better(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });  // legs
-        check_truth_is_better(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });            // all
+        // Normals are reversed on one part of a torus, on the wall of a cavity, on one face of a plate so that both
+        // faces point to the same side, on some legs of a table, and on a whole ball.
+        check_truth_is_better(test::torus(1, 0.35), [](const Vec3& p) { return p[0] > 0.5; });
+        check_truth_is_better(test::shell(1, 0.6), [](const Vec3& p) { return test::norm(p) < 0.8; });
+        check_truth_is_better(test::block({0.8, 0.5, 0.06}), [](const Vec3& p) { return p[2] > 0; });
+        check_truth_is_better(test::table(0.06), [](const Vec3& p) { return p[2] < -0.4 && p[0] > 0; });
+        check_truth_is_better(test::ball(1), [](const Vec3& p) { return test::norm(p) > 0; });
     }
 }
 
@@ -69,12 +69,12 @@ TEST_CASE("Consistency: what another orientation has right is taken from it, pat
     std::size_t right = 0, part = 0;
     for (std::size_t n = 0; n < own.size(); ++n) {
         const Vec3& p = c.sample.points[n];
-        if (p[1] < -0.7) continue;  // wrong in both, including the rim
+        if (p[1] < -0.7) continue;  // wrong in both orientations, including the rim of this region
         ++part;
         right += test::dot(own[n], c.sample.normals[n]) > 0;
     }
     CHECK(double(right) > 0.97 * double(part));
-    // A second call finds nothing more to take, and correct normals are not made worse.
+    // take_better() does not make correct normals worse, and finds nothing to take in the orientation itself.
     std::vector<Vec3> best = c.sample.normals;
     std::vector<double> best_off = c.consistency.off(best);
     c.consistency.take_better(other, best, best_off);

@@ -12,7 +12,7 @@ using namespace covol;
 
 namespace {
 
-/// Random points in a shape.
+/// Random points in the interior of a shape.
 std::vector<Vec3> within(const test::Solid3& shape, std::size_t count, unsigned seed) {
     std::vector<Vec3> points;
     for (unsigned n = 0; points.size() < count; ++n)
@@ -27,7 +27,7 @@ std::vector<Vec3> near(const test::Solid3& shape, std::size_t count, double nois
     return s.points;
 }
 
-/// On a gyroid of three periods along each axis, whose sheets are about 3 apart.
+/// Points on a gyroid, a periodic surface, over three periods along each axis. Neighbouring sheets are about 3 apart.
 std::vector<Vec3> on_gyroid(std::size_t count, unsigned seed) {
     std::vector<Vec3> points = test::box_cloud(count, {{0, 0, 0}, {6 * M_PI, 6 * M_PI, 6 * M_PI}}, seed);
     for (Vec3& p : points)
@@ -89,7 +89,7 @@ TEST_CASE("orient_filled: half the density is where the solid ends") {
         }
         INFO(name << ": " << found / truth << " of the volume");
         CHECK(found / truth == Approx(1).margin(0.04));
-        // Normals point outward in the outermost layer, about a cell thick.
+        // Normals point outward at the outermost points, which lie at most 0.3 cells below the surface.
         double outward = 0, all = 0;
         for (std::size_t n = 0; n < cloud.points.size(); ++n) {
             if (shape.distance(cloud.points[n]) < -0.3 * indicator.cell()) continue;

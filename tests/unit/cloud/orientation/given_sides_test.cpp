@@ -92,7 +92,7 @@ TEST_CASE("normals without a meaning change nothing") {
         CHECK(cloud.orientation.normals == own.orientation.normals);
         CHECK(cloud.hints.agree == Approx(0.5).margin(0.06));
     }
-    // Too few normals to use.
+    // Only a quarter of the points have normals, which are too few to use.
     std::vector<Vec3> few(s.points.size(), Vec3{0, 0, 0});
     for (std::size_t n = 0; n < few.size(); n += 4) few[n] = s.normals[n];
     const CloudOrientation cloud = with_normals(s.points, few);
@@ -114,7 +114,9 @@ TEST_CASE("a part that is turned as a whole is found by what the points say them
         const CloudOrientation cloud = with_normals(s.points, normals);
         CHECK_FALSE(cloud.hints.used);
         CHECK(fraction_wrong(cloud.orientation.normals, s.normals) < 0.01);
-        CHECK(cloud.hints.predicted > 0.9);  // neither half alone can detect the error
+        // The cross-validation with one half of the normals against the other does not detect the error, because both
+        // halves contain it.
+        CHECK(cloud.hints.predicted > 0.9);
     }
 }
 
@@ -160,7 +162,7 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
                 points.push_back(p);
                 normals.push_back(s.normals[n]);
                 const double in_other = box.distance(seed == 1 ? test::sum(p, test::scaled(-1, by)) : p);
-                // Near the rim of the common wall the surface is close.
+                // Points near the rim of the common wall are not counted, because the outer surface is close to them.
                 const bool is_near_rim = std::max(std::abs(p[1]), std::abs(p[2])) > 0.4;
                 if (shift == 1.0 ? in_other < 1e-3 && !is_near_rim : in_other < -0.1) within.push_back(p);
             }
@@ -173,14 +175,14 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
         const auto left = std::count_if(within.begin(), within.end(), [&](const Vec3& p) { return kept.count(p) > 0; });
         INFO("shift " << shift << ": " << left << " of " << within.size() << " within are left, " << cloud.enclosed
                       << " left out");
-        // On walls that touch, some points remain if one wall is sampled more densely than the other.
+        // Where two walls touch, some points remain if one of the walls is sampled more densely than the other.
         CHECK(double(left) < 0.3 * double(within.size()));
         CHECK(double(cloud.enclosed) < 1.6 * double(within.size()));
     }
-    // Narrow gaps are not solid.
+    // Two boxes with a gap of 0.1, about three spacings, must not be joined to one solid: no point may be left out.
     std::vector<Vec3> points, normals;
     for (const double side : {0.0, 1.1}) {
-        const test::SurfaceSample s = box.sample(6000, 3);  // 0.032 apart
+        const test::SurfaceSample s = box.sample(6000, 3);  // with a spacing of 0.032
         for (std::size_t n = 0; n < s.points.size(); ++n) {
             points.push_back(test::sum(s.points[n], {side, 0, 0}));
             normals.push_back(s.normals[n]);

@@ -14,7 +14,8 @@ using namespace covol::cloud;
 
 namespace {
 
-/// Points of two layers; from the lower layer only the inside of the scan is visible, through its opening.
+/// Points of an upper and a lower layer, and the directions from which they were seen. The lower layer was seen only
+/// from inside the scan, through its opening.
 struct Layers {
     std::vector<Vec3> points, free;
     std::vector<char> is_lower;
@@ -47,7 +48,8 @@ const double kSpacing = std::sqrt(4 * M_PI / kCount), kDepth = 1 - 4 * kSpacing;
 
 TEST_CASE("a layer below another is turned outwards, and makes no cavity") {
     for (const unsigned seed : {1, 2, 3}) {
-        // A sphere, open at the top, of which a part was scanned twice, the second time too deep.
+        // A sphere that is open at the top. A part of it was scanned twice, and the points of the second scan lie too
+        // deep.
         Layers scan;
         for (const Vec3& p : test::sphere_cloud(kCount, 1, seed)) {
             if (p[2] > 0.75) continue;

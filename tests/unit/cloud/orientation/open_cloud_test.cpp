@@ -56,10 +56,11 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
         CHECK(m.closed);
         CHECK(m.components == 1);
         CHECK(m.genus == 0);
-        // Half a ball whose lid may sag or bulge.
+        // The volume is that of half a ball, within 40 %, because the lid may sag or bulge.
         CHECK(m.volume < 2.0 / 3 * kPi * 1.4);
         CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
-        // A flat lid would be a third of the area; near its rim it is close to the points.
+        // A flat lid would have a third of the whole area. The part of the lid near the rim is close to the points, so
+        // that it does not count as without points.
         const double fraction = measure_fraction_without_points(mesh, cloud.points, 0.15);
         CHECK(fraction > 0.15);
         CHECK(fraction < 0.45);
@@ -96,7 +97,7 @@ TEST_CASE("segment: a noisy torus of which each part was seen from one side has 
     CHECK(result.report.surface.components == 1);
     CHECK(result.report.surface.genus == 1);
     CHECK(result.report.fit.mean < 0.5 * 0.05);
-    // At the points the surface is the torus.
+    // Near the points, the surface must agree with the torus.
     double sum = 0, count = 0;
     for (const auto& v : result.mesh.vertices) {
         const Vec3 p{v[0], v[1], v[2]};

@@ -15,7 +15,7 @@ using namespace covol;
 
 namespace {
 
-constexpr double kNoise = 1.0 / 3;  // of the spacing
+constexpr double kNoise = 1.0 / 3;  // noise, as a fraction of the points' spacing
 
 RunContext on_threads(int n) {
     RunContext run;

@@ -21,7 +21,7 @@ std::size_t count_along(const std::vector<Vec3>& normals, const std::vector<Vec3
     return count;
 }
 
-/// Uniform random points on a square of edge 1 at this height.
+/// Uniform random points on a square with edges of length 1 in the plane at height z.
 std::vector<Vec3> square(std::size_t count, double z, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> place(0, 1);

@@ -36,7 +36,8 @@ TEST_CASE("points spread through space are stray, a surface's are not") {
 
 TEST_CASE("sparse parts of a surface are not stray") {
     for (const unsigned seed : {1, 2, 3}) {
-        // A sixteenth of the density on one half: points are four times as far apart.
+        // On one half of the sphere only one point in sixteen is kept, so that points there are four times as far
+        // apart.
         const test::SurfaceSample s = test::ball(1).sample(6000, seed);
         std::mt19937 random(seed);
         std::vector<Vec3> points;

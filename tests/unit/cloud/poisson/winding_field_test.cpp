@@ -20,7 +20,7 @@ struct OrientedSphere {
     std::vector<Vec3> points, vectors;
 };
 
-/// Evenly spread along a spiral.
+/// Points that are spread evenly over a sphere, along a spiral.
 OrientedSphere sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
     OrientedSphere s;
     for (int m = 0; m < count; ++m) {
@@ -34,8 +34,8 @@ OrientedSphere sphere(int count, double radius, const Vec3& center = {0, 0, 0}) 
 
 using Stack = std::shared_ptr<const GridStack>;
 
-/// All points on the finest grid, with about `cells` cells along the longest side, including the margin beyond the
-/// points.
+/// A stack of grids with all points on the finest grid, which has about `cells` cells along the longest side. This side
+/// includes the margin of `fraction` of its length at both ends of the points.
 Stack grids(const std::vector<Vec3>& points, int cells, double fraction = 0.2) {
     return std::make_shared<const GridStack>(points, std::vector<std::uint8_t>{},
                                              longest_side(bounding_box(points)) * (1 + 2 * fraction) / cells, fraction);
@@ -49,7 +49,7 @@ double largest_difference(const StackField& a, const StackField& b) {
     return largest;
 }
 
-/// visit(value, place, cell)
+/// Calls visit(value, place, cell) for each node of each level; `cell` is the edge of the level's cells.
 template <typename Field, typename Visit>
 void for_nodes(Field& field, Visit visit) {
     const GridStack& stack = field.stack();
@@ -64,7 +64,7 @@ void for_nodes(Field& field, Visit visit) {
         }
 }
 
-/// Random points in a box; those with x < 0 are two levels coarser than the others.
+/// Random points in a box. The grid around those with x < 0 is two levels coarser than around the others.
 struct UnevenCloud {
     UnevenCloud() {
         for (const Vec3& p : points) levels.push_back(p[0] < 0 ? 2 : 0);
@@ -88,7 +88,7 @@ TEST_CASE("each level has all nodes around its points, and around the level that
                     at[a] = int(std::floor((u.points[n][int(a)] - u.stack->origin()[int(a)]) / levels[l].cell) +
                                 ((corner >> a & 1) != 0 ? 2 : -1)) >>
                             3;
-                // The border lies beyond the coarsest block.
+                // There are no blocks beyond the coarsest block.
                 const int end = 1 << (levels.size() - 1 - l);
                 if (std::all_of(at.begin(), at.end(), [&](int x) { return x >= 0 && x < end; }))
                     REQUIRE(levels[l].find(at) != kNoBlock);
@@ -121,7 +121,8 @@ TEST_CASE("splines are exact on linear functions across levels, and their gradie
         const Vec3 slope{2, -1, 0.5};
         const double step = 0.05 * s.cell;
         for (int a = 0; a < 3; ++a) {
-            REQUIRE(s.gradient[a] == Approx(slope[a]).margin(1e-3));  // of floats over a cell of 0.01
+            // Rounding errors of floats, divided by a cell of 0.01.
+            REQUIRE(s.gradient[a] == Approx(slope[a]).margin(1e-3));
             Vec3 low = x, high = x;
             low[a] -= step;
             high[a] += step;
@@ -153,8 +154,8 @@ TEST_CASE("what is spread keeps the points' number and their centre") {
 
 namespace {
 
-/// Largest error if div grad u = div grad of a bell-shaped function is solved from its gradient at points that fill a
-/// box.
+/// The equation is solved with the gradient of a bell-shaped function, given at points that fill a box, so that the
+/// solution should be this function. @return the maximum error
 double error_of_bell(double cell, bool uneven) {
     constexpr double kWidth = 0.25;
     const int side = int(std::lround(2.4 / (0.5 * cell)));  // two points per cell along each axis
@@ -283,7 +284,8 @@ TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
     WindingField field(std::make_shared<const GridStack>(bowl.points, std::vector<std::uint8_t>{}, 2.8 / 64, 0.2));
     field.solve(bowl.points, bowl.vectors, 12);
     const double cell = field.indicator().stack().cell();
-    // Away from both sides the harmonic part changes, too: for a disc by about the distance over the radius.
+    // The solution also changes away from the surface, on both sides: for a disc by about the distance over the radius.
+    // Therefore the step is measured close to the surface and may be smaller by this amount.
     for (const double r : {2.0, 3.0}) {
         const double step =
             field.indicator().at({0, 0, -1 + r * cell}).value - field.indicator().at({0, 0, -1 - r * cell}).value;
@@ -308,7 +310,7 @@ TEST_CASE("each V-cycle leaves a fraction of the error") {
         CHECK(now < 0.35 * before);
         before = now;
     }
-    // Continuing gives the same result as all cycles at once.
+    // Further cycles after an interruption give the same result as all cycles at once.
     WindingField at_once(l);
     at_once.solve(s.points, s.vectors, 4);
     CHECK(at_once.indicator().values == field.indicator().values);

@@ -42,7 +42,7 @@ struct Shape {
     int genus;
 };
 
-/// Around the ball of radius 1.
+/// The domain around the ball of radius 1.
 const Domain kDomain = make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.06);
 
 }  // namespace
@@ -95,7 +95,7 @@ TEST_CASE("surface_from_cloud: holes in the points are closed") {
     const test::SurfaceSample s = ball.sample(4000, 5);
     std::vector<Vec3> points;
     for (const Vec3& p : s.points)
-        if (p[2] < 0.9) points.push_back(p);  // a cap of a tenth of the diameter
+        if (p[2] < 0.9) points.push_back(p);  // without a cap of height 0.1
     const Result r = surface_of(points, 0.7 * s.spacing());
     const MeshMeasures m = measure(r.mesh);
     CHECK(m.closed);

@@ -18,7 +18,7 @@ using namespace covol::cloud;
 
 namespace {
 
-/// Signed distance, > 0 outside; points are drawn from its zero set within the unit ball.
+/// Signed distance to the border of a solid, > 0 outside. Points are drawn from its zero set within the unit ball.
 using Solid = std::function<double(const Vec3&)>;
 
 Vec3 gradient(const Solid& f, const Vec3& p, double step) {
@@ -32,7 +32,8 @@ Vec3 gradient(const Solid& f, const Vec3& p, double step) {
     return unit(g);
 }
 
-/// Normals are blurred over a fifth of the radius, like those of an indicator.
+/// Random points on the border of a solid. Their normals are averaged over a fifth of the neighbourhood's radius, which
+/// is 1, as the normals of an indicator are blurred.
 std::vector<CreasePoint> border(const Solid& f, double noise, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> place(-1, 1);
@@ -63,7 +64,7 @@ Solid either(Solid a, Solid b) {
     return [=](const Vec3& p) { return std::min(a(p), b(p)); };
 }
 
-/// Largest error of the distance near the border and within 0.8 radii.
+/// The maximum error of the crease's distance at positions near the border and within 0.8 radii of the origin.
 double worst(const Crease& crease, const Solid& f) {
     double error = 0;
     for (double x = -0.8; x <= 0.8; x += 0.1)
@@ -99,7 +100,8 @@ TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where 
             CHECK(worst(*crease, kind.f) < 0.02);
         }
         INFO(kind.name << ": " << found << " of 20");
-        CHECK(found >= (kind.sheets == 2 ? 19 : 14));  // some draws have too few points on one of three sheets
+        // With three sheets, some of the draws have too few points on one of them.
+        CHECK(found >= (kind.sheets == 2 ? 19 : 14));
     }
 }
 
@@ -148,7 +150,8 @@ TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box
             for (int k = -14; k <= 14; ++k)
                 at.setValue({i, j, k}, float(std::clamp(box({double(i), double(j), double(k)}), -3.0, 3.0)));
     TriangleMesh mesh = extract_mesh(*extract_surface(*grid));
-    const auto off_corners = [&] {  // of the corners to the nearest vertex
+    // The maximum distance of a corner of the box from the nearest vertex of the mesh.
+    const auto off_corners = [&] {
         double maximum = 0;
         for (int n = 0; n < 8; ++n) {
             Vec3 corner{0, 0, 0};

@@ -23,7 +23,7 @@ Domain cube() {
     return domain;
 }
 
-/// Active everywhere; negative where inside(i, j, k).
+/// A level set with the values -1 where inside(i, j, k) is true and 1 elsewhere; all voxels are active.
 template <typename Inside>
 FloatGridPtr level_set(Inside inside) {
     const FloatGridPtr grid = make_grid(cube(), 3.0F, "u");
@@ -80,7 +80,7 @@ TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are 
     const FloatGridPtr left = large->deepCopy(), held = large->deepCopy();
     CHECK(cloud::hold_topology(*small, *left, {}, differ - 1) == 0);
     CHECK(left->tree().hasSameTopology(large->tree()));
-    CHECK(measure(extract_mesh(*left)).components == 2);  // the cavity is a component
+    CHECK(measure(extract_mesh(*left)).components == 2);  // the surface around the cavity is a component of its own
     CHECK(cloud::hold_topology(*small, *held, {}, differ) > 0);
     CHECK(measure(extract_mesh(*held)).components == 1);
 }
@@ -88,7 +88,8 @@ TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are 
 TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is narrowest") {
     const double middle = 0.5 * (kSide - 1);
     for (const int narrow : {8, 12, 15}) {
-        // Two blocks and a bar between them, which is thinner in one place.
+        // `target` consists of two blocks and a bar between them, which is thinner at i == narrow. `rough` lacks the
+        // bar.
         const auto bar = [&](int i, int j, int k) {
             return std::hypot(j - middle, k - middle) < (i == narrow ? 1.5 : 4);
         };
@@ -108,7 +109,8 @@ TEST_CASE("hold_topology: where a surface is cut off, what lies beyond is left a
     const FloatGridPtr rough = level_set([](int, int, int k) { return k < 8; });
     FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && away(i, j, k) > 4; });
     const std::size_t all = target->activeVoxelCount();
-    // As after a flood fill: in one of the two, the inside extends without end.
+    // A solid that the domain cuts off extends without end after a flood fill. Here this is the case for `target`
+    // alone.
     target->tree().root().addTile(openvdb::Coord(0, 0, -4096), -3.0F, false);
     static_cast<void>(cloud::hold_topology(*rough, *target, {}));
     CHECK(target->activeVoxelCount() == all);

@@ -19,7 +19,8 @@ const Vec3 kBody{-0.5, 0, 0};
 
 double ball(const Vec3& p, const Vec3& center, double radius) { return test::distance(p, center) - radius; }
 
-/// A body with a cavity, and a small ball whose surface is `gap` from the body's.
+/// The centre of a small ball of radius kThin whose surface is `gap` from that of the body. torn() makes the level set
+/// of this ball and the body, which has a cavity.
 Vec3 tip(double gap) { return {kBody[0] + kRadius + gap + kThin, 0, 0}; }
 FloatGridPtr torn(double gap, double tip_radius = kThin) {
     const Vec3 at{tip(gap)[0] + tip_radius - kThin, 0, 0};
@@ -31,7 +32,7 @@ FloatGridPtr torn(double gap, double tip_radius = kThin) {
         3 * kVoxel);
 }
 
-/// Points on both, and, if `between`, along the missing part between them.
+/// Points on the body and on the small ball and, if `between`, along the missing part between them.
 std::vector<Vec3> points(double gap, bool between) {
     std::vector<Vec3> all = test::sphere_cloud(400, kRadius, 1, kBody);
     for (const Vec3& p : test::sphere_cloud(40, kThin, 2, tip(gap))) all.push_back(p);
@@ -47,13 +48,14 @@ TEST_CASE("a small piece is joined where points lie all along the gap, and nowhe
     for (const double gap : {1.5, 3.0}) {
         INFO(gap << " apart");
         const FloatGridPtr with = torn(gap * kApart), without = torn(gap * kApart), before = torn(gap * kApart);
-        REQUIRE(measure(extract_mesh(*with)).components == 3);  // the cavity is a component
+        REQUIRE(measure(extract_mesh(*with)).components == 3);  // the body, its cavity and the small ball
         CHECK(cloud::join_pieces(*with, points(gap * kApart, true), kApart, {}) == 1);
         const MeshMeasures joined = measure(extract_mesh(*with));
         CHECK(joined.components == 2);
         CHECK(joined.genus == 0);
         CHECK(joined.closed);
-        // A rod about as thick as the points around it, and no thicker than half of their spacing.
+        // The pieces are joined by a rod. Its volume is that of a cylinder with half of the points' spacing as radius,
+        // up to a factor of about 3.
         const double grown = joined.volume - measure(extract_mesh(*before)).volume;
         CHECK(grown > 0.3 * M_PI * 0.25 * kApart * kApart * gap * kApart);
         CHECK(grown < 3 * M_PI * 0.25 * kApart * kApart * gap * kApart);
@@ -73,7 +75,7 @@ TEST_CASE("pieces that are not small stay for themselves, however close") {
 }
 
 TEST_CASE("a piece is joined to one that was joined") {
-    // Three beads in a row; the last is far from the body.
+    // The body and two small balls in a row. The last one is too far from the body to be joined to it directly.
     const double gap = 1.5 * kApart;
     const Vec3 second = tip(gap), third{second[0] + 2 * kThin + gap, 0, 0};
     const FloatGridPtr beads = test::start_grid(

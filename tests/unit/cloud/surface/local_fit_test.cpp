@@ -35,12 +35,12 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-/// How well quadrics at sample points of a shape, moved by noise, fit the shape.
+/// How well quadrics fit a shape if they are computed from sample points of the shape that are moved by noise.
 struct FitErrors {
-    double fraction = 0;                          // of the nodes that have a quadric
-    double off = 0;                               // root mean square of the feet's distance to the shape
-    double noise = 0, radius = 0, curvature = 0;  // medians
-    double off_beside = 0;  // root mean square error of distance() half a radius beside and above the foot
+    double fraction = 0;                          // fraction of the nodes that have a quadric
+    double off = 0;                               // root mean square distance of the quadrics' feet from the shape
+    double noise = 0, radius = 0, curvature = 0;  // medians over the quadrics
+    double off_beside = 0;  // root mean square error of distance() one spacing beside and above the foot
 };
 
 FitErrors fit_shape(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
@@ -91,7 +91,7 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
                 CHECK(f.off < maximum * spacing);
                 CHECK(f.off_beside < (spacings > 0 ? 0.6 * spacings : 0.003) * spacing);
                 CHECK(f.curvature / curvature == Approx(1).margin(spacings > 0 ? 0.4 : 0.02));
-                // As wide as the noise requires.
+                // The neighbourhoods are as wide as the noise requires.
                 if (spacings > 0) CHECK(f.radius > 2.5 * spacing);
                 if (spacings == 0)
                     radius = f.radius;
@@ -122,7 +122,8 @@ TEST_CASE("a quadric's distance, foot and curvature are those of its paraboloid"
 }
 
 TEST_CASE("an exact paraboloid is found as it is") {
-    // Heights 0.3 u^2 - 0.2 uv + 0.1 v^2 over a plane that is not the nodes' own: their normals are tilted.
+    // A paraboloid with the heights 0.3 u^2 - 0.2 uv + 0.1 v^2 over the plane z = 0. The nodes have its normals, so
+    // that their own planes are tilted against z = 0.
     const auto height = [](double x, double y) { return 0.3 * x * x - 0.2 * x * y + 0.1 * y * y; };
     OrientedCloud cloud;
     for (Vec3 p : test::box_cloud(3000, {{-1, -1, 0}, {1, 1, 1}}, 4)) {
@@ -141,7 +142,7 @@ TEST_CASE("an exact paraboloid is found as it is") {
     for (const Vec3& p : test::box_cloud(100, {{-0.05, -0.05, 0}, {0.05, 0.05, 0}}, 5))
         worst = std::max(worst, std::abs(q.distance({p[0], p[1], height(p[0], p[1])})));
     CHECK(worst < 0.01 * spacing);
-    // 0.4 + sqrt(0.04 + 0.04)
+    // The Hessian of the height is ((0.6, -0.2), (-0.2, 0.2)). Its larger eigenvalue is 0.4 + sqrt(0.04 + 0.04).
     CHECK(q.curvature() == Approx(0.4 + std::sqrt(0.08)).epsilon(0.05));
 }
 
@@ -176,7 +177,8 @@ TEST_CASE("two sheets back to back do not mix") {
                      << widest / spacing << ", mean cosine " << cosines / double(fitted));
         CHECK(cosines / double(fitted) > 0.96);
         CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
-        CHECK(widest > 2 * apart);  // they were within reach
+        // The neighbourhoods reached the other sheet, so its points were left out because of their normals.
+        CHECK(widest > 2 * apart);
     }
 }
 
@@ -186,7 +188,8 @@ TEST_CASE("no quadric through the sheets of two folds that the indicator tells a
         const double spacing = std::sqrt(4.0 / each);
         OrientedCloud cloud;
         for (const Vec3& p : test::box_cloud(2 * int(each), {{-1, -1, 0}, {1, 1, 0}}, 9)) {
-            // All normals point to one side, so that the space between the sheets is a narrow gap.
+            // All normals point to one side, as at a narrow gap, so they do not separate the sheets. Only squares_off,
+            // the distances from the indicator's surface, shows that a quadric between the sheets is wrong.
             cloud.points.push_back({p[0], p[1], (cloud.size() % 2 ? 0.5 : -0.5) * spacing});
             cloud.normals.push_back({0, 0, 1});
             cloud.counts.push_back(1);
@@ -265,8 +268,8 @@ TEST_CASE("thinned: counts add up, the centre stays, both sides of a sheet stay 
 TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it is turned") {
     const test::SurfaceSample s = test::ball(1).sample(5000, 12);
     const OrientedCloud thin = thinned(oriented(s), 0.1);
-    // The mean of a cell's points lies no deeper than the chord of the cell; normals close to a diagonal do not split a
-    // cell.
+    // The mean of a cell's points lies below the sphere by no more than a chord of the cell does. A cell has one mean,
+    // even if its normals are close to a diagonal.
     CHECK(thin.size() == PointCells(s.points, 0.1).cell_count());
     for (std::size_t n = 0; n < thin.size(); ++n) {
         REQUIRE(test::norm(thin.points[n]) > 1 - 0.1 * 0.1);
@@ -303,15 +306,15 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     test::add_noise(s, spacing, 2);
     std::size_t bare = 1000;
     const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, 0, bare, {});
-    CHECK(bare < 20);  // of 10,000 positions
+    CHECK(bare < 20);  // number of nodes without a quadric
     CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
     for (const Quadric& q : quadrics) {
         const double times = q.apart / edge;
         CHECK((times == 1 || times == 2 || times == 4 || times == 8));
         CHECK(q.radius > (times > 1 ? 7 * q.apart : 0));
     }
-    // No position is farther from a quadric than the spacing of that quadric's nodes, except in cells whose nodes are
-    // means.
+    // `farthest` is the maximum distance of a position from the nearest quadric's foot, `farthest_beyond` the same less
+    // the spacing of that quadric's nodes. It may exceed 0, because the nodes are means of the points in a cell.
     double farthest = 0, farthest_beyond = 0;
     for (std::size_t n = 0; n < places.size(); n += 10) {
         double nearest = 1, beyond = 1;
@@ -328,7 +331,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     INFO("farthest " << farthest / edge << ", beyond " << farthest_beyond / edge << " cells");
     CHECK(farthest < 3 * edge);
     CHECK(farthest_beyond < 2 * edge);
-    // Without noise the nodes are as close as requested: no neighbourhood on a ball is that wide.
+    // Without noise no neighbourhood on a ball is so wide that nodes farther apart than `edge` would suffice.
     for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 
@@ -368,7 +371,7 @@ TEST_CASE("points selected four at a time are those in the ball on the frame's s
     for (std::size_t begin = 0; begin < places.size(); begin += 7)
         for (std::size_t end = begin; end <= places.size(); ++end) {
             near.clear(end - begin + 5);
-            select_near(cloud, 0, 5, frame, near);  // results are appended
+            select_near(cloud, 0, 5, frame, near);  // the following results are appended
             select_near(cloud, begin, end, frame, near);
             near.fill_up();
             std::vector<std::size_t> expected;

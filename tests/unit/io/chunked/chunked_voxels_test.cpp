@@ -1,4 +1,4 @@
-// Chunks that are decoded on demand: each of them once, with the same values as if all were decoded at once.
+// Tests of chunks that are decoded on demand: each once, with the same values as if all were decoded at once.
 #include <tbb/parallel_for.h>
 
 #include <atomic>
@@ -39,7 +39,7 @@ public:
     Index3 bad{-1, -1, -1};
 };
 
-/// Every chunk but the first one is missing.
+/// A source in which all chunks but the first one are missing; their voxels have the fill value.
 class Missing : public Numbered {
 public:
     using Numbered::Numbered;
@@ -49,7 +49,8 @@ public:
     [[nodiscard]] double fill_value() const noexcept override { return -3; }
 };
 
-/// 1024^2 x 256 voxels of one byte: large enough to be read chunk by chunk. Eight chunks of 64^3 exist.
+/// Writes an array of 1024^2 x 256 voxels of one byte, large enough to be read chunk by chunk. Only eight chunks of
+/// 64^3 exist.
 std::string write_large(const Scratch& scratch) {
     const std::string folder = scratch.path("large");
     std::string meta = zarr_stores::metadata_2(1024, 64, "|u1", "zstd", "5");
@@ -62,7 +63,7 @@ std::string write_large(const Scratch& scratch) {
     return folder;
 }
 
-/// World = index. Around the chunks that exist.
+/// A box around the chunks that exist. World coordinates equal indices.
 const WorldBox kPart{{180, 440, 60}, {330, 590, 200}};
 
 }  // namespace
@@ -203,7 +204,7 @@ TEST_CASE("chunks: percentiles and range depend on what was read, not on threads
     CHECK(touched[3] == 63);
     CHECK(touched == measure(2, true));
     CHECK(touched == measure(8, true));
-    // if nothing was read, some chunks on a lattice are decoded
+    // If nothing was read before, percentiles() and range() decode some chunks, which lie on a lattice.
     const auto untouched = measure(1, false);
     CHECK(untouched[4] == 27);
     CHECK(untouched == measure(8, false));

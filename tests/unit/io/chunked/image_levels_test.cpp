@@ -21,7 +21,7 @@ using detail::ChunkSource;
 
 namespace {
 
-/// Voxel (i,j,k) is i + 3 j + 7 k, times `scale`; the chunk at the origin may be missing.
+/// A source whose voxel (i,j,k) is i + 3 j + 7 k, times `scale`. The chunk at the origin may be missing.
 class Slope final : public ChunkSource {
 public:
     Slope(const Index3& size, int chunk, int scale, bool lacks_first = false)
@@ -54,7 +54,7 @@ ImageGeometry geometry_of(const Index3& size, const Vec3& spacing) {
     return geometry;
 }
 
-/// Levels of factors 1, 2 and 4, the last one of factor 2 along k.
+/// An image in three levels, whose voxels are 1, 2 and 4 times as wide; in the last level only twice as wide along k.
 struct Pyramid {
     Index3 size{40, 24, 36};
     std::shared_ptr<Slope> fine = std::make_shared<Slope>(size, 8, 1);
@@ -139,7 +139,7 @@ TEST_CASE("A level whose voxels span no whole number of fine ones is left out") 
     REQUIRE(levels.levels().size() == 2);
     CHECK(levels.levels()[1].factor == Index3{4, 4, 2});
     pyramid.sources[2].geometry.size = {11, 6, 18};
-    CHECK(pyramid.open().levels().size() == 2);  // the last voxel is only partly covered
+    CHECK(pyramid.open().levels().size() == 2);  // one voxel more along x is accepted
     pyramid.sources[2].geometry.size = {17, 6, 18};
     CHECK(pyramid.open().levels().size() == 1);
 }
@@ -163,7 +163,7 @@ TEST_CASE("A slice for a page comes from its level alone, in whole and in part")
     const std::vector<int> some = unpacked(part);
     for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 9; ++x) CHECK(some[std::size_t(y * 9 + x)] == values[std::size_t((y + 7) * 20 + x + 5)]);
-    // If the level is finer than a pixel, means of voxels, along each axis.
+    // If the level's voxels are smaller than a pixel, the pixel is the mean of voxels along each axis.
     const std::vector<int> means = unpacked(make_page_slice(levels, {0, 39, 6, {}}, range));
     REQUIRE(means.size() == 4 * 6);
     CHECK(means[1 * 4 + 2] == 2 * (19 + 3 * 7 + 7 * 4));
@@ -226,7 +226,7 @@ TEST_CASE("Of an image in chunks no more is kept than is allowed") {
     CHECK(levels.cache().decoded > 75);  // all of its chunks, some of them more than once
     const auto [low, high] = levels.percentiles(0, 1);
     CHECK(low == 0);
-    CHECK(high == 4 * (9 + 3 * 5 + 7 * 17));  // of the coarsest level
+    CHECK(high == 4 * (9 + 3 * 5 + 7 * 17));  // the maximum of the coarsest level, from which percentiles are computed
     CHECK(levels.range() == std::array<double, 2>{0, 65535});
 }
 

@@ -50,7 +50,7 @@ inline void write(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// Bytes with 6 random bits, so that codecs can compress them.
+/// Random bytes in which only 6 bits vary, so that codecs can compress them.
 inline std::string random_bytes(std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::string bytes(count, '\0');

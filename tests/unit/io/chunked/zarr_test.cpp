@@ -15,7 +15,7 @@ namespace {
 const std::vector<std::string> kCodecs{"",          "zstd",       "zlib",      "lz4", "blosc-blosclz",
                                        "blosc-lz4", "blosc-zlib", "blosc-zstd"};
 
-/// Voxel (i,j,k) of the stores of zarr_stores.h.
+/// The expected value of voxel (i,j,k) in the stores of zarr_stores.h.
 int voxel(int i, int j, int k) {
     const std::string bytes = zarr_stores::random_bytes(1024, unsigned(k / 8 * 4 + j / 8 * 2 + i / 8));
     std::uint16_t value = 0;
@@ -150,7 +150,8 @@ TEST_CASE("zarr: of a chunk that is longer than the array only the array is held
         CHECK(image.chunks()->size == Index3{5, 5, 5});
         for (const Index3& v : {Index3{0, 0, 0}, Index3{4, 0, 0}, Index3{0, 4, 0}, Index3{1, 2, 4}, Index3{4, 4, 4}})
             CHECK(image.at(v[0], v[1], v[2]) == voxel(v[0], v[1], v[2]));
-        // 256 MiB that the store does not contain, and that so few bytes cannot decode to
+        // The metadata now claims a chunk of 256 MiB. The store does not contain it, and its few bytes cannot decode to
+        // it.
         zarr_stores::write(store + "/.zarray", zarr_stores::metadata_2(5, 512, "<u2", codec, "7"));
         CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("0.0.0: ") != std::string::npos);
         if (!codec.empty())
@@ -167,7 +168,8 @@ TEST_CASE("zarr: damaged shards are errors wherever they are damaged") {
     std::mt19937 random(4);
     Outcomes outcomes;
     for (int n = 0; n < 400; ++n) try_with(store, shard, mutated(bytes_of(shard), random), outcomes);
-    CHECK(outcomes.read <= 40);  // two flips of the same bit, or bytes before the index that no chunk uses
+    // Some damaged files can be read: a bit was flipped twice, or the bytes that changed belong to no chunk.
+    CHECK(outcomes.read <= 40);
 }
 
 TEST_CASE("zarr: damaged metadata is an error or a result") {
@@ -185,7 +187,7 @@ TEST_CASE("zarr: damaged metadata is an error or a result") {
             for (const auto& [place, value] : flat.items())
                 for (int n = 0; n < 12; ++n) {
                     nlohmann::json bad = whole;
-                    // replaces the value, or the object or array that contains it
+                    // The value is replaced, or every fourth time the object or array that contains it.
                     nlohmann::json::json_pointer at(place);
                     if (n % 4 == 3 && !at.parent_pointer().empty()) at = at.parent_pointer();
                     bad[at] = odd_value(random);
@@ -210,7 +212,7 @@ TEST_CASE("zarr: metadata that is large, deep or no JSON is refused") {
     CHECK(message("[]").find("expected a JSON object") != std::string::npos);
     fs::resize_file(store + "/.zarray", std::uintmax_t(65) << 20);
     CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("64 MiB at most") != std::string::npos);
-    // the size is compared with the file before any memory is allocated
+    // The size that the metadata claim is compared with the file before any memory is allocated.
     CHECK(message(zarr_stores::metadata_2(1 << 20, 8, "|u1", "")).find("claims") != std::string::npos);
     CHECK(message(zarr_stores::metadata_2(2048, 2048, "|u1", "")).find("1 GiB at most") != std::string::npos);
 }

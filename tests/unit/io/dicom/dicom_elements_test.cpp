@@ -70,13 +70,13 @@ TEST_CASE("texts longer than 64 KiB need implicit VR") {
 }
 
 TEST_CASE("colours are those of CIELab with D50") {
-    // 65535 L / 100, 65535 (a + 128) / 255: white is (100, 0, 0), black (0, 0, 0).
+    // DICOM stores L as 65535 L / 100, and a and b as 65535 (a + 128) / 255. White is (100, 0, 0), black (0, 0, 0).
     const auto white = to_cielab({255, 255, 255}), black = to_cielab({0, 0, 0}), red = to_cielab({255, 0, 0});
     CHECK(white[0] == 65535);
     for (const auto& grey : {white, black})
         for (const std::size_t n : {1U, 2U}) CHECK(int(grey[n]) == Approx(65535 * 128.0 / 255).margin(3));
     CHECK(black[0] == 0);
-    // sRGB's red is L 54.29, a 80.81, b 69.89 (brucelindbloom.com, D50)
+    // The red of sRGB has L 54.29, a 80.81 and b 69.89 for the white point D50 (brucelindbloom.com).
     CHECK(red[0] / 655.35 == Approx(54.29).margin(0.02));
     CHECK(red[1] * 255 / 65535.0 - 128 == Approx(80.81).margin(0.05));
     CHECK(red[2] * 255 / 65535.0 - 128 == Approx(69.89).margin(0.05));

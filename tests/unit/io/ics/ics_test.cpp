@@ -1,4 +1,4 @@
-// Image Cytometry Standard, byte by byte as libics writes it.
+// Tests of Image Cytometry Standard files, which are built here byte by byte as libics writes them.
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -25,7 +25,7 @@ struct Header {
                 bytes = "1 2", compression = "uncompressed", scale = "1 0.5 0.25 2000",
                 units = "bits micrometers micrometers nanometers", origin = "0 10 -20 3000";
     std::string more;        ///< further lines
-    std::string parameters;  ///< empty: the number of axes
+    std::string parameters;  ///< the word after "layout parameters"; empty: the number of axes
 
     [[nodiscard]] std::string count() const {
         return parameters.empty() ? std::to_string(1 + std::count(order.begin(), order.end(), ' ')) : parameters;
@@ -43,7 +43,7 @@ struct Header {
     }
 };
 
-/// Values that count up from 0.
+/// The bytes of `count` values of type T that count up from 0.
 template <typename T>
 std::string counted(int count = kVoxels, bool big = false) {
     std::string bytes;
@@ -111,7 +111,7 @@ TEST_CASE("ICS: spacing and origin, in the unit of x") {
     info = read_image_info(scratch.write("a.ics", header.text() + voxels));
     CHECK(info.spacing_known == std::array<bool, 3>{false, false, false});
     CHECK(info.geometry.unit.empty());
-    header.scale = "1 0.5 0.5 2";  // a spacing of an unknown unit
+    header.scale = "1 0.5 0.5 2";  // a spacing without a known unit
     info = read_image_info(scratch.write("a.ics", header.text() + voxels));
     CHECK(info.geometry.spacing_known);
     header.units = "relative um um furlongs";  // which cannot be converted to um
@@ -177,7 +177,7 @@ TEST_CASE("ICS: headers as other programs write them") {
         CHECK(several.frames == 3);
         CHECK(several.axis_order == "XYZTC");
     }
-    // Blanks after the sizes, as in files of Bio-Formats, where the separator is a tab.
+    // As in files of Bio-Formats, the sizes are followed by blanks, although the separator is a tab.
     std::string padded = Header().text();
     padded.insert(padded.find("16\t4\t3\t2") + 8, "\t     ");
     check_counts(read_image(scratch.write("padded.ics", padded + counted<std::uint16_t>())));

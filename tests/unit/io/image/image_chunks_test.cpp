@@ -1,4 +1,4 @@
-// Large files are decoded in parts: the values are those that were written, and damage is an Error.
+// Tests of large files that are decoded in parts: values are those that were written, and damage is an Error.
 #include <tbb/parallel_for.h>
 #include <tiffio.h>
 
@@ -27,7 +27,7 @@ std::uint16_t value(int i, int j, int k) {
     return std::uint16_t((std::uint32_t(i) * 2654435761U + std::uint32_t(j) * 40503U + std::uint32_t(k) * 97U) >> 20);
 }
 
-/// 21 MB, so that there are several positions to start from.
+/// 21 MB of values, so that a packed stream of them has several positions at which decoding can start.
 std::string ramp() {
     std::string bytes(voxel_count(kSize) * 2, '\0');
     std::size_t at = 0;
@@ -195,7 +195,8 @@ TEST_CASE("a TIFF's tiles and strips are read one by one, by several threads") {
                 TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, kind.rows);
             }
             for (int plane = 0; plane < kind.planes; ++plane) {
-                const auto shift = plane + 1 < kind.planes ? 9 : 0;  // for the plane that is not read
+                // Only the last plane is read; the others have other values.
+                const auto shift = plane + 1 < kind.planes ? 9 : 0;
                 for (int y = 0; kind.tile == 0 && y < kPages[1]; ++y) {
                     std::vector<std::uint16_t> row;
                     for (int x = 0; x < kPages[0]; ++x) row.push_back(std::uint16_t(value(x, y, k) + shift));
@@ -260,7 +261,7 @@ TEST_CASE("the header of a large packed file tells the chunks that it will be re
     const std::string small = scratch.write("small.nrrd", nrrd + "600 600 600\n\n" + stream);
     CHECK(read_image_info(small).chunk_size == Index3{0, 0, 0});
 
-    // pages of which only the first tile was written
+    // A large TIFF in which only the first tile of each page was written.
     const std::string path = scratch.path("a.tif");
     TIFF* tiff = TIFFOpen(path.c_str(), "w");
     for (int k = 0; k < 3; ++k) {

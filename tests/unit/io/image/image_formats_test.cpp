@@ -1,4 +1,4 @@
-// Files in formats that Debian's Python packages cannot write, and damaged files of every format.
+// Tests of files in formats that Debian's Python packages cannot write, and of damaged files of every format.
 #include <itkHDF5ImageIO.h>
 #include <itkImageIOBase.h>
 #include <openvdb/openvdb.h>
@@ -34,7 +34,7 @@ void check_ramp(const Image& image) {
     CHECK(same);
 }
 
-/// Bytes in little endian.
+/// Writes a number at the position `at`, in little endian.
 template <typename T>
 void put(std::string& bytes, std::size_t at, T number) {
     if (bytes.size() < at + sizeof(T)) bytes.resize(at + sizeof(T));
@@ -59,7 +59,7 @@ std::string mrc(std::int32_t mode) {
     return bytes;
 }
 
-/// A data element with explicit VR, little endian.
+/// Appends a data element of a DICOM file with explicit value representation (VR), in little endian.
 void element(std::string& bytes, std::uint16_t group, std::uint16_t number, const std::string& vr, std::string data) {
     if (data.size() % 2 != 0) data += vr == "UI" ? '\0' : ' ';
     put(bytes, bytes.size(), group);
@@ -76,7 +76,7 @@ void element(std::string& bytes, std::uint16_t group, std::uint16_t number, cons
 
 std::string word(std::uint16_t n) { return {static_cast<char>(n & 255), static_cast<char>(n >> 8)}; }
 
-/// Slice k of the ramp as a DICOM file, PS3.10 and PS3.5.
+/// Slice k of the ramp as a DICOM file, according to PS3.10 and PS3.5 of the standard.
 std::string dicom(int k) {
     std::string meta;
     element(meta, 2, 1, "OB", std::string("\0\1", 2));
@@ -168,7 +168,8 @@ TEST_CASE("MRC: pixels, spacing and origin") {
     put(permuted, 68, std::int32_t(1));
     put(permuted, 72, std::int32_t(2));
     const ImageGeometry g = read_image_geometry(scratch.write("p.mrc", permuted));
-    // one step along the columns goes along the world's z, by the cell size in z over its number of samples
+    // A step along the columns is a step along the world's z, by the cell's length in z over the number of samples in
+    // z.
     const Vec3 step = g.index_to_world({1, 0, 0});
     CHECK(step[0] == Approx(kOrigin[0]));
     CHECK(step[2] == Approx(kOrigin[2] + kSpacing[2]));
@@ -177,7 +178,7 @@ TEST_CASE("MRC: pixels, spacing and origin") {
     std::string no_cell = mrc(1);
     put(no_cell, 40, 0.0F);
     CHECK_FALSE(read_image_geometry(scratch.write("n.mrc", no_cell)).spacing_known);
-    // an extended header lies before the pixels
+    // An extended header lies between the header and the pixels.
     std::string extended = mrc(1);
     put(extended, 92, std::int32_t(80));
     extended.insert(1024, 80, 'x');
@@ -238,7 +239,7 @@ TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
     const Scratch scratch;
     fuzz_image(scratch, scratch.write("f.mrc", mrc(1)));
     const std::string slice = dicom(0);
-    // the series has only one slice, which is an Error; the test is that reading ends
+    // The file is the only slice of its series, which is an Error anyway. The test is that reading ends.
     fuzz(
         scratch, scratch.write("d.dcm", slice), [](const std::string& bad) { (void)read_image(bad); }, 200,
         slice.size());
@@ -268,7 +269,7 @@ TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
     const std::string folder = scratch.path("series");
     write_series(folder);
     CHECK(message_of([&] { (void)read_image(folder); }).empty());
-    std::ofstream(folder + "/7.dcm", std::ios::binary) << slice;  // is skipped
+    std::ofstream(folder + "/7.dcm", std::ios::binary) << slice;  // a slice whose values have 0 bits, which is skipped
     CHECK_THAT(message_of([&] { (void)read_image(folder); }), Catch::Contains("a slice is missing"));
 }
 

@@ -27,7 +27,7 @@ std::string npy(const std::string& descr, const std::string& order, const std::s
     return bytes;
 }
 
-/// Checks that voxels count up along `strides`.
+/// Checks that the voxels' values are i, j and k times `strides`.
 void check_counts(const Image& image, const std::array<int, 3>& strides) {
     REQUIRE(image.geometry().size == kSize);
     int wrong = 0;
@@ -38,7 +38,7 @@ void check_counts(const Image& image, const std::array<int, 3>& strides) {
     CHECK(wrong == 0);
 }
 
-/// Pages of 4 x 3 bytes with the page number as value, as tifffile writes them.
+/// Writes pages of 4 x 3 bytes with the page's number as value, as tifffile writes them.
 std::string tifffile(const std::string& path, int pages, const std::string& description) {
     TIFF* tiff = TIFFOpen(path.c_str(), "w");
     for (int page = 0; page < pages; ++page) {
@@ -106,19 +106,20 @@ TEST_CASE("tifffile's description: axes, spacing, and what does not fit the page
     CHECK(info.geometry.unit == "um");
     ReadImageOptions options;
     options.channel = 1;
-    CHECK(read_image(path, options).at(0, 0, 1) == 3);  // the channel varies fastest
+    CHECK(read_image(path, options).at(0, 0, 1) == 3);  // the channel varies faster than z from page to page
     tifffile(path, 4, R"({"shape": [2, 2, 3, 4], "axes": "TZYX"})");
     options = {};
     options.frame = 1;
     CHECK(read_image(path, options).at(0, 0, 0) == 2);
     tifffile(path, 4, R"({"shape": [4, 3, 4]})");  // z, y, x if there are no axes
     CHECK(read_image(path).at(0, 0, 3) == 3);
-    tifffile(path, 4, R"({"shape": [4, 3, 4], "axes": "TYX"})");  // a movie of one slice
+    tifffile(path, 4, R"({"shape": [4, 3, 4], "axes": "TYX"})");  // a movie of a single slice has no third dimension
     CHECK_THAT(message_of([&] { (void)read_image_info(path); }), Catch::Contains("got 4 x 3 x 1"));
     for (const char* wrong : {R"({"shape": [9, 3, 4], "axes": "ZYX"})", R"({"shape": [1, 1, 1, 4, 3, 4]})",
                               "{\"shape\": 4}", "{", R"({"shape": [0, 3, 4], "axes": "ZYX", "spacing": -1})"}) {
         INFO(wrong);
         info = read_image_info(tifffile(path, 4, wrong));
-        CHECK(info.geometry.size == Index3{4, 3, 4});  // falls back to the pages
+        // A wrong description is ignored, and the pages determine the size.
+        CHECK(info.geometry.size == Index3{4, 3, 4});
     }
 }

@@ -85,7 +85,7 @@ TEST_CASE("samples beyond the part that is held are an error, beyond the image t
 
 TEST_CASE("a file too large to read is mapped, and only what the box needs is asked for") {
     const Scratch scratch;
-    // a sparse file of 3 GiB with one voxel set
+    // A sparse file of 3 GiB, in which one voxel is not 0.
     constexpr std::uint64_t kSize = 1448;
     const std::string header =
         "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1448 1448 1448\nspacings: 1 1 2\nencoding: raw\n\n";
@@ -102,7 +102,7 @@ TEST_CASE("a file too large to read is mapped, and only what the box needs is as
     CHECK(image.at(500, 600, 700) == 42);
     CHECK(image.at(501, 600, 700) == 0);
 
-    // pages that were read count as resident memory until they are released
+    // Pages of the mapped file that were read count as resident memory until they are released.
     const std::uint64_t before = resident_bytes();
     constexpr std::uint64_t kTouched = std::uint64_t(32) << 20;
     double sum = 0;

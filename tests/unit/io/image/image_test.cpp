@@ -58,7 +58,7 @@ struct TiffFormat {
     int pages = 3;
 };
 
-/// Pages of 20 x 17 with the bytes of `value(page, pixel, out)`.
+/// Writes a TIFF with pages of 20 x 17 pixels, whose samples are value(page, x, y).
 template <typename T>
 std::string make_tiff(const std::string& path, const TiffFormat& f, T (*value)(int page, int x, int y)) {
     constexpr int kWidth = 20, kHeight = 17;
@@ -151,7 +151,7 @@ TEST_CASE("images come back with values, type, spacing, origin and direction") {
     for (const char* name : {"a.nrrd", "a.nii", "a.nii.gz", "a.mha"}) {
         INFO(name);
         const std::string path = scratch.path(name);
-        // NIfTI keeps its geometry in single precision
+        // The geometry in NIfTI's header has single precision.
         const double tolerance = std::string(name).find("nii") != std::string::npos ? 1e-5 : 1e-9;
         write_image(path, g, ramp<std::int32_t>(g).data());
         Image image = read_image(path);
@@ -278,7 +278,7 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     CHECK(g.spacing[2] == Approx(0.7));
     CHECK(g.unit == "um");
     CHECK(g.spacing_known);
-    // the user's options take precedence
+    // The spacing in the options takes precedence over that of the file.
     ReadImageOptions stated;
     stated.spacing = Vec3{0.4, 0.5, 3};
     CHECK(read_image_geometry(path, stated).spacing == stated.spacing);
@@ -325,7 +325,7 @@ TEST_CASE("ImageJ's way with huge stacks: one directory, the slices behind each 
         for (std::size_t n = 0; n < 8; ++n) page[n] = static_cast<std::uint16_t>(1000 + n);
         TIFFWriteEncodedStrip(tiff, 0, page.data(), 16);
         TIFFClose(tiff);
-        // the strip is at the file's beginning; point it at appended pixels instead
+        // The strip lies at the file's beginning. Its offset is replaced by that of the pixels that are appended here.
         std::string bytes = bytes_of(path);
         const bool big = mode[1] == 'b';
         const auto text = [&](std::uint64_t value, int width) {
@@ -435,7 +435,7 @@ TEST_CASE("damaged image files end in an Error, never in a crash") {
         INFO(name);
         write_image(scratch.path(name), g, ramp<std::uint8_t>(g).data());
         const FuzzCounts counts = fuzz(scratch, scratch.path(name), read);
-        // some truncated files lack only a checksum at their end
+        // Some of the truncated files lack only a checksum at their end.
         CHECK(counts.truncated_accepted <= counts.truncated / 20);
     }
     const std::string tiled =
@@ -451,7 +451,7 @@ TEST_CASE("samples on the image's own lattice are its values") {
     const std::vector<std::uint8_t> values = ramp<std::uint8_t>(g);
     const Image image = Image::from_values(g, values.data());
     Domain frame;
-    frame.voxel_size = 0.35000001;  // a rounded spacing must not interpolate
+    frame.voxel_size = 0.35000001;  // the rounding error of a spacing must not cause an interpolation
     frame.origin = g.origin;
     std::vector<float> out(2 * 3 * 4);
     image.sample(frame, {1, 1, 0}, {2, 3, 3}, out.data());
@@ -459,7 +459,7 @@ TEST_CASE("samples on the image's own lattice are its values") {
     for (int i = 1; i <= 2; ++i)
         for (int j = 1; j <= 3; ++j)
             for (int k = 0; k <= 3; ++k) CHECK(out[n++] == float(image.at(i, j, k)));
-    // a position outside takes the value of the nearest voxel
+    // A position outside of the image has the value of the nearest voxel.
     float corner[1];
     image.sample(frame, {-7, -7, -7}, {-7, -7, -7}, corner);
     CHECK(corner[0] == float(image.at(0, 0, 0)));
@@ -501,7 +501,7 @@ TEST_CASE("trilinear samples of a linear function are exact in any frame") {
                     worst = std::max(worst, std::abs(out[n] - linear(world)));
                 }
         CHECK(inside > 1000);
-        CHECK(worst < 5e-4);  // positions within 1e-4 voxel of a centre count as the centre
+        CHECK(worst < 5e-4);  // because a position within 1e-4 voxel of a centre gets the centre's value
     }
 }
 

@@ -58,7 +58,7 @@ TEST_CASE("an image over memory of any strides is the image of its values") {
         expected.sample(frame, frame.min, frame.max, theirs.data());
         CHECK(ours == theirs);
         REQUIRE(image.view());
-        CHECK(image.view()->first.get() == first.get());  // nothing was copied
+        CHECK(image.view()->first.get() == first.get());  // the image uses the given memory, and nothing was copied
         CHECK(image.view()->stride == layout.stride);
     }
     CHECK(expected.view()->type == PixelType::Float);

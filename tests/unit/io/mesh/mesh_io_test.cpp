@@ -209,7 +209,7 @@ TEST_CASE("a file is the same to those who want its mesh and to those who want i
             read();
         } catch (const Error& error) {
             const std::string message = error.what();
-            return message.substr(message.find(':'));  // without the function's name before it
+            return message.substr(message.find(':'));  // without the name of the function before it, which differs
         }
         return "was read";
     };
@@ -322,7 +322,7 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
     const std::string obj = folder.file("s.obj");
     write_meshes(obj, meshes);
     CHECK_THAT(text_of(obj), Catch::Contains("o ve\n") && Catch::Contains("o ex e\n"));
-    // Corners have the normals of their vertices; numbers continue from object to object.
+    // Each corner names the normal of its vertex, and numbers continue from object to object.
     CHECK_THAT(text_of(obj), Catch::Contains("f 1//1 3//3 2//2\n") && Catch::Contains("f 5//5 7//7 6//6\n"));
     const TriangleMesh both = read_mesh(obj);
     REQUIRE(both.vertices.size() == 8);
@@ -338,7 +338,7 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
     const std::string json = text.substr(20, json_bytes);
     CHECK_THAT(json, Catch::Contains(R"("name":"ve")") && Catch::Contains(R"("name":"ex e")"));
     CHECK_THAT(json, Catch::Contains(R"("nodes":[0,1])") && Catch::Contains(R"("baseColorFactor":[1.0,0.0,0.0,1.0])"));
-    // Positions, normals and indices of both: 4 vertices and 4 triangles each.
+    // Positions, normals and indices of both meshes, which have 4 vertices and 4 triangles each.
     CHECK(text.size() == 20 + json_bytes + 8 + 2 * (2 * 4 * 12 + 4 * 12));
     float x = 0;
     std::memcpy(&x, text.data() + 20 + json_bytes + 8 + (2 * 4 * 12 + 4 * 12), 4);
@@ -382,8 +382,8 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 TEST_CASE("glb of other programs: interleaved vertices, short indices, shared positions; what is not read is named") {
     const Folder folder;
-    // Positions with a stride of 16, then two primitives with 16-bit indices that use the same positions, and one
-    // without indices.
+    // Positions with a stride of 16 bytes, then two primitives with 16-bit indices that use the same positions. In
+    // b.glb, the second primitive has no indices.
     const std::string binary = raw(std::vector<float>{0, 0, 0, 9, 1, 0, 0, 9, 0, 1, 0, 9, 0, 0, 1, 9}) +
                                raw(std::vector<std::uint16_t>{0, 2, 1, 0, 1, 3});
     const std::string json =
@@ -396,7 +396,7 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
         R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"indices":2,"mode":4}]}],)"
         R"("nodes":[{"mesh":0}]})";
     const TriangleMesh mesh = read_mesh(folder.file("a.glb", glb_of(json, binary)));
-    // y up in the file, z up here
+    // The y axis points up in the file, the z axis in covol.
     CHECK(mesh.vertices == std::vector<std::array<float, 3>>{{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}});
     CHECK(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 2, 1}, {0, 1, 3}});
     const TriangleMesh bare = read_mesh(
@@ -427,7 +427,7 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco",
             Errc::Unsupported);
     refused(R"("byteLength":76)", R"("byteLength":76,"uri":"a.bin")", "another file", Errc::Unsupported);
-    // The same indices many times.
+    // Many primitives with the same indices: a small file must not make a large mesh.
     std::string many;
     for (int n = 0; n < 200; ++n) many += R"({"attributes":{"POSITION":0},"indices":1},)";
     refused(R"("primitives":[)", R"("primitives":[)" + many, "the same data too often");
@@ -484,7 +484,7 @@ TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "
     }
     REQUIRE(messages.size() == 1);
     CHECK_THAT(messages.front(), Catch::Contains("relative to (500000, 5400000, -3000)"));
-    // in another unit, y up
+    // The mesh's origin is converted, too, if it is written in another unit and with y up.
     options = {};
     options.y_up = true;
     options.unit_scale = 0.001;

@@ -74,8 +74,8 @@ struct RoiSpec {
     std::vector<int> positions;  ///< slice of each point, from 1
     int position = 0, z = 0, channel = 0;
     std::string name;
-    std::array<float, 4> box{};  ///< x, y, width, height, or the ends of a line
-    std::vector<float> path;     ///< of a composite
+    std::array<float, 4> box{};  ///< x, y, width and height, or the two ends of a line
+    std::vector<float> path;     ///< the path of a composite ROI
 };
 
 std::string roi(const RoiSpec& spec) {
@@ -126,7 +126,7 @@ std::string zip(const std::vector<std::pair<std::string, std::string>>& files, b
             .put(std::uint32_t(0))
             .put(std::uint32_t(w.size()))
             .put(name);
-        // the sizes follow the data (bit 3), as Java writes them: only the directory has them
+        // As Java writes them (bit 3), sizes are 0 here and follow the data. Only the archive's directory has them.
         w.put(std::uint32_t(0x04034b50))
             .put(std::uint16_t(20))
             .put(std::uint16_t(8))
@@ -146,7 +146,7 @@ std::string zip(const std::vector<std::pair<std::string, std::string>>& files, b
 
 // ---- scans
 
-/// Greedy and slow; matches may overlap.
+/// Packs bytes in the format LZF. This is greedy and slow; a match may overlap the bytes that it produces.
 std::string lzf(const std::string& in) {
     std::string out, literals;
     const auto flush = [&] {
@@ -238,7 +238,7 @@ ImageGeometry image() {
     return geometry;
 }
 
-/// One line for each mark; # is replaced by its position, X, Y, Z by its coordinates.
+/// One line for each mark. In the pattern, # stands for the mark's number from 0, and X, Y and Z for its coordinates.
 std::string rows(const std::vector<Vec3>& points, const std::string& pattern) {
     std::string text;
     int n = 0;
@@ -418,7 +418,7 @@ TEST_CASE("the options go before what a format says") {
     const PointCloud index = read_points(path, {PointSpace::IndexOne});
     CHECK(index.points[0] == Vec3{0, 1, 2});
     CHECK(index.space == PointSpace::Index);
-    // a multi-point clicked in a hyperstack of two channels: images 1 and 2 are slice 0
+    // A multi-point that was clicked in a hyperstack of two channels: its images 1 and 2 are slice 0.
     RoiSpec spec = multi_point();
     spec.positions = {1, 2, 3, 8};
     ReadPointsOptions two;
@@ -479,11 +479,11 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
             CHECK(std::pow((p[0] - 12.5) / 3, 2) + std::pow((p[1] - 23.5) / 4, 2) == Approx(1));
     }
     spec.type = kLine;
-    CHECK(read(spec).points ==
-          std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});  // both ends, in coordinates of pixel centres
+    // Both ends of the line, in coordinates of pixel centres.
+    CHECK(read(spec).points == std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});
     CHECK_FALSE(read(spec).lines[0].closed);
 
-    // a square with a square hole
+    // The path of a square with a square hole.
     spec.type = kRectangle;
     spec.path = {0, 10, 10, 1, 20, 10, 1, 20, 20, 1, 10, 20, 1, 10, 10, 4, 0, 12, 12, 1, 18, 12, 1, 18, 18, 4};
     const PointCloud composite = read(spec);
@@ -510,7 +510,7 @@ TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its n
     spec.name = "cell";
     contains(read_error(scratch, "a.roi", roi(spec)), "ROI 'cell' (polygon): expected a slice");
     spec.position = 3;
-    spec.channel = 1;  // on all slices of channel 1
+    spec.channel = 1;  // the ROI belongs to all slices of channel 1
     contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
 }
 
@@ -528,7 +528,7 @@ TEST_CASE("the types of Cell Counter are structures, and its slices may count ch
     contains(message_of([&] { (void)read_structures_of_points(path, "group"); }), "its Cell Counter with type");
     ReadPointsOptions two;
     two.channels = 2;
-    CHECK(read_points(path, two).points[0][2] == 1);  // image 4 of two channels
+    CHECK(read_points(path, two).points[0][2] == 1);  // image 4 of a hyperstack with two channels is slice 1
     CHECK(read_points(path, two).points[3][2] == 2);
 }
 
@@ -565,7 +565,7 @@ TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of
     };
     set("<MarkerZ>4</MarkerZ>", "<MarkerZ>\r\n  4\r\n</MarkerZ>");
     CHECK(read_points(scratch.write("a.xml", text)).points == kIndex);
-    set("</Type>", "</Type><Name />");  // of the type's number
+    set("</Type>", "</Type><Name />");  // a type without a name is called by its number
     CHECK(read_structures_of_points(scratch.write("n.xml", text), "type")[0].name == "Type 1");
     set("a.tif", "placeholder.tif");
     const PointCloud cloud = read_points(scratch.write("b.xml", text));
@@ -630,13 +630,13 @@ TEST_CASE("archives that lie are refused before memory is taken") {
     std::string archive = zip({{"a.roi", roi(multi_point())}});
     const std::size_t entry = archive.find("PK\1\2");
     std::string huge = archive;
-    huge.replace(entry + 24, 4, "\xF0\xFF\xFF\xFF");  // its claimed size
+    huge.replace(entry + 24, 4, "\xF0\xFF\xFF\xFF");  // the size that the archive's directory claims
     contains(read_error(scratch, "a.zip", huge), "bytes cannot hold 4294967280");
     std::string secret = archive;
     secret[entry + 8] = 1;
     contains(read_error(scratch, "a.zip", secret), "is encrypted");
     std::string broken = archive;
-    broken[entry + 16] ^= 1;  // its checksum
+    broken[entry + 16] ^= 1;  // the checksum in the archive's directory
     contains(read_error(scratch, "a.zip", broken), "does not match its checksum");
 }
 

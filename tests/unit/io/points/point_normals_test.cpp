@@ -1,4 +1,4 @@
-// Normals and sensors in files of points.
+// Tests of normals and sensor positions in files of points.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
@@ -83,7 +83,7 @@ TEST_CASE("normals turn with the axes and signs of their points, and do not scal
     options.space = PointSpace::World;
     options.order = PointOrder::ZYX;
     check_normal(read("a.ply", text, options).normals.at(0), {0.8, 0, 0.6});
-    options.space = PointSpace::Index;  // voxels have no directions in the world
+    options.space = PointSpace::Index;  // normals of points in voxels are no directions in the world
     CHECK(read("a.ply", text, options).normals.empty());
 }
 
@@ -109,7 +109,8 @@ TEST_CASE("OBJ: one normal for each vertex, of the same number") {
     check_normal(cloud.normals[1], {0, 1, 0});
     CHECK(read("b.obj", vertices + "f 1//1 2//3 3//2\n").normals.empty());
     CHECK(read("c.obj", vertices + "vn 0 0 1\n").normals.empty());
-    CHECK(read("d.obj", vertices + "f 1/4 2/5 3/6\n").normals.size() == 3);  // texture coordinates alone
+    // The second numbers are of texture coordinates, not of normals.
+    CHECK(read("d.obj", vertices + "f 1/4 2/5 3/6\n").normals.size() == 3);
 }
 
 TEST_CASE("PCD: normals stay beside their points where invalid ones are left out; the sensor") {
@@ -122,8 +123,8 @@ TEST_CASE("PCD: normals stay beside their points where invalid ones are left out
     check_normal(cloud.normals[2], {0, 0, 1});
     REQUIRE(cloud.sensor);
     CHECK(*cloud.sensor == Vec3{1, 2, 3});
-    // The default that writers use for an unknown viewpoint; in an organized cloud (rows of pixels) it is the camera's
-    // position.
+    // Programs that do not know the viewpoint write this default, so it is no sensor. In an organized cloud (rows of
+    // pixels) it is the position of the camera.
     CHECK_FALSE(read("b.pcd", pcd("VIEWPOINT 0 0 0 1 0 0 0\n", 4, 1, rows)).sensor);
     CHECK(read("c.pcd", pcd("VIEWPOINT 0 0 0 1 0 0 0\n", 2, 2, rows)).sensor == std::optional(Vec3{0, 0, 0}));
     CHECK_FALSE(read("d.pcd", pcd("", 2, 2, rows)).sensor);

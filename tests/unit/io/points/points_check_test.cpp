@@ -24,7 +24,7 @@ PointCloud cloud_of(const std::vector<Vec3>& points, PointSpace space = PointSpa
     return cloud;
 }
 
-/// The result of a check: the error, or the warnings in brackets.
+/// The result of check_inside(): the message of its error, or its warnings in brackets.
 std::string verdict(const PointCloud& cloud, const ImageGeometry& geometry) {
     std::string warnings;
     RunContext run;
@@ -56,7 +56,7 @@ std::vector<Vec3> marks() {
 
 TEST_CASE("points outside the image are counted, and both boxes told") {
     const ImageGeometry geometry = small_image();
-    // 10 x 8 x 20 in world units, half a voxel wider on each side
+    // The image extends over 10 x 8 x 20 world units. The centre of its first voxel is at 0.
     CHECK(verdict(cloud_of({{0, 0, 0}, {9.9, 7.9, 19}, {-0.05, -0.05, -0.5}}), geometry).empty());
     const std::string message = verdict(cloud_of({{1, 1, 1}, {1, 1, 20.5}, {0, -60, 0}}), geometry);
     contains(message, "cloud.csv: 2 of 3 points");
@@ -94,7 +94,7 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
 
 TEST_CASE("readings that fit equally well are all told") {
     const ImageGeometry geometry = small_image();
-    // as voxels, or in world units with the axes reversed
+    // The points fit if they are read as voxels, or in world units with the axes reversed.
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
     contains(message, "; `points_order = zyx` would");
     contains(message, "or `points_space = index` would");
@@ -125,7 +125,7 @@ TEST_CASE("points that lie inside by accident are told by their slices") {
     contains(verdict(cloud_of(voxels), geometry), "`points_space = index` would put them on voxel centres");
     contains(verdict(cloud_of(reversed), geometry), "`points_order = zyx` would put them on voxel centres");
     CHECK(verdict(cloud_of(world), geometry).empty());
-    // a stated space is not questioned
+    // If the user has stated the space of the points, there is no warning.
     PointCloud stated = cloud_of(voxels);
     stated.stated = true;
     CHECK(verdict(stated, geometry).empty());
@@ -171,13 +171,13 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
 }
 
 TEST_CASE("numbers that are small in the image's unit are not taken for voxels") {
-    // Micrometres in an image in millimetres: read as voxels, all lie in the first voxel.
+    // The points are in millimetres. Read as voxels, all of them would lie in the first voxel.
     ImageGeometry geometry = small_image();
     geometry.spacing = {1e-4, 1e-4, 5e-4};
     std::vector<Vec3> points;
     for (const Vec3& p : marks()) points.push_back(geometry.index_to_world(p));
     CHECK(verdict(cloud_of(points), geometry).empty());
-    // ... and no advice if they lie outside.
+    // If they lie outside of the image, voxels are not suggested either.
     for (Vec3& p : points) p[0] += 1;
     CHECK(verdict(cloud_of(points), geometry).find("Index") == std::string::npos);
 }

@@ -34,8 +34,8 @@ std::string bytes(T value, bool big_endian) {
     return text;
 }
 
-/// Colour before the coordinates, which are z, x, y of different types with a list between them, after another element
-/// that contains a list.
+/// A PLY file that is difficult to read: an element with a list precedes the vertices, whose coordinates z, x, y follow
+/// a colour, have different types and are separated by a list.
 std::string awkward_ply(const std::string& format) {
     const bool ascii = format == "ascii";
     const bool big = format == "binary_big_endian";
@@ -105,7 +105,7 @@ TEST_CASE("column names that mean voxels are understood as such") {
     CHECK(cloud.points == kThree);
     CHECK(cloud.space == PointSpace::Index);
     CHECK(cloud.rule.find("napari") != std::string::npos);
-    // the user's options take precedence
+    // The options take precedence over the column names.
     cloud = read_points(napari, {PointSpace::World, PointOrder::XYZ});
     CHECK(cloud.space == PointSpace::World);
     CHECK(cloud.points[0] == Vec3{3, 2, 1});
@@ -141,7 +141,8 @@ TEST_CASE("a column of kinds says which marks lie inside and outside") {
     CHECK(marks.cloud.rule.find("with kinds") != std::string::npos);
     CHECK(marks.of(MarkKind::Surface).points == std::vector<Vec3>{{1, 2, 3}});
     CHECK(marks.of(MarkKind::Outside).points == std::vector<Vec3>{{7, 8, 9}});
-    // A column of that name from another program, also in the middle of the file, and a row without it.
+    // If a column of this name contains another word, in whichever row, or if a row lacks it, it is from another
+    // program. All points then are surface marks.
     for (const char* rows : {"x,y,z,kind\n1,2,3,soma\n-4.5,.25,.001,inside\n7,8,9,axon\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001,5\n7,8,9,inside\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001\n7,8,9,inside\n"}) {
@@ -181,7 +182,7 @@ TEST_CASE("a selection of Fiji holds 16-bit pixels") {
 
 TEST_CASE("contours of slices are ordered, closed lines") {
     const Scratch scratch;
-    // contour 0 of slices 3 and 4, contour 1 of slice 3; the last row is out of order
+    // The rows contain contour 0 of slices 3 and 4, and contour 1 of slice 3. The last row is out of order.
     const PointCloud cloud = read_points(scratch.write(
         "contours.csv", "slice,contour,x_px,y_px\n3,0,1,2\n3,0,4,2.5\n3,1,9,9\n4,0,7,7\n4,0,8,7\n3,0,4,6\n"));
     CHECK(cloud.space == PointSpace::Index);
@@ -212,11 +213,11 @@ TEST_CASE("napari shapes are lines, closed or open by their type") {
     CHECK(cloud.space == PointSpace::Index);
     REQUIRE(cloud.lines.size() == 5);
     CHECK(cloud.points[0] == Vec3{1, 2, 5});
-    CHECK(cloud.points[1] == Vec3{4, 2, 5});  // by vertex-index
+    CHECK(cloud.points[1] == Vec3{4, 2, 5});  // in the order of the column vertex-index
     CHECK(cloud.points[2] == Vec3{4, 6, 5});
     const bool closed[] = {true, false, false, true, true};
     for (std::size_t n = 0; n < 5; ++n) CHECK(cloud.lines[n].closed == closed[n]);
-    // x = 30 +- 10, y = 13 +- 3
+    // The ellipse in the file: x = 30 +- 10, y = 13 +- 3.
     const MarkLine& ellipse = cloud.lines[4];
     CHECK(ellipse.end - ellipse.begin >= 40);
     for (std::size_t n = ellipse.begin; n < ellipse.end; ++n) {
@@ -361,7 +362,7 @@ TEST_CASE("close points become one, the first stays and so does the order") {
     const std::vector<Vec3> points{{0.9, 0, 0}, {0.1, 0, 0}, {0.9, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}};
     CHECK(merge_close_points(points, 0) ==
           std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}});
-    // 0.12 is too close to 0.1, 0.6 to 0.9; 1.1 is in the next cell
+    // 0.12 is too close to 0.1, and 0.6 to 0.9, so they are left out. 1.1 is in the cell after that of 0.9.
     CHECK(merge_close_points(points, 1.0) == std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {1.1, 0, 0}});
     CHECK(merge_close_points({}, 1.0).empty());
     CHECK_THROWS_AS(merge_close_points(points, -1.0), Error);
@@ -406,7 +407,8 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
         };
         const double before = double(std::count_if(all.begin(), all.end(), is_in)),
                      after = double(std::count_if(some.begin(), some.end(), is_in));
-        CHECK(after / before == Approx(0.15).margin(0.003));  // for random points it is 0.006
+        // If points were selected at random, the deviation would be 0.006.
+        CHECK(after / before == Approx(0.15).margin(0.003));
     }
     std::sort(order.begin(), order.end());
     CHECK(order == all);
@@ -424,7 +426,7 @@ TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
     CHECK(s.mean == Approx(0.5));
     CHECK(s.max == Approx(0.5));
 
-    // clusters of very different sizes, far from the origin
+    // Clusters of very different sizes, far from the origin.
     std::vector<Vec3> points = random_points(1000, 4);
     for (std::size_t n = 0; n < points.size(); ++n) {
         const double scale = n % 2 == 0 ? 1e-4 : 50.0;

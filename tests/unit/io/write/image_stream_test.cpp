@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A ball of radius 7 with a core of radius 2, zero elsewhere; boxes outside of the ball, or in the core, are reported
-/// as uniform.
+/// Labels of a ball: 7, and 2 in its core, times `scale`; 0 elsewhere. The ball fills 90 % of the shortest side of the
+/// image. Boxes in the core, or outside of the ball, are reported as uniform.
 template <typename T>
 class Balls : public PixelSource {
 public:
@@ -109,7 +109,7 @@ std::map<std::string, std::string> files_of(const std::string& folder) {
 
 TEST_CASE("streamed images come back voxel by voxel, and each voxel is told of once") {
     const Scratch scratch;
-    // Several blocks of 256 KB, and one; sizes are not multiples of a tile, a chunk or a block.
+    // The first image has several blocks of 256 KB, the second one. Sizes are not multiples of a tile, chunk or block.
     for (const Index3& size : {Index3{301, 290, 31}, Index3{23, 5, 9}}) {
         const ImageGeometry g = lattice(size);
         const Balls<std::uint8_t> bytes(g, PixelType::UInt8, true);
@@ -184,7 +184,8 @@ TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, c
     write_image(path, source);
     const auto json = json_of(path + "/.zattrs");
     const auto& levels = json["multiscales"][0]["datasets"];
-    // z is 2.5 times as wide as x, and is not reduced until the others catch up.
+    // Voxels are 2.5 times as wide along z as along x, so z is not reduced until the other axes have reached this
+    // width.
     REQUIRE(levels.size() == 3);
     CHECK(json_of(path + "/1/.zarray")["shape"] == std::vector<int>{140, 145, 151});
     CHECK(json_of(path + "/2/.zarray")["shape"] == std::vector<int>{70, 73, 76});
@@ -194,7 +195,7 @@ TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, c
     CHECK(json["multiscales"][0]["type"] == "mode");
     CHECK(json["image-label"]["colors"][0]["rgba"] == std::vector<int>{1, 2, 3, 255});
     CHECK(json["image-label"]["properties"][1]["name"] == "core");
-    CHECK_FALSE(fs::exists(path + "/0/0/0/2"));  // outside of the ball
+    CHECK_FALSE(fs::exists(path + "/0/0/0/2"));  // a chunk outside of the ball is not written
     CHECK(fs::exists(path + "/0/0/1/1"));
 
     const Image coarse = read_image(path + "/1");

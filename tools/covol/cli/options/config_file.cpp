@@ -228,7 +228,7 @@ bool is_plain(const std::string& value) {
 }
 
 /// The value as TOML: a basic string unless is_plain(). Characters that a shell would interpret within double quotes
-/// are written as numeric escapes.
+/// are written as numeric escapes, so that a shell that reads the file executes no part of a value.
 std::string toml_text(const std::string& value) {
     if (is_plain(value)) return value;
     std::string text = "\"";

@@ -2,7 +2,7 @@
 
 namespace covol::tool {
 
-/// The commands for a first try, in three lines.
+/// Commands with which to try the program for the first time, one per line, as shown in its help.
 constexpr const char* kFirstSteps =
     "  covol demo               a sample image and its marks, in the browser\n"
     "  covol mark stack.tif     click marks on your own image there, and see the surface\n"

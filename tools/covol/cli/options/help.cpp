@@ -13,11 +13,12 @@ namespace {
 constexpr std::size_t kColumn = 30;  // column in which descriptions begin
 constexpr std::size_t kWidth = 100;  // maximum length of a line
 
-// Indexed by Group.
+// Headings of the groups of options, indexed by Group.
 constexpr std::array kGroupNames{"Input", "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh", "Picture",
                                  "Start", "Domain", "Image edges",        "Flow",         "Numerics", "Help"};
 
-/// `left`, then `text` in a column of its own, with line breaks between words.
+/// An entry of the help: `left`, then `text`, which begins in kColumn and is wrapped at kWidth. If `left` does not fit
+/// before kColumn, `text` begins on the next line.
 std::string entry(const std::string& left, const std::string& text) {
     std::string out = "  " + left;
     std::size_t used = out.size();

@@ -13,7 +13,7 @@ namespace covol::tool {
 /// Options that are added to `command` after this call belong to this group.
 void in_group(CLI::App& command, Group group);
 
-/// Puts all options into one group. Only the help needs groups; CLI11 would sort a configuration file by them.
+/// Puts all options of `command` into the same group, "Options". Only the help needs different groups.
 void forget_groups(CLI::App& command);
 
 /// An option as shown in the help.

@@ -12,7 +12,8 @@
 namespace covol::tool {
 namespace {
 
-// Type names of option values by role. trust_test.Roles checks the roles of the options.
+// Type names of option values, by the role of the options: see role_of(). The class Roles of tests/cli/trust_test.py
+// checks the role of every option.
 constexpr std::array<std::string_view, 19> kSettings{"N",
                                                      "INT",
                                                      "UINT",
@@ -118,7 +119,8 @@ std::vector<std::string> command_line_of(const JobOptions& job, const CLI::App& 
         }
     }
     if (positional.empty()) return words;
-    // After an option that takes any number of values, CLI11 uses the first "--" only to end these values.
+    // After an option that takes any number of values, CLI11 uses the first "--" only to end these values. Positional
+    // arguments then begin after a second one.
     words.insert(words.end(), last != nullptr && last->get_allow_extra_args() ? 2 : 1, "--");
     words.insert(words.end(), positional.begin(), positional.end());
     return words;

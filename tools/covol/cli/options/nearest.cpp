@@ -33,7 +33,7 @@ bool is_number(const std::string& word) {
     return error == std::errc() && end == word.data() + word.size();
 }
 
-/// Long and short names, with their dashes.
+/// The long and short names of all options, with their dashes.
 std::vector<std::string> names_of_options(const CLI::App& app) {
     std::vector<std::string> names;
     for (const CLI::Option* option : app.get_options()) {
@@ -87,7 +87,7 @@ std::string unknown_name(const CLI::App& program, const std::vector<std::string>
         if (word.size() < 2 || word[0] != '-' || is_number(word)) continue;
         const std::string name = word.substr(0, word.find('='));
         const auto is_given = [&](const std::string& known) {
-            // A short name may be followed directly by its value, or by other flags.
+            // A short name may be followed by its value, or by other short flags, without a blank, as in -oOUT.vdb.
             return known == name || (known.size() == 2 && known[1] != '-' && name[1] != '-' && name.starts_with(known));
         };
         if (std::none_of(names.begin(), names.end(), is_given))

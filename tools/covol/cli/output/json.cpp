@@ -12,7 +12,8 @@ Json parse_json(const std::string& text, const std::string& what) {
     constexpr int kMaxLevels = 32;
     try {
         return Json::parse(text, [&](int depth, Json::parse_event_t, const Json&) {
-            // The depth is limited, because the library copies and writes values recursively.
+            // Depth is limited because the JSON library copies and writes values recursively: deep ones exhaust the
+            // stack.
             if (depth > kMaxLevels)
                 throw Error(Errc::InvalidInput,
                             what + ": expected JSON of at most " + std::to_string(kMaxLevels) + " levels");

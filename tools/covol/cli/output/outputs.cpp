@@ -63,7 +63,7 @@ bool is_special(const OutputPlace& place) {
 
 bool is_special(const std::string& path) {
     std::error_code status;
-    // Other errors of the path are reported when the file is written.
+    // A path that does not exist or cannot be examined is not special; errors are reported when the file is written.
     return fs::exists(path, status) && is_special(place_of_output(path));
 }
 
@@ -145,7 +145,7 @@ const std::vector<std::string>& Outputs::files_of(const std::string& input, cons
         try {
             entry->second = list_image_files(input);
         } catch (const Error& error) {
-            // The input is not an image, or it is one that cannot be read, which is reported when it is read.
+            // The input is not an image, or it is one that cannot be read; this error is reported when it is read.
             if (error.code() == Errc::Cancelled) throw;
         }
     }
@@ -189,7 +189,8 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
     check_inputs(flag, path, target);
     if (::access(folder.c_str(), W_OK) != 0)
         throw Error(Errc::Io, flag + ": " + path + ": cannot write: no permission to write in " + folder.string());
-    // Checked now, so that the run does not fail after the computation.
+    // Another program may hold the lock on the folder. Waiting for it before the computation, and failing if it is not
+    // released, avoids a failure after the computation.
     wait_for_folder(folder, run_);
     if (std::find(checked_.begin(), checked_.end(), target.string()) != checked_.end())
         throw Error(Errc::InvalidOptions, flag + ": " + path + ": another output has the same name");
@@ -203,8 +204,8 @@ void Outputs::add(const std::string& path, std::function<void(const std::string&
 bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
     if (path.empty()) return false;
     check_inputs("output", path, place_of_output(path).path);
-    files_.write(path, write, run_);  // files_ contains no other file before write_queued()
-    files_.publish(run_);
+    files_.write(path, write, run_);
+    files_.publish(run_);  // publishes only this file: write_queued() adds the queued ones later
     kept_.push_back(path);
     return true;
 }
@@ -214,7 +215,7 @@ void Outputs::write_queued() {
         if (is_special(output.path)) {
             devices_.push_back(std::move(output));
         } else {
-            // Inputs may have been added since the start.
+            // check() compared the path with the inputs known at that time; protect() may have added others since.
             check_inputs("output", output.path, place_of_output(output.path).path);
             files_.write(output.path, output.write, run_);
         }
@@ -232,7 +233,7 @@ void write_stream(int stream, const std::string& text, const std::string& name, 
     for (std::size_t done = 0; done < text.size();) {
         pollfd ready{stream, POLLOUT, 0};
         constexpr int kPause = 50;                          // milliseconds
-        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal arrived
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // not ready yet, or a signal arrived
         run.check();
         if (waits) continue;
         // At most PIPE_BUF bytes are written, which a pipe that is ready accepts without blocking.

@@ -28,7 +28,8 @@ enum class OutputKind {
 /// complete. If one fails, the previous files stay unchanged.
 class Outputs {
 public:
-    /// @param run  reports that the program waits for another one, and can cancel this; must outlive this object
+    /// @param run  is used to report and to cancel waiting for other programs, for example for one that holds the lock
+    /// on a folder; must outlive this object
     explicit Outputs(const RunContext& run) : run_(run) {}
 
     /// Adds files and folders that this run reads: no output may replace one of them, or a file that it refers to.
@@ -43,7 +44,7 @@ public:
     /// Queues an output for write_queued(); does nothing for an empty path.
     void add(const std::string& path, std::function<void(const std::string& path)> write);
 
-    /// Writes a file at once; it stays even if the run fails later. @returns false for an empty path.
+    /// Writes a file at once. Unlike queued files, it is kept if the run fails later. @returns false for an empty path.
     bool write(const std::string& path, const std::function<void(const std::string& path)>& write);
     [[nodiscard]] const std::vector<std::string>& kept() const noexcept { return kept_; }
 
@@ -68,10 +69,10 @@ private:
     };
     const RunContext& run_;
     std::vector<std::string> inputs_;
-    std::map<std::string, std::vector<std::string>> files_of_;  ///< files_of() each input
+    std::map<std::string, std::vector<std::string>> files_of_;  ///< results of files_of(), by input
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
-    std::vector<Pending> devices_;  ///< outputs to devices and pipes; written last, because this cannot be undone
+    std::vector<Pending> devices_;  ///< outputs to devices and pipes; written last, because they cannot be undone
     FileSet files_;
     std::vector<std::string> written_;
     std::vector<std::string> kept_;

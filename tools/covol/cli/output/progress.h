@@ -29,7 +29,7 @@ private:
     bool drawn_ = false;
     bool announced_ = false;
     std::string stage_, shown_stage_;
-    double fraction_ = 0;                ///< completed fraction of the stage; never decreases
+    double fraction_ = 0;                ///< completed fraction of the current stage, 0 to 1
     std::map<std::string, int> passes_;  ///< how often each stage began
     Clock::time_point begin_;
     Clock::time_point shown_;

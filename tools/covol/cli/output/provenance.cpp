@@ -8,7 +8,7 @@ namespace fs = std::filesystem;
 
 std::pair<std::size_t, std::size_t> path_within(const std::string& text) {
     const std::size_t equals = text.find('=');
-    std::size_t begin = text.find('/') > equals ? equals + 1 : 0;  // names of structures contain no slash
+    std::size_t begin = text.find('/') > equals ? equals + 1 : 0;  // not a '=' in a folder's name
     for (const char* kind : {"mesh:", "mask:", "vdb:"})
         if (text.compare(begin, std::string(kind).size(), kind) == 0) begin += std::string(kind).size();
     return {begin, std::min(text.find(":/", begin), text.size())};
@@ -45,7 +45,7 @@ bool is_frame(const std::string& name, const std::pair<std::string, std::string>
 std::string without_folder(const std::string& text) {
     const auto [begin, end] = path_within(text);
     std::size_t last = end;
-    while (last > begin && text[last - 1] == '/') --last;  // folders, such as .zarr/
+    while (last > begin && text[last - 1] == '/') --last;  // the path of a folder may end in slashes, as in a.zarr/
     const std::size_t slash = last > begin ? text.rfind('/', last - 1) : std::string::npos;
     return slash == std::string::npos || slash < begin ? text : text.substr(0, begin) + text.substr(slash + 1);
 }

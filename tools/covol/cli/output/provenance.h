@@ -17,7 +17,7 @@ namespace covol::tool {
 
 /// The parts of a name before and after {frame}; nullopt if it contains none.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> around_frame(const std::string& text);
-/// Whether the name consists of these two parts with a number between them.
+/// Whether the name consists of `parts`, the result of around_frame(), with a number between them.
 [[nodiscard]] bool is_frame(const std::string& name, const std::pair<std::string, std::string>& parts);
 /// The files that match a text such as NAME=FILE_{frame}.csv with any number for {frame}, sorted.
 [[nodiscard]] std::vector<std::string> files_of_frames(const std::string& text);

@@ -84,8 +84,8 @@ Json to_json(const CompareReport& r) {
             {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
-/// An optional without a value, and the word "auto", become null: the value was not needed, or the step that uses it
-/// chooses it.
+/// An empty optional, and an enumerator called "auto", become null. Either the run did not need the option, or the step
+/// that uses it chooses the value itself.
 template <typename T>
 static Json to_json_value(const T& value) {
     if constexpr (requires { *value, value.has_value(); })

@@ -26,12 +26,12 @@ namespace covol::tool {
 [[nodiscard]] Json to_json(const FitStatistics& fit);
 [[nodiscard]] Json to_json(const SeedCheck& check);
 [[nodiscard]] Json to_json(const CompareReport& report);
-/// Every number that segment() used, in world units.
+/// Every option with the value that segment() used; lengths are in world units.
 [[nodiscard]] Json to_json(const SegmentOptions& options);
 
-/// All fields except the input and the seconds.
+/// All fields of the report except those about the inputs and the run times.
 [[nodiscard]] Json to_json(const SegmentReport& report);
-/// The result in a few lines of text.
+/// The result in a few lines of text, for the terminal.
 [[nodiscard]] std::vector<std::string> summary(const SegmentReport& report);
 
 /// The measurements as one line of text.

@@ -11,10 +11,10 @@
 
 namespace covol::tool {
 
-/// What output files state about the run that wrote them.
+/// The provenance that output files contain: facts about the run that wrote them, its options and its inputs.
 class RunProvenance {
 public:
-    /// @param command, report  of the run; kept by reference, so they must outlive this object
+    /// @param command, report  command and report of the run; kept by reference, so they must outlive this object
     RunProvenance(const CLI::App& command, std::vector<std::string> inputs, const Json& report)
         : command_(command), inputs_(std::move(inputs)), report_(report) {}
 
@@ -32,7 +32,8 @@ public:
     /// The metadata() as comment lines for files of meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
-    /// Identifies this run: version, command, options that change results, digests of the inputs.
+    /// Text that identifies the job, so that only the same job continues from a checkpoint: version, instruction set,
+    /// command, options that change results, and digests of the inputs.
     [[nodiscard]] std::string job_text() const;
 
 private:

@@ -10,7 +10,7 @@
 namespace covol::tool {
 namespace {
 
-// The only state that a signal handler may touch.
+// The only variables that the signal handler changes. They must be lock-free: a handler must not wait for a lock.
 std::atomic<bool> cancel_requested = false;
 std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -18,11 +18,11 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 extern "C" void on_signal(int signal) {
     interrupted = true;
     cancel_requested = true;
-    std::signal(signal, SIG_DFL);  // a second one ends the program at once
+    std::signal(signal, SIG_DFL);  // a second signal ends the program at once
 }
 
 /// Called if a page of a mapped file does not exist any more, because another program truncated the file. Finished
-/// outputs are kept; the temporary files of this run are removed by the next one.
+/// outputs are kept; the temporary files of this run are removed by the next run.
 extern "C" void on_bus_error(int) {
     constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
     static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));

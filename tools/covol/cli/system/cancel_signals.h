@@ -8,7 +8,8 @@ namespace covol::tool {
 [[nodiscard]] std::atomic<bool>& cancel_flag();
 /// Whether a signal requested termination.
 [[nodiscard]] bool is_interrupted();
-/// For commands that Ctrl-C ends in the regular way: clears cancel_flag() if a signal requested termination.
+/// Clears cancel_flag() if a signal requested termination, so that the run then ends without an error. For commands
+/// such as `mark`, which run until Ctrl-C.
 void accept_interrupt();
 
 /// The first signal sets the flag, the second ends the program at once.

@@ -29,7 +29,7 @@ namespace {
     char nothing = 0;
     while (::read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
     }
-    constexpr int kMaxTries = 500, kPause = 10000;  // microseconds: a child run may still be ending
+    constexpr int kMaxTries = 500, kPause = 10000;  // kPause in microseconds; a child run may still write files
     std::error_code status;
     for (int n = 0; n < kMaxTries; ++n) {
         fs::remove_all(folder, status);

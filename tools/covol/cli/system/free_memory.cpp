@@ -90,7 +90,7 @@ std::string own_group(const std::string& root, bool is_v2) {
     std::ifstream file(root + "/proc/self/cgroup");
     std::string line;
     while (std::getline(file, line)) {
-        // number:controllers:group
+        // format of a line: number:controllers:group
         const std::size_t first = line.find(':'), second = line.find(':', first + 1);
         if (second == std::string::npos) continue;
         const std::string controllers = line.substr(first + 1, second - first - 1);
@@ -110,7 +110,7 @@ std::vector<fs::path> group_folders(const Hierarchy& hierarchy, const std::strin
     return folders;
 }
 
-/// Memory of the group's processes, without file caches, which are reclaimed on demand.
+/// Memory of the group's processes, bytes, without file caches, which the kernel reclaims on demand.
 std::uint64_t used_by(const fs::path& folder, bool is_v2) {
     const std::uint64_t all = number_in(folder / (is_v2 ? "memory.current" : "memory.usage_in_bytes")).value_or(0);
     const std::string prefix = is_v2 ? "" : "total_";  // in v1, these values include the groups below
@@ -120,7 +120,7 @@ std::uint64_t used_by(const fs::path& folder, bool is_v2) {
     return all - std::min(all, caches);
 }
 
-/// The minimum of the group's limits; nullopt if it has none.
+/// The minimum of the group's memory limits, bytes; nullopt if it has none.
 std::optional<std::uint64_t> limit_of(const fs::path& folder, bool is_v2) {
     std::array<std::optional<std::uint64_t>, 2> limits;
     if (is_v2) {

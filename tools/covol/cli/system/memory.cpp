@@ -20,7 +20,8 @@
 namespace covol::tool {
 namespace {
 
-// New pages are allocated at some gigabytes per second; one check takes two microseconds.
+// Interval between two checks of MemoryGuard. A process allocates at some gigabytes per second, so that it can grow by
+// some megabytes in this time. One check takes two microseconds.
 constexpr auto kInterval = std::chrono::milliseconds(1);
 constexpr std::uint64_t kSlack = 32;  // a cancelled run may exceed the limit by 1/32 before the process is ended
 constexpr std::uint64_t kUsablePercent = 80;
@@ -55,7 +56,7 @@ private:
 std::uint64_t held_memory() { return PageCount().held(); }
 
 std::uint64_t peak_rss() {
-    // Preferred to ru_maxrss, which may be that of the process that started this program.
+    // VmHWM is preferred to ru_maxrss, which may be the maximum of the process that started this program.
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
         if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;

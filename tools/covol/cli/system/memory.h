@@ -15,7 +15,7 @@ namespace covol::tool {
 
 /// The maximum memory of a run.
 struct MemoryBound {
-    std::uint64_t bytes = 0;  ///< 0: not known
+    std::uint64_t bytes = 0;  ///< 0: the free memory is unknown, and the memory is not limited
     std::string name;         ///< for messages: "--memory-limit 8G", or the free memory and what limits it
 };
 
@@ -35,7 +35,7 @@ public:
     ~MemoryGuard();
     MemoryGuard(const MemoryGuard&) = delete;
     MemoryGuard& operator=(const MemoryGuard&) = delete;
-    /// False if the system could not create a thread for it.
+    /// False if the system could not create the guard's thread, so that the memory is not monitored.
     [[nodiscard]] bool watches() const noexcept { return watches_; }
     /// Whether the limit was exceeded, so that this guard has set `cancel`.
     [[nodiscard]] bool tripped() const noexcept { return tripped_; }

@@ -33,7 +33,7 @@ std::string too_few_files() {
 
 void catch_signals(void (*handler)(int)) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-        if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);  // as with nohup
+        if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);  // stays ignored, as with nohup
 }
 
 }  // namespace covol::tool

@@ -8,7 +8,8 @@ namespace covol::tool {
 /// of the stream, and receive the program's messages.
 void keep_standard_streams();
 
-/// Raises the limit of open files as far as allowed, for image stacks. @return a message if the limit is too low
+/// Raises the limit of open files to 4096, or as far as allowed, because image stacks consist of many files.
+/// @return an error message if fewer than 16 files are allowed, otherwise an empty text
 [[nodiscard]] std::string too_few_files();
 
 /// Installs a handler for the signals that request termination. Should not be called before the run starts: until then,

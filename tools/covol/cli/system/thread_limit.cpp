@@ -74,9 +74,10 @@ ThreadCount limit_threads(int threads) {
     const auto maximum = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     ThreadCount count;
     count.wanted = threads > 0 ? std::min(threads, maximum) : maximum;
-    // TBB creates one thread fewer than this. The other one is for the child process in which a reader tests files.
+    // The calling thread is one of TBB's threads, so TBB creates one thread fewer than this test. The remaining one is
+    // for the child process in which a reader tests files; the limits count processes, too.
     count.possible = std::max(1, count_possible(count.wanted));
-    // Never destroyed, because its limit ends with it: TBB would then create more threads.
+    // This object is never destroyed: its limit would end with it, and TBB would create more threads.
     if (count.possible < count.wanted)
         static_cast<void>(
             new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(count.possible)));
@@ -86,7 +87,7 @@ ThreadCount limit_threads(int threads) {
 bool is_missing_thread(const std::exception& error) {
     if (const auto* system = dynamic_cast<const std::system_error*>(&error))
         return system->code() == std::errc::resource_unavailable_try_again;
-    return std::string(error.what()).starts_with("pthread_create has failed");  // TBB's
+    return std::string(error.what()).starts_with("pthread_create has failed");  // text of an exception of TBB
 }
 
 void expect_temporary_files() { may_have_files = true; }

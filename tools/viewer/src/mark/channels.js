@@ -22,7 +22,7 @@ export class Channels {
     this.show(kept);
   }
 
-  /** Colours by channel number; other channels are hidden. If `mix` is empty, the marked channel is shown in grey. */
+  /** Shows only the channels in `mix`, colours by channel number. If it is empty, the channel of the marks is shown in grey. */
   async show(mix) {
     try {
       for (const n of Object.keys(mix).map(Number)) {
@@ -43,7 +43,7 @@ export class Channels {
     const mix = {...this.state.get('mix')}, own = this.image.channel;
     if (n in mix) delete mix[n];
     else mix[n] = COLORS[n % COLORS.length];
-    if (n !== own && n in mix) mix[own] ??= COLORS[own % COLORS.length];  // grey would hide the colour of the other channel
+    if (n !== own && n in mix) mix[own] ??= COLORS[own % COLORS.length];  // in grey, the own channel would hide the colour of the other one
     if (Object.keys(mix).every((one) => Number(one) === own)) delete mix[own];
     return this.show(mix);
   }

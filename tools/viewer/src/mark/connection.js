@@ -37,7 +37,7 @@ export class Connection {
     this.count();
   }
 
-  /** Whether the server has the study that the page shows. */
+  /** Handles the first state of a connection. Returns whether the server has the study that the page shows. */
   welcome(state) {
     if (this.study.name === null) {
       this.study.name = state.study;
@@ -60,7 +60,7 @@ export class Connection {
     this.count();
     this.timer = setTimeout(() => this.open(), WAITS[Math.min(this.tries++, WAITS.length - 1)]);
     if (this.tries < 2) return;
-    try {  // a server that was restarted knows neither the cookie nor the page
+    try {  // a server that was restarted does not accept the cookie of its earlier run
       const answer = await fetch('/image', {method: 'HEAD'});
       if (answer.status === 403 && !this.isOpen) this.state.set({link: 'refused'});
     } catch { /* no server is running */ }
@@ -85,7 +85,8 @@ export class Connection {
     for (const item of this.queue.items) {
       if (item.seq !== null) continue;
       if (item.sentOn !== this.number) {
-        // Later actions must not overtake one that waits for an ID.
+        // An action that refers to an object without an ID has to wait for it. The later actions wait, too, because the
+        // order must not change.
         if (onTheWay >= MAX_IN_FLIGHT || !this.queue.isReady(item)) return;
         item.sentOn = this.number;
         item.sentAt = performance.now();

@@ -2,7 +2,7 @@
 import {el} from '../dom.js';
 
 const MARKS = /\.(csv|tsv|txt|xyz|pts|asc|roi|zip|json|fcsv|annot)$/i;
-const MAX_BYTES = 256 * 2 ** 20;  // limit of the program
+const MAX_BYTES = 256 * 2 ** 20;  // kMaxFileBytes of the program
 const ANSWER_TIMEOUT = 5000;  // maximum time in ms until a structure has its number
 
 export class Files {
@@ -29,7 +29,7 @@ export class Files {
     if (file) this.send(file, this.as);
   }
 
-  /** The number of the active structure; a new structure gets it from the program. */
+  /** The ID of the active structure. If it is new, waits until the program has assigned the ID. */
   async structure() {
     const own = this.tools.open();
     if (!own) return null;

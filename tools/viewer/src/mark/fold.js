@@ -2,7 +2,7 @@
 import {applyAction, isSameMark, isSameOutline} from '../changes.js';
 import {referenceOf} from './queue.js';
 
-/** Undo cancels the preceding pending action; only the server can undo earlier ones. */
+/** The actions without those that a later pending undo cancels. An undo without a pending action before it is left to the server. */
 function withoutUndone(actions) {
   const done = [], undone = [];
   for (const action of actions) {
@@ -18,7 +18,7 @@ function withoutUndone(actions) {
   return done;
 }
 
-/** The newest ID of the object that an action has made, for servers that do not send it; `taken` are IDs of other objects. */
+/** The ID of the object that an action has made, for servers that do not send it: the highest ID that fits; `taken` are IDs of other objects. */
 export function madeBy(action, structures, taken) {
   const own = structures.find((s) => s.id === action.structure);
   const made = action.do === 'add_structure' ? structures.filter((s) => s.name === action.name)
@@ -26,7 +26,7 @@ export function madeBy(action, structures, taken) {
   return (made ?? []).map(({id}) => id).filter((id) => !taken.has(id)).sort((a, b) => b - a)[0];
 }
 
-/** `resolve` returns the ID for a reference if it is known. */
+/** Applies pending actions to the structures. `resolve` replaces a reference by the ID, if that is known. */
 export function fold(structures, actions, resolve) {
   return withoutUndone(actions).reduce((list, a) => {
     const action = {...a, structure: resolve(a.structure), mark: resolve(a.mark), to: resolve(a.to)};

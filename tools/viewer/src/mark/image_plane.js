@@ -1,6 +1,6 @@
 // The image on an oblique plane, sampled by the server.
 
-/** For an ObliquePlane: a new request cancels the previous one. */
+/** Returns a function that an ObliquePlane calls for its codes; a new request to the server cancels the previous one. */
 export function codesOf() {
   let controller = null;
   return async ({first, alongX, alongY, count}) => {

@@ -58,7 +58,7 @@ function follow(state, study) {
   };
   study.on('change', () => {
     const active = study.resolve(state.get('active')), first = study.structures[0]?.id ?? null;
-    // Before the first state it is not known whether the active structure exists.
+    // Before the page has received the first state (seq < 0), the active structure is kept, because it may exist.
     const isKept = study.seq < 0 || study.structure(active);
     state.set({study: state.get('study') + 1, active: isKept ? active : first, selected: known(state.get('selected')), hover: known(state.get('hover')), drag: known(state.get('drag'))});
   });
@@ -113,7 +113,7 @@ async function start() {
   showFocus();
   keyboard(app, {suggestions, sidebar, help, theme, oblique, view: () => view});
   remember(state, store, KEPT, (name, value) => name !== 'active' || !isReference(value));
-  // If the queue cannot be stored, unsent actions would be lost.
+  // The browser warns before it closes a page whose unsent actions would be lost, because they could not be stored.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();
   window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing, tools, files, channels: app.channels,

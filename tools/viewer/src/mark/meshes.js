@@ -2,7 +2,7 @@
 import {decodeCorners, decodePositions} from '../mesh_codec.js';
 import {indexCoordinates} from '../outline.js';
 
-const HEAD = 40;  // bytes before the positions
+const HEAD = 40;  // bytes before the positions in the answer for a mesh
 export const PREVIOUS_OUTLINE_MS = 1000;  // ms for which the previous surface is still outlined
 
 function decode(buffer, space) {
@@ -13,7 +13,7 @@ function decode(buffer, space) {
   return {...mesh, positions, corners, index: indexCoordinates(positions, space)};
 }
 
-/** After reconnecting, the same surface may be sent again. */
+/** Whether two meshes are the same surface, which may be received again after reconnecting. */
 const isSame = (a, b) => a.vertices === b.vertices && a.triangles === b.triangles && a.min.every((x, n) => x === b.min[n]) && a.max.every((x, n) => x === b.max[n]);
 
 export class Meshes {
@@ -29,7 +29,8 @@ export class Meshes {
     if (stage === 'empty') return this.drop(id);
     const wanted = this.wanted.get(id);
     if (!isNew && wanted >= version) return;
-    // While a structure is being solved, it has a surface only if it had one before.
+    // While a structure is being solved, its version belongs to an earlier surface, which is fetched only if none was
+    // requested before.
     if (!(version > 0) || (!['first', 'refined'].includes(stage) && !isNew && wanted)) return;
     this.wanted.set(id, version);
     let mesh = null;

@@ -77,7 +77,7 @@ export function drawOverlay(panel, context) {
   drawPaint(panel, context);
   drawCrosshair(panel, context);
   const active = panel.tools.active();
-  const ordered = [...panel.study.structures].sort((a, b) => (a === active) - (b === active));  // the active one is drawn on top
+  const ordered = [...panel.study.structures].sort((a, b) => (a === active) - (b === active));  // the active structure is drawn last, on top
   for (const structure of ordered)
     if (structure.visible) {
       drawSurface(panel, context, structure, structure === active);

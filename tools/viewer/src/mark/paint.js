@@ -3,7 +3,10 @@
 const NOTHING = {};
 const lengthOf = (space, along) => Math.sqrt(space.product(along, along));
 
-/** Splits segments into pieces of at most twice the radius, because the bounding box of a long one is mostly empty. */
+/**
+ * Splits the segments of a stroke into pieces of at most twice its radius. All voxels in the bounding box of a piece are tested, and
+ * most voxels in the box of a long segment are not painted.
+ */
 function* pieces(space, corners, radius) {
   if (corners.length === 1) yield [corners[0], corners[0]];
   for (let n = 1; n < corners.length; ++n) {
@@ -52,7 +55,7 @@ function pictureOf(space, strokes, axis, at, rgb) {
   return {canvas};
 }
 
-/** Caches the pictures of displayed slices; strokes never change, so a list of strokes identifies its picture. */
+/** Caches the pictures of displayed slices. A finished stroke never changes, so the number of strokes and the last one identify the picture. */
 export class PaintPictures {
   constructor(space) { Object.assign(this, {space, kept: new Map()}); }
 

@@ -3,8 +3,8 @@ import {MarkPointer} from '../mark_pointer.js';
 import {CLICK, TAP} from '../pointer.js';
 import {isBrush} from './tools.js';
 
-const HIT_LINE = 6;  // CSS pixels
-const FREEHAND = 3;  // CSS pixels between two corners
+const HIT_LINE = 6;  // CSS pixels: maximum distance of the pointer from a line that it selects
+const FREEHAND = 3;  // minimum number of CSS pixels between two corners of a freehand outline
 const NEAR_BEGINNING = 10;
 
 function distanceToLine([x, y], [ax, ay], [bx, by]) {
@@ -80,7 +80,7 @@ export class PointerInput extends MarkPointer {
     if (!panel.isSeen(index)) return;
     if (draft && draft.axis === panel.axis && draft.at === panel.shownAt) {
       const distance = (place) => Math.hypot(...panel.plane.place(...place).map((v, n) => v - spot[n]));
-      if (distance(draft.places.at(-1)) < CLICK) return;  // the second click of a double click
+      if (distance(draft.places.at(-1)) < CLICK) return;  // the second click of a double click adds no corner
       if (draft.places.length > 2 && distance(draft.places[0]) < NEAR_BEGINNING) return void panel.tools.closeDraft(true, 1 / panel.plane.scaleX);
     }
     panel.tools.addCorners(panel, [[index[panel.right], index[panel.down]]]);

@@ -1,9 +1,9 @@
-// Actions that the server has not acknowledged yet. Until then each is stored in localStorage: a tab that is opened later
-// sends them, and sending an action from two tabs does no harm, because the server applies each key once.
+// Actions that the server has not acknowledged yet. Until then each is stored in localStorage: a tab that is opened
+// later sends them, and sending an action from two tabs does no harm, because the server applies each key once.
 
 const REFERENCES = ['structure', 'mark', 'to'];
 
-/** Reference to an ID that the server has not assigned yet: "of" and the key of the action that requests it. */
+/** A reference that stands for an ID that the server has not assigned yet: "of" and the key of the action that makes the object. */
 export const referenceOf = (key) => `of ${key}`;
 export const isReference = (id) => typeof id === 'string';
 
@@ -15,7 +15,7 @@ export class Queue {
     this.store = null;
   }
 
-  /** Called when the study is known: actions left from earlier sessions precede the new ones. */
+  /** Called when the page has received the name of the study. Stored actions from earlier sessions are put before the new ones. */
   open(store) {
     this.store = store;
     const old = store.names().map((key) => ({key, ...store.get(key)})).filter(({key, action}) => action?.key === key);
@@ -53,7 +53,7 @@ export class Queue {
         }
   }
 
-  /** Actions that refer to objects that will never exist. */
+  /** Actions that refer to an object that will never exist, because the action that makes it is not in the queue any more. */
   orphans() {
     const made = new Set(this.items.map(({action}) => referenceOf(action.key)));
     return this.items.filter(({action}) => REFERENCES.some((name) => isReference(action[name]) && !made.has(action[name])));
@@ -61,6 +61,6 @@ export class Queue {
 
   isReady({action}) { return !REFERENCES.some((name) => isReference(action[name])); }
 
-  /** The number of actions that are not known to be on disk. */
+  /** The number of actions that the server has not acknowledged, and may therefore not have stored. */
   get waiting() { return this.items.filter(({seq}) => seq === null).length; }
 }

@@ -166,7 +166,7 @@ export function sidebar(app) {
     const active = tools.active(), seen = new Set(), references = [...cards.keys()].filter(isReference);
     nothing.hidden = study.structures.length > 0;
     study.structures.forEach((structure, n) => {
-      // A card is kept when its structure gets its ID.
+      // When the server has assigned the ID of a structure, the card that was made with a reference to it is kept.
       const waiting = cards.has(structure.id) ? structure.id : references.find((id) => study.resolve(id) === structure.id), card = cards.get(waiting) ?? new Card(structure.id, app);
       if (waiting !== structure.id) cards.delete(waiting);
       cards.set(structure.id, card);

@@ -3,14 +3,14 @@
 
 const MAX_SLICES = 200, MAX_BYTES = 48 * 2 ** 20, MAX_CONCURRENT = 4, AHEAD = 6;
 const MAX_STEP = 1024;
-const BUSY = 503, PAUSE = 200;  // ms
-const SLOW = 400;  // ms: slower slices are not fetched ahead
-const MAX_LATE_DISTANCE = 12;  // maximum distance in slices of a late slice that is shown instead of the requested one
+const BUSY = 503, PAUSE = 200;  // HTTP status of a busy server; ms before the request is repeated
+const SLOW = 400;  // ms: if slices take longer than this, none are fetched ahead
+const MAX_LATE_DISTANCE = 12;  // slices: maximum distance from the requested slice at which another one is shown until it arrives
 const MAX_PIXELS = 1.5 * 2 ** 20, OVERVIEW = 2 ** 19, GRID = 256;
 
 const partKey = (part) => part ? ` ${part.x} ${part.y} ${part.width} ${part.height}` : '';
 
-/** The displayed part of a slice between two voxels, rounded to whole squares; null if the slice is small. */
+/** The part of a slice between two voxels, enlarged to whole squares of pixels; null, for the whole slice, if it has at most MAX_PIXELS. */
 function partOf([across, rows], step, [x0, y0], [x1, y1]) {
   const width = Math.ceil(across / step), height = Math.ceil(rows / step);
   if (width * height <= MAX_PIXELS) return null;
@@ -51,7 +51,7 @@ export class SliceStore {
     return slice;
   }
 
-  /** The whole slice, or the finest one that is cached; null if there is none. */
+  /** The cached whole slice with this step, otherwise the cached one with the smallest step; null if there is none. */
   best(axis, at, step) {
     const own = this.get(axis, at, step);
     if (own) return own;
@@ -69,7 +69,7 @@ export class SliceStore {
     return null;
   }
 
-  /** A cached part of that slice that overlaps with this one. */
+  /** The cached part `part` of a slice, otherwise a cached part that overlaps with it, or null. */
   partial(axis, at, step, part) {
     const own = this.get(axis, at, step, part);
     if (own) return own;
@@ -81,7 +81,7 @@ export class SliceStore {
 
   hasFailed(axis, at, step, part = null) { return this.failed.has(this.key({axis, at, step, part})); }
 
-  /** The step at which a slice is small, for display until the full slice has been received. */
+  /** A step at which the slice has few pixels, so that it arrives soon and can be displayed until the requested slice has been received. */
   coarse(axis, step, most = OVERVIEW) {
     const [right, down] = this.space.planeAxes(axis), {size} = this.space;
     let coarse = step * 2;
@@ -92,7 +92,8 @@ export class SliceStore {
   /** Requests a slice or a part of it and, in the direction of travel, the next ones. */
   want(axis, at, step, direction, part = null) {
     const own = {axis, at, step, part}, list = [own];
-    // For chunks, which have to be decompressed, a coarse slice arrives first; a part is always shown on top of a whole slice.
+    // If the image is in chunks, which have to be decompressed, a coarse slice is requested first, because it arrives
+    // sooner. It is also requested before a part, because a part is always displayed on top of a whole slice.
     const coarse = part ? this.coarse(axis, step) : 4 * step;
     if ((part || (this.image.in_chunks && !this.has(own))) && coarse <= MAX_STEP && !this.best(axis, at, step)) list.unshift({axis, at, step: coarse, part: null});
     this.wanted[axis] = list.filter((one) => !this.has(one) && !this.failed.has(this.key(one)));
@@ -106,7 +107,7 @@ export class SliceStore {
     this.work();
   }
 
-  /** Cancels requests for slices that are far from the displayed one, or of another zoom. */
+  /** Cancels requests for slices of this axis that are far from the displayed one, or that were made for another zoom. */
   dropStale({axis, at, step, part}) {
     const near = 2 * AHEAD * this.thickness(axis, step);
     for (const [key, {of, controller}] of this.underWay) {
@@ -141,7 +142,7 @@ export class SliceStore {
   work() {
     while (this.underWay.size < MAX_CONCURRENT) {
       const list = this.wanted.find((one) => one.length > 0);
-      // One request is kept free for the slice that is displayed next.
+      // Fetching ahead leaves one of the concurrent requests free for a slice that has to be displayed.
       if (!list && this.underWay.size >= MAX_CONCURRENT - 1) return;
       const next = list ? list.shift() : this.ahead.shift();
       if (!next) return;

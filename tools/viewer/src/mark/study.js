@@ -4,7 +4,7 @@ import {referenceOf} from './queue.js';
 
 const OF_A_SURFACE = ['triangles', 'volume', 'area', 'extent', 'mean', 'sd', 'expected', 'warnings'];
 
-/** While a surface is recomputed, and if that failed, the figures of the existing one stay. */
+/** The new result of a structure. While its surface is recomputed, or if that failed, the figures of the existing surface are kept. */
 function merged(before, result) {
   if (!before || !result || !['working', 'failed'].includes(result.stage) || before.stage === 'empty') return result;
   return {...result, ...Object.fromEntries(OF_A_SURFACE.filter((name) => before[name] !== undefined).map((name) => [name, before[name]]))};
@@ -59,7 +59,7 @@ export class Study {
 
   takePatch(patch) {
     if (patch.seq <= this.seq) return;
-    if (patch.seq !== this.seq + 1) return this.emit('gap');  // a message was lost: only a complete state helps
+    if (patch.seq !== this.seq + 1) return this.emit('gap');  // a message was lost: the page reconnects to get a complete state
     Object.assign(this, {seq: patch.seq, canUndo: patch.can_undo, canRedo: patch.can_redo, options: patch.options ?? this.options});
     const known = new Map(this.confirmed.map((s) => [s.id, s]));
     for (const s of patch.structures) known.set(s.id, {...s, result: merged(known.get(s.id)?.result, s.result)});
@@ -116,7 +116,7 @@ export class Study {
     this.dropOrphans();
   }
 
-  /** Removes actions on objects that were refused, or do not exist any more. */
+  /** Removes actions on objects that do not exist, because the server refused to make them, or because they were removed. */
   dropOrphans() {
     for (let orphans = this.queue.orphans(); orphans.length > 0; orphans = this.queue.orphans()) {
       for (const orphan of orphans) this.queue.remove(orphan);
@@ -127,7 +127,8 @@ export class Study {
   refold() {
     const taken = new Set(this.ids.values());
     this.guesses.clear();
-    // A structure may already exist, although its ID has not been reported yet: its marks are shown in it.
+    // A structure that this page has added may already be in the state although its ID has not been reported. Its ID is
+    // then estimated by madeBy(), so that pending marks appear in this structure.
     for (const {action, sentOn} of this.queue.items)
       if (action.do === 'add_structure' && sentOn > 0) this.guesses.set(referenceOf(action.key), madeBy(action, this.confirmed, taken));
     this.structures = fold(this.confirmed, this.queue.items.map(({action}) => action), (id) => this.resolve(id));

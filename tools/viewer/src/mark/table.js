@@ -24,7 +24,7 @@ export function tableSheet(app) {
     if (!dialog.open) return;
     const value = COLUMNS[order.by][1], of = (s) => value(s, s.result ?? {});
     const rows = [...study.structures];
-    // Unknown values come last in both orders.
+    // Unknown values come last in ascending and in descending order.
     if (!order.isNatural) rows.sort((a, b) => {
       const [x, y] = [of(a), of(b)], isKnown = (v) => v !== undefined && v !== null;
       if (!isKnown(x) || !isKnown(y)) return isKnown(y) - isKnown(x);

@@ -8,7 +8,7 @@ export class Timing {
     addEventListener('pointerup', (event) => { this.pointer = event.timeStamp; }, true);
   }
 
-  /** The outline of a surface was drawn for the first time: it becomes visible with the next frame. */
+  /** Called when the outline of a surface was drawn for the first time. It becomes visible with the browser's next frame, whose time is recorded. */
   drawn({id, version, seq, stage}) {
     const {pointer} = this;
     this.lastShown = performance.now();

@@ -9,7 +9,7 @@ export const TOOLS = [...MARK_TOOLS.slice(0, 3), OUTLINE, ...BRUSHES, ...MARK_TO
 const COLORS = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68], [102, 204, 238], [170, 51, 119], [238, 119, 51],
   [0, 153, 136], [136, 34, 85], [153, 153, 51], [51, 34, 136], [187, 187, 187]];
 
-/** Removes corners within `most` of the line between their neighbours. */
+/** Simplifies a line (Douglas and Peucker): removes corners that are at most `most` away from the simplified line. */
 function thinned(places, most) {
   if (places.length < 3) return places;
   const [a, b] = [places[0], places[places.length - 1]], dx = b[0] - a[0], dy = b[1] - a[1], length = Math.hypot(dx, dy);
@@ -83,7 +83,7 @@ export class Tools extends MarkTools {
     return true;
   }
 
-  /** `fine` is the size of a pixel in voxels: smaller details are removed. */
+  /** Finishes the outline that is being drawn. `fine` is the size of a pixel in voxels: details smaller than half of it are removed. */
   closeDraft(closed, fine = 0) {
     const draft = this.state.get('draft');
     if (!draft) return false;

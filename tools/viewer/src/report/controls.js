@@ -29,7 +29,7 @@ function legend(data, name) {
   return [el('span', {}, number(low, 3)), bar, el('span', {}, `${number(high, 3)}${unit}`)];
 }
 
-/** The position of the cut, on a page without planes that show it. */
+/** A slider for the position of the cut, for a page without planes, on which it could not be moved otherwise. */
 function cutPlace({state, space}) {
   const slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': 'place of the cut', oninput: () => state.set({slices: state.get('slices').map((at, axis) => axis === state.get('cut') ? Number(slider.value) : at)})});
   const row = el('label', {}, el('span', {}, 'cut at'), slider), update = () => {
@@ -78,7 +78,7 @@ export function suggestedPlaces(data) {
   return data.structures.flatMap((structure, n) => (structure.evidence?.suggestions ?? []).map((place) => ({id: n + 1, structure, ...place})));
 }
 
-/** A click goes to the suggested position. */
+/** The list of suggested slices; a click on one goes to the suggested position. */
 export function suggestionList({data, state, goTo}) {
   const items = suggestedPlaces(data), unit = data.unitText ? `\u2009${data.unitText}\u00b2` : '';
   if (items.length === 0) return null;

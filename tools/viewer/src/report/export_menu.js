@@ -17,7 +17,8 @@ export function exportMenu({study, data, space}, saveTable) {
       const whole = data.structures[own.id - 1], isThinned = whole.markCount > study.given.get(own.id), items = [];
       for (const [kind, what, flag] of KINDS) {
         const marks = own.marks.filter((m) => m.kind === kind), set = marks.filter((m) => m.isNew);
-        // If there are very many marks, the page contains only some: a file with these would be incomplete.
+        // If there are very many marks, the page contains only some of them (isThinned). No file of all marks is then
+        // offered, because it would be incomplete.
         if (marks.length > 0 && !(isThinned && kind === 'surface')) items.push(file(own, marks, what, flag));
         if (set.length > 0 && (set.length < marks.length || isThinned)) items.push(file(own, set, `new_${what}`, flag));
       }

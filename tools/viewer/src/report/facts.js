@@ -11,7 +11,7 @@ function section(title, note, ...content) {
   return el('section', {class: 'card'}, el('h2', {}, title), note ? el('p', {class: 'note'}, note) : null, ...content);
 }
 
-/** The parts of a report for each structure. */
+/** The part of the run's report that belongs to each structure of the page: {structure, facts}. */
 export function structureFacts(data) {
   const list = Array.isArray(data.facts.structures) ? data.facts.structures : [];
   return data.structures.map((structure, n) => ({structure, facts: list.find((f) => f.name === structure.name) ?? list[n] ?? data.facts}));
@@ -72,7 +72,7 @@ function optionRows(facts, data) {
   const isGiven = (name) => given.has(name) || given.has(name.replace(/_/g, '-'));
   for (const name of new Set([...Object.keys(automatic), ...Object.keys(resolved)])) {
     const reason = automatic[name], value = name in resolved ? text(resolved[name]) : '';
-    if (value === '\u2013' && !reason) continue;  // not needed, and therefore not chosen
+    if (value === '\u2013' && !reason) continue;  // the run did not need this option, so that no value was chosen
     rows.push({name: name.replace(/_/g, ' '), value, how: isGiven(name) && name in resolved ? 'given' : reason ? 'automatic' : 'default', reason: reason ?? ''});
   }
   const rank = {automatic: 0, given: 1, default: 2};
@@ -167,7 +167,7 @@ function provenance(data) {
   return [pairs(rows), el('div', {class: 'command'}, code, copy)];
 }
 
-/** Everything below the views. */
+/** The elements below the views: tables, bars and curves, for all structures. */
 export function factsOf(data) {
   const all = structureFacts(data), seconds = data.facts.seconds ?? {};
   const bars = timeBars(seconds), curves = convergenceOf(all);

@@ -2,7 +2,7 @@
 import {el} from '../dom.js';
 
 const quoted = (cell) => {
-  const text = String(cell ?? ''), isFormula = typeof cell === 'string' && /^[=+\-@\t\r]/.test(text);  // a spreadsheet must not interpret a name as a formula
+  const text = String(cell ?? ''), isFormula = typeof cell === 'string' && /^[=+\-@\t\r]/.test(text);  // quoted with ', so that a spreadsheet does not interpret it
   return /[",\n\r]/.test(text) || isFormula ? `"${(isFormula ? `'${text}` : text).replace(/"/g, '""')}"` : text;
 };
 

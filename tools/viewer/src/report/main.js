@@ -1,4 +1,5 @@
-// The page of covol report: the image in three planes, surfaces and marks, and the figures of the run. It needs no server.
+// The page of covol report: the image in three planes, surfaces and marks, and the figures of the run. It needs no
+// server.
 import {barButton, historyButtons, suggestButtons, toolChoice, windowMenu} from '../bar.js';
 import {colorings} from '../colors.js';
 import {el, unitText} from '../dom.js';
@@ -32,7 +33,7 @@ import {ReportScene} from './scene.js';
 import {saveTable, structureTable} from './table.js';
 import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
-const MAX_MARKS = 10000;  // more marks are hidden at first, because they would hide the surface
+const MAX_MARKS = 10000;  // if there are more, marks are hidden at first, because they would hide the surface
 const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity', 'oblique'];
 
 const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
@@ -56,7 +57,8 @@ function appOf(data, digest) {
   const base = data.origin ?? [0, 0, 0], volume = data.image ? new Volume(data.image, base) : null, space = volume ?? spaceAround(data.structures, base);
   const {black, white} = data.image ?? {black: 0, white: 1}, image = {black, white, low: black, high: white, anatomical: data.anatomical};
   for (const structure of data.structures) Object.assign(structure, {index: indexCoordinates(structure.positions, space), isShown: true});
-  // All frames of a time-lapse share their view.
+  // All pages of a time-lapse store their view under the same name, that of the first page, so that they have the same
+  // view.
   const view = new Store(`covol-report/${data.frames ? `${location.pathname.replace(/[^/]*$/, '')}${data.frames.pages[0]}` : digest}`, () => sessionStorage), kept = Object.fromEntries(KEPT.map((name) => [name, view.get(name)]));
   const state = firstState(image, space, data, kept), study = new LocalStudy(data.structures, new Store(`covol-report/${digest}`)), toasts = new Toasts();
   const app = {data, image, volume, space, unitText: data.unitText, state, study, toasts, kept: view, panels: [], slices: volume && new VolumeSlices(volume),

@@ -8,7 +8,7 @@ import {codesOf} from './volume_plane.js';
 export class ReportScene extends ObliqueScene {
   constructor(canvas, app) {
     super(canvas, app);
-    this.patience = 0;  // on this page marks do not change the surface
+    this.patience = 0;  // ms; changed marks are shown at once, because no new surface follows from them on this page
     if (app.panels.length === 0) this.frame.visible = false;  // there is no image whose frame could be drawn
     if (app.volume) this.addOblique(codesOf(app.volume));
     this.look(EYE, true);

@@ -46,7 +46,7 @@ export function structureTable(app) {
     sorted.isUp = sorted.by === key ? !sorted.isUp : key === 'name';
     sorted.by = key;
     const [, , , value] = columns.find(([name]) => name === key), sign = sorted.isUp ? 1 : -1;
-    // Unknown values come last in both orders.
+    // Unknown values come last in ascending and in descending order.
     const order = [...lines].sort(({r: a}, {r: b}) => value(a) === value(b) ? a.id - b.id : value(a) === null ? 1 : value(b) === null ? -1 : sign * (value(a) < value(b) ? -1 : 1));
     body.replaceChildren(...order.map(({line}) => line));
     heads.forEach((head, n) => head.setAttribute('aria-sort', columns[n][0] === key ? sorted.isUp ? 'ascending' : 'descending' : 'none'));

@@ -1,7 +1,7 @@
 // The image of a page: slices are decoded into one array of bytes, which can be sliced along any axis.
 import {ImageSpace} from '../space.js';
 
-const FULL = 257;  // factor from 8 to 16 bits
+const FULL = 257;  // factor that maps 8-bit values to 16 bits: 255 to 65535
 
 export class Volume extends ImageSpace {
   /** `image` is the page's image, `base` the position in the world that its coordinates are relative to. */
@@ -35,7 +35,7 @@ export class Volume extends ImageSpace {
     this.jpegs[k] = null;
   }
 
-  /** Decodes all slices, beginning at the position that `wanted()` returns. `tell` is called with the progress. */
+  /** Decodes all slices, always next the one nearest to the position that `wanted()` returns. `tell` is called repeatedly. */
   async decodeAll(wanted, tell) {
     const left = Array.from({length: this.size[2]}, (_, k) => k).filter((k) => !this.decoded[k]);
     let last = performance.now();
@@ -60,7 +60,7 @@ export class Volume extends ImageSpace {
   }
 }
 
-/** The slices for the planes: decoded ones are complete and in full detail, and the others follow automatically. */
+/** The slices for the planes, with the interface of SliceStore. They need not be requested: decodeAll() decodes all slices. */
 export class VolumeSlices {
   constructor(volume) { Object.assign(this, {volume, kept: [null, null, null]}); }
 
@@ -81,7 +81,7 @@ export class VolumeSlices {
   /** Called when more of the image has been decoded. */
   forget() { this.kept = [null, null, null]; }
 
-  /** JPEGs of 8 bits represent a value to within some percent. */
+  /** The value of a voxel. It is never exact: JPEGs of 8 bits reproduce values to within some percent. */
   valueAt([i, j, k], {low, high}) {
     const {volume} = this, [nx, ny] = volume.size;
     return volume.decoded[k] ? {value: low + volume.data[(k * ny + j) * nx + i] / 255 * (high - low), isExact: false} : null;

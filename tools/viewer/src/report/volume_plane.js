@@ -9,7 +9,7 @@ function sample({data, size: [nx, ny, nz]}, i, j, k) {
   return layer(n) * (1 - (z - c)) + layer(n + dz) * (z - c);
 }
 
-/** For an ObliquePlane. */
+/** Returns a function that an ObliquePlane calls for its codes. */
 export function codesOf(volume) {
   return Object.assign(({first, alongX, alongY, count}) => {
     const codes = new Uint16Array(count * count);

@@ -9,9 +9,10 @@
 #include "io/points/point_text.h"
 #include "io/xml.h"
 
-// Layout: WriteXML.java of Fiji's plugin Cell Counter. MarkerX and MarkerY are pixels, counted from 0. MarkerZ is the
-// number of the plane in the stack, counted from 1: in a hyperstack, channels vary fastest, then slices, then time
-// points. BrainGlobe's cellfinder writes the same tags with slices from 0; its files name the image placeholder.tif.
+// The format is defined by WriteXML.java of Fiji's plugin Cell Counter. MarkerX and MarkerY are pixels, counted from 0.
+// MarkerZ is the number of the plane in the stack, counted from 1: in a hyperstack, channels vary fastest, then slices,
+// then time points. BrainGlobe's cellfinder writes the same tags but counts slices from 0; its files are recognized by
+// the name of the image, placeholder.tif.
 namespace covol::detail {
 namespace {
 
@@ -49,7 +50,7 @@ public:
                 open(tag.name, tags);
             if (tag.empty) close(tag.name);
         }
-        // At a syntax error, the tag is the one with the error.
+        // After a syntax error, `tag` is the tag with the error.
         if (in_name_ && !tag.closing && tag.name != "Name") refuse_name();
         if (!is_complete) fail(path_, "damaged or truncated: " + quote(kRoot) + " has no end");
     }
@@ -121,9 +122,10 @@ private:
     std::string type_;  ///< name of the current type of markers; without a name, "Type 1" as in the plugin
     bool in_name_ = false, in_marker_ = false;
     std::array<std::optional<double>, 3> at_{};
-    std::string slice_;  ///< MarkerZ as written
+    std::string slice_;  ///< MarkerZ of the current marker, as in the file
     bool has_markers_ = false;
-    int types_ = 0;  ///< number of types with markers; the plugin also writes types without any
+    /// Number of types of markers that occur; the plugin also writes types without markers, which are not counted.
+    int types_ = 0;
 };
 
 }  // namespace

@@ -52,7 +52,7 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
     PointTable table;
     Words words(path, text);
     if (words.next("CSLC") != "CSLC") fail(path, "expected the header CSLC of sections in planes");
-    // No count exceeds the size of the file, which needs at least two bytes for each item.
+    // A count that exceeds the size of the file in bytes is invalid, because each item needs at least two bytes.
     const std::size_t maximum = text.size();
     const std::size_t planes = words.count("the number of planes", 0, maximum);
     const std::size_t labels = words.count("the number of labels", 1, maximum);

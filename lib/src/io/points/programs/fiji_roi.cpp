@@ -8,16 +8,17 @@
 #include "io/points/point_text.h"
 #include "io/points/programs/zip.h"
 
-// Layout and meaning: ij/io/RoiDecoder.java and ij/gui/PointRoi.java of ImageJ 1.54.
+// The format is defined by ij/io/RoiDecoder.java and ij/gui/PointRoi.java of ImageJ 1.54.
 //
-// Coordinates of area outlines refer to the corners of pixels, those of lines and points to their centres
-// (Roi.useLineSubpixelConvention()), so half a pixel is subtracted from those of areas. Slices count from 1.
+// In coordinates of area outlines, integers are corners of pixels; in those of lines and points, integers are centres
+// (Roi.useLineSubpixelConvention()). Half a pixel is therefore subtracted from the coordinates of areas. Slices count
+// from 1.
 namespace covol::detail {
 namespace {
 
 enum Type { kPolygon, kRectangle, kOval, kLine, kFreeLine, kPolyline, kNothing, kFreehand, kTraced, kAngle, kPoint };
 enum Subtype { kText = 1, kImage = 4 };
-constexpr int kSubPixel = 128;  // a bit of the options
+constexpr int kSubPixel = 128;  // bit of the options: the file has coordinates with fractions of pixels
 constexpr std::uint64_t kHeader = 64;
 
 const char* name_of(int type) {
@@ -81,11 +82,12 @@ private:
         if (offset == 0 || length == 0) return;
         const std::string_view text = bytes_.part(offset, 2 * std::uint64_t(length));
         name_.clear();
-        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; other characters than ASCII become "?"
+        for (std::size_t n = 1; n < text.size(); n += 2)  // UTF-16; characters other than ASCII become "?"
             name_ += text[n - 1] == 0 && static_cast<unsigned char>(text[n]) < 128 ? text[n] : '?';
     }
 
-    /// A 16-bit coordinate, as ImageJ's getShort() reads it: values below -5000 are large coordinates that overflowed.
+    /// A 16-bit coordinate, as ImageJ's getShort() reads it: values below -5000 are positive coordinates above 32767
+    /// that have overflowed.
     [[nodiscard]] double coordinate(std::uint64_t offset) const {
         const int value = bytes_.at<std::int16_t>(offset);
         return value < -5000 ? value + 65536 : value;
@@ -97,8 +99,9 @@ private:
         return value;
     }
 
-    /// The slice of the ROI, counted from 0; nothing if it is on all slices. It is stored as the z of a hyperstack, as
-    /// the position in a stack, or in the name that the ROI Manager assigned ("0012-0100-0200": slice, y, x).
+    /// The slice of the ROI, counted from 0; nothing if the ROI is on all slices. The slice is stored as the z of a
+    /// hyperstack, as the position in a stack, or in the name that the ROI Manager assigned ("0012-0100-0200": slice,
+    /// y, x).
     [[nodiscard]] std::optional<double> slice() const {
         if (second_ != 0) {
             const int channel = bytes_.at<std::int32_t>(second_ + 4), z = bytes_.at<std::int32_t>(second_ + 8),
@@ -201,7 +204,7 @@ private:
         };
         for (std::uint64_t n = 0; n < count;) {
             const double segment = real(kHeader + 4 * n++);
-            if (segment == 4) continue;  // "close" has no effect: all outlines are closed
+            if (segment == 4) continue;  // the segment type "close" is ignored, because all outlines are closed
             if (segment != 0 && segment != 1 && segment != 2 && segment != 3)
                 fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " +
                                 std::to_string(segment));

@@ -1,4 +1,4 @@
-// RT structure sets of DICOM: PS3.3 A.19.
+// Reads RT structure sets of DICOM: PS3.3 A.19.
 #include <cmath>
 #include <map>
 #include <optional>

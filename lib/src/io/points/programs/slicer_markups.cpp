@@ -63,7 +63,8 @@ PointTable read_markups(const std::string& path, const Json& file, const std::st
         const std::string type = markup.value("type", "Fiducial");
         auto [points, labels] = control_points(path, markup);
         if (points.empty() || type == "ROI" || type == "Plane") continue;
-        // Slicer's default is LPS. If a file has both systems, points are converted to the first one.
+        // Slicer's default is LPS. If a file has both systems, all points are converted to the first system in the
+        // file.
         const PointSpace space = to_space(path, markup.value("coordinateSystem", "LPS"));
         if (table.space == PointSpace::Unstated) table.space = space;
         if (space != table.space) turn(points);
@@ -100,7 +101,7 @@ PointTable parse_markups(const std::string& path, const std::string& text, const
 PointTable parse_fcsv(const std::string& path, const std::string& text, const std::string& structures_by) {
     PointTable table;
     table.order = PointOrder::XYZ;
-    std::string system = "RAS";  // for files that state no system, as written before Slicer 4.11
+    std::string system = "RAS";  // the system of files that state none, which Slicer wrote before version 4.11
     bool stated = false;
     std::array<std::size_t, 3> at{1, 2, 3};
     std::size_t label = 11;  // index of the column with labels, unless the file names the columns
@@ -161,7 +162,7 @@ PointTable parse_landmarks(const std::string& path, const std::string& text) {
     while (lines.next_words(line, fields)) {
         if (fields.size() < 4)
             fail(path, lines.number(), "expected x y z and a label, or a label and x y z, got " + quote(line));
-        // If the first field is a number, it is x: the label is then at the end, if there is one.
+        // If the first field is a number, it is x, and a label follows z. Otherwise the first field is the label.
         const std::size_t first = to_number(fields[0]) ? 0 : 1;
         Vec3 point;
         for (std::size_t a = 0; a < 3; ++a) point[a] = to_coordinate(path, lines.number(), fields[first + a]);

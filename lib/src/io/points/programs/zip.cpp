@@ -5,14 +5,15 @@
 #include "covol/error.h"
 #include "io/points/bytes.h"
 
-// Layout: PKWARE's APPNOTE.TXT 6.3, sections 4.3.7, 4.3.12 and 4.3.16.
+// The format is defined by PKWARE's APPNOTE.TXT 6.3, sections 4.3.7, 4.3.12 and 4.3.16.
 namespace covol::detail {
 namespace {
 
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEntrySignature = 0x02014b50, kLocalSignature = 0x04034b50;
 constexpr std::uint64_t kEndSize = 22, kEntrySize = 46, kLocalSize = 30;
-constexpr std::uint64_t kLargestRatio = 1032;  // maximum ratio of Deflate
-// Limits for the unpacked size of the archive. ROIs are usually compressed to between a half and a tenth of their size.
+constexpr std::uint64_t kLargestRatio = 1032;  // maximum ratio of unpacked to packed bytes in Deflate
+// Limits for the unpacked size of the archive: a multiple of its own size, and a number of bytes that is always allowed
+// in addition. ROIs are usually compressed to between a half and a tenth of their size.
 constexpr std::uint64_t kLargestArchiveRatio = 16, kAlwaysAllowed = std::uint64_t(16) << 20;
 
 struct Entry {
@@ -60,7 +61,7 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
     return content;
 }
 
-/// The compressed bytes of an entry, after checking that they can hold its claimed size.
+/// The compressed bytes of an entry, after checking that the entry's stated size is possible for so many bytes.
 std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
         throw Error(Errc::Unsupported, path + ": entry " + quote(entry.name) + " is " + what);
@@ -101,7 +102,8 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
     for (int n = 0; n < count; ++n) {
         const Entry entry = read_entry(bytes, at, path);
         at += kEntrySize + entry.name.size() + bytes.at<std::uint16_t>(at + 30) + bytes.at<std::uint16_t>(at + 32);
-        // In archive bombs, entries overlap so that a small archive expands to a huge one.
+        // In archive bombs, entries overlap, so that a small archive expands to huge contents. The sum of the packed
+        // sizes then exceeds the size of the archive.
         total += entry.packed;
         if (total > bytes.size()) fail(path, "the archive's entries overlap");
         if (!wanted(entry.name)) continue;
