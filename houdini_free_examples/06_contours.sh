@@ -14,7 +14,8 @@ echo "== making the stack, its truth and the outlines"
 import sys
 import numpy as np, tifffile
 out, pixel, step, center = sys.argv[1], 0.5, 1.0, np.array((27.0, 25.0, 22.0))
-shapes = {"core": (8, 0.15, 3), "layer": (16, 0.1, 2)}  # radius, height and number of bumps
+# For each border: radius in um, height of its bumps divided by the radius, and number of bumps around the z axis.
+shapes = {"core": (8, 0.15, 3), "layer": (16, 0.1, 2)}
 def radius(name, azimuth, up):  # distance of the border from the centre in a direction; up: cosine of the angle to the z axis
     size, bump, count = shapes[name]
     return size * (1 + bump * np.cos(count * azimuth + 4 * up) * (1 - up ** 2))
@@ -33,7 +34,7 @@ def outline(name, slice):
     azimuth, s = np.meshgrid(np.arange(0, 2 * np.pi, np.pi / 12), np.arange(0.01, 25, 0.01), indexing="ij")
     r = np.hypot(s, step * slice - center[2])
     inside = r < radius(name, azimuth, (step * slice - center[2]) / r)
-    if not inside[:, 0].all(): return []  # the slice does not meet the border
+    if not inside[:, 0].all(): return []  # the slice passes above or below the border: no outline
     turn, s = azimuth[:, 0], 0.01 * inside.sum(axis=1)
     return (np.stack([np.cos(turn), np.sin(turn)], 1) * s[:, None] + center[:2]) / pixel + random.normal(0, 0.4, (24, 2))
 for name, borders in (("core", ["core"]), ("layer", ["layer", "core"])):  # the outline of the core is the inner border of the layer, a hole

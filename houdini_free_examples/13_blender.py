@@ -22,7 +22,7 @@ from mathutils.bvhtree import BVHTree
 if "bool" not in vars(np):
     np.bool = bool
 
-MESH_TOLERANCE = 1e-5  # relative to the largest side: PLY and GLB have the same single-precision numbers
+MESH_TOLERANCE = 1e-5  # of the largest side, between PLY and GLB vertices: both have the same single-precision numbers
 BOX_TOLERANCE = 0.5    # voxels, between the bounding boxes of a volume's surface and of the mesh
 MEAN_TOLERANCE = 0.1   # voxels, mean distance of a level set's surface from the mesh
 NORMAL_TOLERANCE = 1   # degrees, between the normals in the .glb file and those that Blender computes from the triangles
@@ -206,7 +206,7 @@ def render(path, size, ply, volume, low, high):
     half.data.materials.append(surface_material((0.10, 0.36, 0.50)))
     half.matrix_world = home
     volume.matrix_world = home @ volume.matrix_world
-    volume.data.render.space = "WORLD"  # emission per metre, not per micrometre
+    volume.data.render.space = "WORLD"  # emission per metre of the scaled scene, not per micrometre of the object
     volume.data.materials.append(volume_material((1.0, 0.42, 0.12), low, high))
 
     world = bpy.data.worlds.new("world")

@@ -14,7 +14,7 @@ packages=(
   libinsighttoolkit5-dev libtiff-dev libpng-dev libturbojpeg0-dev libzstd-dev liblz4-dev libhdf5-dev
   # command line, reports, the Python module, packages
   libcli11-dev nlohmann-json3-dev libxxhash-dev pybind11-dev python3-dev dpkg-dev file patchelf
-  # tests: other programs that read covol's files
+  # tests, and other programs that read covol's files
   catch2 libopenvdb-tools libnanovdb-tools python3-vtk9 python3-meshio python3 python3-openvdb python3-numpy python3-tifffile
   python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py python3-pil
   python3-pytest python3-yaml xxhash pkgconf lintian groff-base man-db fish zsh

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Runs the unit and property tests under the address and undefined-behaviour sanitizers.
 #
-#   bash tests/sanitizers.sh [WORDS FOR CTEST ...]   all of them, and the lines of lib/ that they reach: an hour and more
-#   bash tests/sanitizers.sh --quick                 the programs that take less than 20 s (tests/CMakeLists.txt): for CI
+#   bash tests/sanitizers.sh [WORDS FOR CTEST ...]  all of them, and the lines of lib/ that they reach: an hour and more
+#   bash tests/sanitizers.sh --quick                the programs that take less than 20 s (tests/CMakeLists.txt): for CI
 #
 # The quick pass leaves out the checks of pointer dereferences, which take a third of the compile time, because the
 # address sanitizer finds most of these errors, too. Leaks are detected, except for those of two libraries with damaged

@@ -43,14 +43,17 @@ import scenes  # noqa: E402
 import shapes  # noqa: E402
 
 MAX_SECONDS = 120   # of processor time per job; a job that takes longer fails
-NOTICEABLE = 0.05   # a case is better or worse if its error changes by this fraction of itself, and by MINIMUM[panel]
-MINIMUM = {"clouds": 0, "scans": 1, "marks": 0.2, "jobs": 0.1}  # minimum change, in percentage points
+# A case counts as better or worse if its error changes by more than this fraction of itself, and by more than
+# MINIMUM[panel].
+NOTICEABLE = 0.05
+MINIMUM = {"clouds": 0, "scans": 1, "marks": 0.2, "jobs": 0.1}  # in percentage points
 NOISES = (0, 0.25, 1)
 SCENE_FRACTION = 0.4  # fraction of the numbers of points in scenes.SCENES that is used, to save time
-# name: genus of the true surface.
+# The cases of the panel `scans`: {name of the scan: genus of the true surface}.
 SCANNED = {"apc_rawlings_baseball": 0, "apc_scotch_duct_tape": 1, "apc_fitness_gear_3lb_dumbbell": 0, "apc_cloud_b_plush_bear": 0}
 BALL = "apc_rawlings_baseball", (-0.0003, -0.0014, 0.0049), 0.0355  # name, centre and radius of the ball, in metres
-# name: (the mechanism, the value of COVOL_SCALE that switches it off, the panels that may use it)
+# Mechanisms of covol, each of which is switched off in turn: {name for --only: (description, value of COVOL_SCALE that
+# switches it off, panels with jobs that may use it)}.
 MECHANISMS = {
     "redraw": ("a guess is redrawn by the image", "inference.redraw_bits=1000", ("jobs",)),
     "iterations": ("the second iteration of guidance", "guidance.iterations=0.5", ("marks", "jobs")),

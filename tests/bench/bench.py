@@ -211,8 +211,8 @@ def part_sphere(bench):
     k = runs["covol, one level, tau = h", 1][0].report["edge"]["edge_k"]
     common = ("--image", image, "--radius", START_RADIUS, "--edge-k", k)
 
-    # The dense solver runs until it is steady in one octant only, and for 3 steps in the whole cube, for the time per
-    # step.
+    # The dense solver runs until it is steady in one octant only. In the whole cube it makes 3 steps, which measure the
+    # time per step.
     dense = [bench.programs / "bench_dense", *common, "--points", points]
     octant_mesh = bench.work / "octant.ply"
     octant = Run([*dense, "--octant", 1, "--mesh", octant_mesh, "--max-steps", 20 if bench.quick else 500]).json()
@@ -269,7 +269,8 @@ def part_sphere(bench):
     bench.write("sphere", [{"image": f"{size}^3"} | row for row in rows])
 
 
-# Weights of ITK's filter: of all that were tried on this phantom at 260^3, those with the smallest error on the shell.
+# Weights of ITK's filter: of all that were tried on the sphere phantom with 260^3 voxels, those with the smallest error
+# of the surface between the holes (shell_errors()).
 ITK = {"propagation": -0.03, "curvature": 1, "advection": 1}
 
 
@@ -375,7 +376,7 @@ def part_embryo(bench):
     for (job, threads), done in runs.items():
         run = best(done)
         voxels = run.report["grid"]["active_voxels"]
-        # Bytes for the level sets: without the image, at one byte per voxel.
+        # Peak memory in bytes, without the program's libraries (`idle`) and the image, which has one byte per voxel.
         held = run.peak - idle - (truth.size if image in jobs[job] else 0)
         rows.append({"job": job, "threads": threads, "seconds": run.wall, "cpu_seconds": run.cpu, "dice": dices[job],
                      "active_voxels": voxels, "peak_mib": run.peak / 2**20,

@@ -12,14 +12,14 @@ FIELD = re.compile(r"((?:    ///[^\n]*\n)*)    ([\w:]+) (\w+) =\s*(heuristic|lim
 class Heuristic:
     name: str      # STEP.FIELD, as in COVOL_SCALE
     value: float
-    text: str      # the value as it is written in heuristics.h
+    text: str      # the value of the constant as it is written in heuristics.h
     is_count: bool
     unit: str
     meaning: str
     folder: str
     step: str      # the comment of the struct, which describes the step
     problem: str   # what is wrong with the declaration; empty: nothing
-    is_limit: bool = False  # a limit of time or memory, which only larger inputs reach
+    is_limit: bool = False  # a limit of time or memory: only inputs that reach it have another result
 
     def scaled(self, factor):
         return max(1, int(self.value * factor + 0.5)) if self.is_count else self.value * factor

@@ -75,7 +75,7 @@ Cube& cube_of(int side) {
 SchemeConstants constants() {
     SchemeConstants c{};
     c.tau = c.theta = c.rho = 1;
-    c.curvature = 5;  // delta = 5 h, tau = h
+    c.curvature = 5;  // tau delta / h^2 for delta = 5 h and tau = h
     c.epsilon2 = 1e-4F;
     c.edge_epsilon2 = 4e-4F;
     return c;
@@ -120,8 +120,8 @@ struct Kernel {
 
 constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Fraction);
 constexpr Kernel kKernels[] = {
-    {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // read u, phi, edge; write u before, rows
-    {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // read u, u before, rows; write u
+    {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // read u, phi, edge; write the previous u, rows
+    {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // read u, the previous u, rows; write u
     {"relax_2", relax<2>, 2 * kFloat + kRows + kFloat},  {"mean_step", mean_step, 3 * kFloat},
     {"mean_gradient", mean_gradient, 2 * kFloat},        {"motion", motion, 2 * kFloat},
 };

@@ -28,13 +28,15 @@ from heuristics import SOURCE, read_heuristics
 CSV, PAGE = SOURCE / "tests/bench/results/heuristics.csv", SOURCE / "docs/heuristics.md"
 COLUMNS = ["name", "value", "factor", "job", "state", "error", "seconds"]
 MAX_SECONDS = 20  # of processor time per job; a job that takes longer fails
-CHECK = "local_fit.first_spacings=2"  # a change of COVOL_SCALE that changes the result of every cloud
-# sensitive: an error grows by this fraction, and by POINTS percentage points; fails: it grows by a factor of FAIL, and
-# by 1 percentage point.
+# A value of COVOL_SCALE that changes the result of every cloud, unless the build ignores COVOL_SCALE.
+CHECK = "local_fit.first_spacings=2"
+# Ratings of a constant that is halved or doubled. Sensitive: the error of a job grows by more than the fraction ABOVE
+# of itself, and by more than POINTS percentage points. Fails: a job fails, or its error becomes more than FAIL times as
+# large and grows by more than 1 percentage point.
 ABOVE, POINTS, FAIL = 0.1, 0.1, 3
 
 
-# ---- running --------------------------------------------------------------------------------------------------------------
+# ---- running -------------------------------------------------------------------------------------------------------
 
 class Runner:
     def __init__(self, covol, work):
@@ -120,7 +122,7 @@ def measure(options):
     shutil.rmtree(work)
 
 
-# ---- the page -------------------------------------------------------------------------------------------------------------
+# ---- the page ------------------------------------------------------------------------------------------------------
 
 def read_rows(path):
     return list(csv.DictReader(open(path))) if path.exists() else []

@@ -14,7 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent / "marks"))
 COUNT = 3000  # default number of points of a cloud
 
 
-# ---- clouds: f(p) is a distance near its surface, negative inside ------------------------------------------------------------
+# ---- clouds: f(p) is a distance near its surface, negative inside --------------------------------------------------
 
 def ball(center, radius):
     return lambda p: np.linalg.norm(p - np.array(center), axis=1) - radius
@@ -146,7 +146,7 @@ def cloud_error(folder, out, shape, part=None):
     return 100 * float(np.abs(SHAPES[shape](vertices)).mean() + missing.mean())
 
 
-# ---- phantoms ------------------------------------------------------------------------------------------------------------
+# ---- phantoms ------------------------------------------------------------------------------------------------------
 
 def read_nrrd(path):
     head, body = path.read_bytes().split(b"\n\n", 1)
@@ -201,17 +201,18 @@ def mask_error(folder, path, name):
     return 100 * (1 - 2 * float((truth & mask).sum()) / max(1, float(truth.sum() + mask.sum())))
 
 
-# ---- structures of real images: with COVOL_DATA ----------------------------------------------------------------------------
+# ---- structures of real images: with COVOL_DATA --------------------------------------------------------------------
 
-# The structures of the second row were not used to choose constants. Marks are drawn with another number (REAL_DRAW)
-# than those that were used for it.
+# The structures of the second row were not used to choose constants. The marks are of the draw REAL_DRAW, which was
+# not used for this purpose either.
 REAL = ("spinal cord", "ventricle", "left atrium", "hippocampus", "worm nucleus 59", "embryo nucleus 2",
         "caudate, right", "vertebra", "hippocampus, posterior", "mouse nucleus 395", "hippocampus 2", "thalamus")
 REAL_COUNTS = (60, 20)
 REAL_DRAW = 11
 
 
-# Number of marks; shift of the wrong ones along each axis, as a fraction of the extent of the marks.
+# For the jobs that compare right with wrong marks: number of marks, and shift of the wrong marks along each axis as a
+# fraction of the extent of the marks.
 DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4
 
 
@@ -260,7 +261,7 @@ def real_error(folder, out, structure):
     return 100 * (1 - truth.dice(tifffile.imread(out / "m.tif") > 0, np.load(folder / f"{structure}.npy")))
 
 
-# ---- jobs -----------------------------------------------------------------------------------------------------------------
+# ---- jobs ----------------------------------------------------------------------------------------------------------
 
 RECONSTRUCT = "reconstruct ../in/{} --init cloud -o s.vdb --mesh s.ply"
 MARKS = "segment ../in/p_{0}.nrrd --points ../in/p_{0}.csv -o s.vdb --mask m.nrrd"

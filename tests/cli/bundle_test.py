@@ -36,8 +36,8 @@ class Bundle(unittest.TestCase):
         cls.root = cls.work / packed.name.removesuffix(".tar.xz")
         cls.elf = [path for path in cls.root.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
         # ROS, conda and modules of clusters set LD_LIBRARY_PATH to folders with other versions of the same libraries.
-        # Here it
-# contains invalid files with the names of the bundle's libraries, so that a program that loads one of them fails.
+        # Here the folder contains invalid files with the names of the bundle's libraries, so that a program that loads
+        # one of them fails.
         poison = cls.work / "poison"
         poison.mkdir()
         for path in (cls.root / "lib").glob("*.so*"):

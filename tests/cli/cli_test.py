@@ -394,7 +394,8 @@ class Segment(Case):
         self.assertEqual(self.files(), ["s.vdb"])
 
     def test_memory_limit(self):
-        for _ in range(40):  # one message, from the memory guard or the reader; chance decides which
+        # Either the memory guard or the reader refuses the job, by chance. There is one message in both cases.
+        for _ in range(40):
             self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "20k", code=3,
                         expected_text="--memory-limit 20k")
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "1M",
@@ -407,7 +408,7 @@ class Segment(Case):
             with self.subTest(more):
                 line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, expected_text="GiB of memory")
                 fits = re.search(r"such as ([0-9.e-]+) ", line).group(1)
-        # The last of these jobs succeeds with the voxel size that the error message proposed.
+        # The last job of the loop succeeds with the voxel size that its error message proposed.
         report = self.report("reconstruct", self.points, "-o", "s.vdb", "--voxel-size", fits, *more[2:])
         self.assertTrue(report["surface"]["closed"])
         self.refuse_distance()

@@ -95,7 +95,8 @@ class Few(Clouds):
             self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.15)
 
     def test_so_few_that_the_tag_distance_has_to_be_given(self):
-        for seed in (3, 5, 6):  # with other seeds, the automatic tag distance suffices
+        # These clouds need a larger tag distance than the automatic one; those of other seeds do not.
+        for seed in (3, 5, 6):
             points = random_sphere(24, seed)
             advice = re.search(r"try (--tag-distance) ([0-9.]+)",
                                self.advice(points, "the points enclose nothing", "--model", "paper"))
@@ -278,13 +279,15 @@ class Many(Clouds):
         self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
 
     def test_from_the_air(self):
-        # The surface that closes the scan is larger than the scan and leaves the domain; no roof may be inverted by it.
+        # The surface that closes the scan is larger than the scan and leaves the domain. This must not turn any roof
+        # inside out.
         for seed in 1, 3:
             report = self.report(random_scan_from_the_air(5000, seed))
             self.assertIn("from every point", " ".join(report["warnings"]))
             self.assertTrue(report["surface"]["closed"])
             self.assertLessEqual(report["surface"]["components"], 1 + 9)  # the ground, and 9 roofs without walls
-            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # scan, surface below it, and walls
+            # The scan and the surface below it have an area of about 100^2 each; the rest is for walls.
+            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.25 * report["resolved"]["voxel_size"])
             self.assertLess(report["fit"]["marks_off"]["count"], 0.02 * 5000)
 
@@ -693,7 +696,8 @@ class Open(Clouds):
         self.check_layer([(0.02 * n, 0.0, 0.0) for n in range(500)], "lie on a line")
 
     def test_what_holds_no_surface_is_refused_at_once(self):
-        # Refused before tagging and the flow, which would need half a minute until the surface vanishes.
+        # Points on a line or in a plane are refused before tagging and the flow, in which the surface would vanish only
+        # after half a minute.
         draw = random.Random(2)
         line = [(0.002 * n, 0.001 * n, 0.0) for n in range(6000)]
         plane = [(draw.uniform(0, 10), draw.uniform(0, 10), 3.0) for _ in range(6000)]

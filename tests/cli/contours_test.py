@@ -125,8 +125,8 @@ class Bodies(ContoursCase):
         for step in (2, 4, 7):
             with self.subTest(step=step):
                 volume = self.volume(self.solid, "--contours", self.table(f"every_{step}.csv", ellipsoid(step)), "--rho", 0)
-                # step 7 leaves three slices. Between them the radius is a cubic with slope 0 at the equator, and thus
-                # 8.9 instead of 9.9 halfway.
+                # A step of 7 leaves outlines on three slices. Between them the radius is a cubic with slope 0 at the
+                # equator; halfway to the next outline it is thus 8.9 units of length instead of 9.9.
                 self.assertLess(abs(volume / ELLIPSOID - 1), 0.03 if step < 7 else 0.08)
 
     def test_the_image_helps_between_slices(self):
@@ -209,8 +209,8 @@ class Bodies(ContoursCase):
         self.assertLess(report["fit"]["points_to_surface"]["max"], 1)
 
     def test_a_thin_bright_body_is_no_line(self):
-        # The marks lie on the wall of a thin rod, not on a bright line. The position inside that is compared with a mark must
-        # not lie beyond the opposite wall, where the image is as dark as outside.
+        # The marks lie on the wall of a thin rod, not on a bright line. The position inside that is compared with a
+        # mark must not lie beyond the opposite wall, where the image is as dark as outside.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         image = self.inputs / "rod.nrrd"
         write_nrrd(image, 30 + 180 * np.clip((1 - np.hypot(x, y) / 2.2) * 2.2 / 0.5 + 0.5, 0, 1))
@@ -233,7 +233,8 @@ class Bodies(ContoursCase):
         whole = report["surface"]["volume"]
         cavity = self.report("segment", self.solid, "--contours", self.table("cavity.csv", ellipsoid() + inner), "-o", "c.vdb",
                              "--rho", 0, "--exterior-seed", seed)
-        # No tagging: the seed is in the cavity, outside the contours' body.
+        # The start is the body of the contours instead of tagging, because the exterior seed lies in the cavity, that
+        # is outside this body.
         self.assertTrue(cavity["automatic"]["start"].startswith("contours"))
         self.assertGreater(whole - cavity["surface"]["volume"], math.pi * 25 * 6 * SPACING[2])
         shell = self.report("segment", self.solid, "--contours", self.table("whole.csv", ellipsoid()), "-o", "t.vdb", "--rho", 0,
@@ -263,8 +264,8 @@ class Bodies(ContoursCase):
         self.assertGreater(volumes["bright-line"], volumes["slope"])
 
     def test_evidence_on_membranes(self):
-        # The image shows the membrane only above the centre. Below, nothing supports the surface between the outlines: the
-        # suggestion is expected there.
+        # The image shows the membrane only above the centre. Below, nothing supports the surface between the outlines.
+        # The suggested position for a further mark is expected there.
         x, y, z = (a - c for a, c in zip(world_lattice(), CENTRE_WORLD))
         r = np.sqrt((x / 11) ** 2 + (y / 11) ** 2 + (z / 12) ** 2)
         image = self.inputs / "faded.nrrd"

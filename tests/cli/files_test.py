@@ -108,7 +108,8 @@ class TwoFolders(Files):
             if code == 0:
                 break
             self.assertEqual(code, -signal.SIGKILL)
-            # A run that writes to one of the folders completes or discards the interrupted set of outputs in all of them.
+            # A run that writes to one of the folders completes or discards the interrupted set of outputs in all of
+            # them.
             self.run_covol(*PHANTOM, "-o", "abc"[call % 3] + "/next.nrrd")
             self.assertIn(self.state(), sets, f"killed before call {call}")
             new += sets.index(self.state()) != last

@@ -43,7 +43,8 @@ class Words(Case):
         self.assertIn("--report", lines[2])
         self.assertLessEqual(max(map(len, lines)), 100)
         self.assertNotIn("error", output)
-        self.refuse(code=2, expected_text="covol --help")  # without a terminal, as in a script, it is an error
+        # Without a terminal, as in a script, a missing command is an error.
+        self.refuse(code=2, expected_text="covol --help")
 
     def test_help_begins_with_what_to_do(self):
         text = self.run_covol("--help").stdout

@@ -256,7 +256,8 @@ class Plain(Case):
         cuts = [good[:len(good) * n // 8] for n in range(8)]
         places = np.concatenate([rng.integers(0, len(good), 8), rng.integers(0, 2048, 24)])
         flips = [good[:p] + bytes([good[p] ^ 1 << int(rng.integers(8))]) + good[p + 1:] for p in places]
-        # For some damaged headers, the HDF5 library keeps objects open, and once printed errors of its own at the end.
+        # For some damaged headers, the HDF5 library keeps objects open, and would print errors about them at the
+        # program's exit. Only messages of covol may be printed.
         header = [good[:p] + bytes([good[p] ^ 128]) + good[p + 1:] for p in range(800, 832)]
         for n, bad in enumerate(cuts + flips + header):
             self.path("bad.h5").write_bytes(bad)
@@ -341,7 +342,7 @@ class Imaris(Case):
                                           "/DataSet/ResolutionLevel 2: 8 x 5 x 3, spacing 2 x 2 x 8"])
         path = "a.ims:/DataSet/ResolutionLevel 1"
         info = self.info_of(path)
-        # The first voxel of this level covers two voxels along each axis; the origin is its centre.
+        # The first voxel of resolution level 1 covers two voxels of level 0 along each axis; the origin is its centre.
         self.assertEqual((info["spacing"], info["origin"]), ([1, 1, 4], [10.5, -19.5, 6]))
         self.check(path, means(data[1, 0]), "--channel", 0, "--frame", 1)
         self.check(path + "/TimePoint 1", means(data[1, 0]), "--channel", 0)

@@ -107,7 +107,7 @@ class OptionFiles(Case):
                          ["image", "points", "output", "mesh", "delta", "epsilon", "sigma", "up"])
 
     def test_a_file_of_an_earlier_version(self):
-        # Its comments contain descriptions of options that have changed since; they are ignored.
+        # The comments of this configuration are descriptions of options that have changed since. Comments are ignored.
         (self.out / "old.toml").write_text(
             '# covol 1.0.0, segment\n# Image and points together: the surface of a structure\n\n'
             '# 3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse\n'

@@ -411,7 +411,7 @@ class Options(Case):
         chosen = 0
         for what in ("delta", "tau", "sigma", "edge_k", "attraction_range"):
             pair = of_part["resolved"][what], of_whole["resolved"][what]
-            if pair != (None, None):  # None: the option was not needed
+            if pair != (None, None):  # None: neither job needed this option, so that no value was chosen
                 self.assertAlmostEqual(pair[0] / pair[1], 1, 3, what)
                 chosen += 1
         self.assertGreater(chosen, 2)

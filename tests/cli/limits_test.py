@@ -98,7 +98,8 @@ class ControlGroups(Limited):
                     code, _, text = self.peak(*words, "--quiet", preexec_fn=lambda: processes.write_text(str(os.getpid())))
                     self.assertEqual(code, 3, text)
                     self.assertIn("memory", text)
-                    if "voxel size" not in text:  # else refused for its voxel size, before allocation
+                    # A job may also be refused before it allocates memory, with the advice to use larger voxels.
+                    if "voxel size" not in text:
                         self.assertIn("control group", text)
                     self.assertEqual(self.files(), before)
             code, _, text = self.peak("info", "t.nrrd", preexec_fn=lambda: processes.write_text(str(os.getpid())))
@@ -343,8 +344,8 @@ class LargeImages(Limited):
         self.assertNotIn("estimate", self.run_covol("info", self.image).stdout)
 
     def test_plan_knows_of_mapped_pages(self):
-        # The bounds are wide because the system maps more pages at once if it has them in memory from an earlier run;
-        # docs/benchmarks.md states how accurate plans are.
+        # The bounds of `ratio` are wide, because the peak of memory depends on earlier runs: if the system still has
+        # pages of the image in memory, it maps more of them at once. docs/benchmarks.md states how accurate plans are.
         job = ["segment", self.large, "--points", self.inputs / "large.xyz", "-o", "s.vdb", "--quiet", "--json"]
         self.run_covol("plan", *job, "plan.json")
         planned = json.loads((self.out / "plan.json").read_text())["plan"]

@@ -56,7 +56,7 @@ class Kept(MarkCase):
         program, page = self.start()
         live = self.open(page)
         live.act(do="remove_mark", structure=1, mark=live.state["structures"][0]["marks"][0]["id"])
-        program.kill()  # before or after the new surface is saved
+        program.kill()  # before or after the program saves the new surface, by chance; both are accepted
         program.wait()
         _, page = self.start()
         result = self.open(page).state["structures"][0]["result"]

@@ -21,8 +21,8 @@ class Marks(PageCase):
             self.click(axis, wanted)
             self.assertEqual(len(self.marks()), before + 1)
             self.near(self.marks()[-1]["index"], wanted, axis)
-            # The plane is enlarged 5 times about the mark, which is not in the middle of the plane; then the click on
-            # `again`.
+            # The view of the plane is enlarged 5 times about the mark, which is not in the middle of the view. The next
+            # mark is set by a click on the voxel position `again`.
             x, y = self.spot(axis, wanted)
             self.js("const p = mark.panels[arguments[0]], b = p.canvas.getBoundingClientRect(); p.zoomAt(5, arguments[1] - b.left, arguments[2] - b.top)", axis, x, y)
             self.slices(31, 36, 26)

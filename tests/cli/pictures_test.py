@@ -55,7 +55,8 @@ class Pictures(Case):
         self.assertGreater(near(both[:60, :60], RED).sum(), 20)
         self.two = f"{self.two}:left"
         one = self.picture("--figure", "surface", "--view", "front", "--size", "500x300", name="q.png")
-        # No blue surface; the rows below contain blue axes.
+        # A single structure has the default colour, which is not blue. Rows from 240 on are left out, because they
+        # contain the axes, one of which is blue.
         self.assertEqual((one[:240, ..., 2].astype(int) - one[:240, ..., 0] > 30).sum(), 0)
         behind = self.picture("--figure", "surface", "--view", "back", "--size", "500x300", name="r.png")
         self.assertFalse(np.array_equal(one, behind))

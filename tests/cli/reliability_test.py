@@ -191,7 +191,7 @@ class Memory(Case):
         self.stay_within({
             "distance": ["distance", "t.ply", "--like", "t.nrrd", "-o", "o.vdb", "--max-distance", "30vx"],
             "band": ["band", "d.vdb", "-o", "o.vdb", "--tag-distance", "3vx"],
-            # All steps need the same memory.
+            # 3 steps are sufficient, because all steps need the same memory.
             "evolve": ["evolve", "b.vdb", "--distance", "d.vdb", "-o", "o.vdb", "--rho", 0, "--max-steps", 3],
             "surface": ["surface", "b.vdb", "-o", "o.vdb"],
             "convert": ["convert", "t.nrrd", "o.vdb"],
@@ -269,9 +269,12 @@ class Damaged(Case):
         kind = b"\x0d\0\0\0__delayedload"
         begin = data.index(kind) + len(kind)
         length, leaves, packed = struct.unpack_from("<3I", data, begin)
-        self.assertEqual(packed, 0)  # 0: a byte per leaf, uncompressed; a Blosc block with 8 bytes per leaf follows
+        # The metadata has two arrays, each after its packed size in bytes. The first has a byte per leaf and is not
+        # packed (size 0); the second has 8 bytes per leaf and is packed by Blosc.
+        self.assertEqual(packed, 0)
         block = begin + 12 + leaves
-        # 4-byte numbers: packed size, versions, unpacked size, block size, packed size.
+        # 4-byte numbers: the packed size of the second array, and Blosc's header of versions, unpacked size, block size
+        # and packed size.
         header = struct.unpack_from("<5I", data, block)
         self.assertEqual(header[2::2], (8 * leaves, header[0]))
         for place, value in ((begin + 4, leaves + 1), (begin + 4, 2**32 - 1), (begin + 8, 2**32 - 2), (begin + 8, 7), (begin + 8, leaves),

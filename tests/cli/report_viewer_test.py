@@ -22,7 +22,7 @@ class Viewer(BrowserCase):
         zoom = self.js("return report.state.get('views')[2].zoom")
         self.assertGreater(zoom, 1.2)
         after = self.spot(2, [*place, 20])
-        # px: the wheel zooms about the cursor, so that the position under it stays.
+        # The wheel zooms about the cursor, so that the position under it stays in place, up to 1.5 px.
         self.assertLess(math.hypot(after[0] - spot[0], after[1] - spot[1]), 1.5)
         self.mouse(("move", *spot), ("down", 1), ("move", spot[0] + 40, spot[1] + 30), ("up", 1))
         after = self.spot(2, [*place, 20])

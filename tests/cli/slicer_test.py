@@ -91,7 +91,7 @@ class Slicer:
         self.nodes.append(Node(kind, name, **payload))
         return self.nodes[-1]
 
-    def export(self, node, filename, properties={}, world=False):  # noqa: B006 - the signature of the original
+    def export(self, node, filename, properties={}, world=False):  # noqa: B006 - the signature of Slicer's exportNode()
         assert world and node in self.nodes  # world=True: otherwise transforms of the node would be ignored
         if hasattr(node, "file"):
             shutil.copy(node.file, filename)
@@ -169,7 +169,7 @@ class Module(Folder):
             ring = middle + np.stack([part * np.cos(turns), part * np.sin(turns), np.full(24, z)], 1)
             curves.append(self.slicer.add("vtkMRMLMarkupsClosedCurveNode", "CC", places=ring.tolist()))
         segmentation, _, report = self.run_job(curves)
-        # 8 %, as the curves do not reach the poles.
+        # The volume may differ by 8 %, because the curves do not reach the poles of the ball.
         self.assertAlmostEqual(report["surface"]["volume"] / (4 / 3 * np.pi * 3.5**3), 1, delta=0.08)
         self.run_covol("segment", self.private / "i.tif", "--points", self.private / "p.xyz", "-o", "g.vdb", "--mask", "guess.seg.nrrd", "--quiet")
         guess = self.slicer.add("vtkMRMLSegmentationNode", "guess", file=self.out / "guess.seg.nrrd")

@@ -49,8 +49,8 @@ class SphereHoles(unittest.TestCase):
     def test_points_complete_the_sphere(self):
         for kind in KINDS:
             with self.subTest(kind=kind):
-                # The shell is two voxels thick, and its inner and outer edge cannot be resolved. The mean distance of the
-                # surface from the outer edge is only expected to be less than this thickness.
+                # The shell is two voxels thick, and its inner and outer edge cannot be resolved. The mean distance of
+                # the surface from the outer edge is only expected to be less than this thickness.
                 self.assertLess(self.expect_points_met(f"{kind}.nrrd", f"{kind}.xyz", kind, 0.02), 2)
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")

@@ -478,7 +478,8 @@ class Evidence(Case):
             self.assertLess(abs(math.dist(s["world"], self.CENTER) - self.RADIUS), 0.3 * H)
             for axis in range(3):
                 self.assertAlmostEqual(s["world"][axis], ORIGIN[axis] + H * s["index"][axis], places=4)
-        # The marks end at the equator, and support the sphere up to a chord of length `reach` beyond: this latitude.
+        # The marks end at the equator. They support the sphere as far as a chord of length `reach` extends beyond it,
+        # which is up to the latitude `angle`.
         angle = 2 * math.asin(report["reach"] / (2 * self.RADIUS))
         self.assertAlmostEqual(report["unsupported_area"] / report["area"], (1 - math.sin(angle)) / 2, delta=0.02)
 

@@ -17,7 +17,7 @@ from cli_test import Case
 SIZES = np.array([40, 36, 26])          # number of voxels along i, j, k
 SPACING = np.array([0.5, 0.5, 0.75])
 RADII = np.array([6.0, 5.0, 7.0])
-# Centre along the image's axes, from voxel (0, 0, 0).
+# Centres of the two ellipsoids: lengths along the phantom's axes from the centre of voxel (0, 0, 0).
 MIDDLES = {"slice": np.array([9.75, 8.75, 4.0]), "edge": np.array([2.5, 8.75, 4.0])}
 
 

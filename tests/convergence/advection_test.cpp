@@ -6,14 +6,15 @@
 #include "support/both_solvers.h"
 #include "support/shapes.h"
 
-// Pure advection, δ = ρ = 0: the surface runs at unit speed along -∇d and stops where d = 0.
+// Pure advection, without curvature (δ = 0) and edges (ρ = 0): the surface runs at unit speed along -∇d, d the distance
+// to points, and stops where d = 0.
 
 using namespace covol;
 using namespace covol::test;
 
 namespace {
 
-/// A plane across `axis` that moves along `sign` from u0's zero level to the plane where d = 0.
+/// A plane across `axis` that moves in the direction `sign` from its start at `from` to `to`, where d = 0.
 struct PlaneRun {
     double h, from, to;
     int axis, sign;
@@ -21,7 +22,7 @@ struct PlaneRun {
 
     [[nodiscard]] double along(const Vec3& x) const { return sign * x[axis]; }
 
-    /// Mean position along the path after `time`, in `steps` steps.
+    /// Mean position of the plane along its path after `time`, in `steps` steps.
     [[nodiscard]] double position(double time, int steps) const {
         Domain domain = cube_domain(static_cast<int>(std::lround(3.0 / h)), h);
         for (int a = 0; a < 3; ++a)
@@ -56,9 +57,10 @@ struct PlaneRun {
 }  // namespace
 
 TEST_CASE("a plane runs at unit speed in each of the six directions") {
-    // One implicit upwind step spreads a jump over a geometric distribution with mean c = τ/h, variance c(1+c) and
-    // third cumulant c(1+c)(1+2c). After many steps the median of the profile therefore lags behind the mean by
-    // (1+2c)/6 voxels, and by less as long as the start's ramp of six voxels is not smeared out.
+    // One implicit upwind step of the time τ, with voxels of edge h, spreads a jump over a geometric distribution with
+    // mean c = τ/h, variance c(1+c) and third cumulant c(1+c)(1+2c), in voxels. After many steps the median of the
+    // profile therefore lags behind the mean by (1+2c)/6 voxels, and by less as long as the start's ramp of six voxels
+    // is not smeared out.
     constexpr double way = 0.5;
     for (const double courant : {0.25, 1.0})
         for (int axis = 0; axis < 3; ++axis)
@@ -72,8 +74,8 @@ TEST_CASE("a plane runs at unit speed in each of the six directions") {
             }
 }
 
-// With a ramp of half a voxel the start is a jump. It lags behind by (1+2c)/6 voxels, c = τ/h, from the beginning on,
-// for every h. This error is of first order.
+// With a ramp of half a voxel the start is a jump. The plane then lags behind its exact position by (1+2c)/6 voxels,
+// c = τ/h, from the beginning on, for every h. This error is of first order.
 TEST_CASE("a plane arrives on time, first order in h, and stays") {
     // The time step is fraction * h^power.
     const auto [power, fraction] = GENERATE(table<double, double>({{1, 1}, {2, 1}, {2, 0.25}}));
@@ -105,7 +107,8 @@ TEST_CASE("a plane that starts as a distance arrives on time and stays") {
     }
 }
 
-// The error of the scheme itself: its one-sided differences give a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r.
+// The error of the scheme itself: because of its one-sided differences, the surface moves at the position x, at the
+// distance r from the centre, with a speed of 1 + h Σ |n_a| (1 - n_a²) / r, n = x / r, instead of 1.
 TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
     // The time step is fraction * h^power; `maximum` is the largest allowed error in voxels.
     const auto [power, fraction, maximum] =

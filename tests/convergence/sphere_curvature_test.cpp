@@ -7,7 +7,7 @@
 #include "support/both_solvers.h"
 #include "support/shapes.h"
 
-// A sphere under curvature alone: r² = r0² - 4 δ t.
+// A sphere that moves by curvature alone, with the weight δ: after the time t its radius r is r² = r0² - 4 δ t.
 
 using namespace covol;
 using namespace covol::test;
@@ -17,7 +17,7 @@ namespace {
 constexpr double kStart = 1.0, kEnd = 0.7;  // radii of the sphere at the start and at the end
 constexpr double kTime = (kStart * kStart - kEnd * kEnd) / 4;
 
-/// The mean of | |x| - r | over the positions x of the zero level set.
+/// The mean of | |x| - radius | over the positions x at which the zero level set cuts edges of the lattice.
 double radius_error(const Domain& domain, const DenseField& u, double radius) {
     const auto crossings = zero_crossings(domain, u);
     REQUIRE(crossings.size() > 50);
@@ -26,7 +26,7 @@ double radius_error(const Domain& domain, const DenseField& u, double radius) {
     return sum / static_cast<double>(crossings.size());
 }
 
-/// @return the observed order of the last halving of h
+/// @return the observed order of convergence when h was halved; NAN at the first h, for which `previous` is 0
 double print_order(const char* what, double h, double error, double previous) {
     std::printf("%s: h = %.4f, error %.2e = %.3f h", what, h, error, error / h);
     if (previous == 0) {
@@ -93,7 +93,8 @@ double tracked_error(int n, double fraction) {
     return radius_error(domain, to_dense(domain, *u), kEnd);
 }
 
-// Values frozen on the band's border slow the surface down if sqrt(δτ) is close to the band's width. Hence τ ~ h².
+// The values at the band's border are frozen. They slow the surface down if sqrt(δτ) is close to the band's width,
+// which is a number of voxels. Therefore the time step τ is proportional to h².
 TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or better") {
     const double fraction = GENERATE(1.0, 0.25);
     double previous = 0;

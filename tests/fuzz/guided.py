@@ -146,7 +146,7 @@ def seeds_of(covol, folder):
               "parameter\tunits\tbits\tum\tum\tnm\nend\n")
     values = np.arange(60, dtype="<u2").tobytes()
     seeds["ics"] = [header.encode() + values, header.replace("uncompressed", "gzip").encode() + gzip.compress(values),
-                    # The voxels of version 1.0 are in another file.
+                    # The header alone: in version 1.0 of ICS, the voxels are in another file.
                     header.replace("ics_version\t2.0", "ics_version\t1.0").encode()]
     write_hdf5(folder / "a.h5", lambda file, values: file.create_dataset("data", data=values, chunks=(2, 5, 6), compression="gzip"))
     write_hdf5(folder / "a.ims", imaris)

@@ -272,7 +272,7 @@ def config(box, values, rng):
     yield ["segment", "--config", "c.toml", "-o", "c.vdb", "--save-config", "again.toml", "--memory-limit", "600M"], ["inputs/(c\\.vdb|again\\.toml)"]
     for shell in ("sh", "bash"):
         subprocess.run([shell, "-c", ". ./again.toml"], cwd=box.here, capture_output=True, stdin=subprocess.DEVNULL, timeout=60)
-    # After this command, files that the shell created are found.
+    # Files are compared after each command. This one finds the files that a shell created when it read again.toml.
     yield ["info", "ball.nrrd"], ["inputs/(c\\.vdb|again\\.toml)"]
 
 

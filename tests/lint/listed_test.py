@@ -11,7 +11,7 @@ import sys
 def findings(root):
     # Comments are removed: a test named there is not run.
     text = re.sub(r"#.*", "", (root / "tests/CMakeLists.txt").read_text())
-    # ".$": the class is a variable of a loop.
+    # In a loop of CMake, the class of a test is a variable: "programs_test.${group}".
     listed = set(re.findall(r"(?<![\w/])[a-z0-9_]+_test(?:\.[A-Za-z]\w*)?(?=[\s)]|\.\$)", text))
     files = sorted((root / "tests/cli").glob("*_test.py"))
     if len(files) < 20:

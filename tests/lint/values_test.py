@@ -10,7 +10,7 @@ import sys
 FOLDERS = ("segment", "bricks")
 # Parameters that would allow a function to change inputs or choices: references and pointers that are not const.
 WRITTEN_TO = re.compile(r"(?<!const )(?<!struct )(?<!class )\b(?:covol::)?(?:pipeline::)?(?:Problem|Choices|Resolved|\w*Options)\s*[&*]")
-# Code that makes a result depend on the report: fields of texts that are searched or used in a condition.
+# Code that makes a result depend on the report: it searches texts of the report, or uses one in a condition.
 READ_BACK = re.compile(r"\.(?:automatic|warnings)\s*(?:\.(?:contains|count|find|erase|empty|at)\b|\[)"
                        r"|\b(?:if|while)\s*\((?:[^()]|\([^()]*\))*\b(?:reason|why_not|summary)\b")
 # The module that keeps the log, and the only one that may read it.

@@ -17,7 +17,9 @@ sys.path.insert(0, str(HERE))
 import make  # noqa: E402
 
 DOCS = HERE.parents[1] / "docs"
-COARSE = (48, 32)  # columns and rows of cells; in cells this large, letters and noise have almost no effect
+# Columns and rows of cells over which a picture is averaged. In cells this large, letters and noise have almost no
+# effect.
+COARSE = (48, 32)
 
 
 def look(path):

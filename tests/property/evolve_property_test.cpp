@@ -154,7 +154,7 @@ TEST_CASE("evolve() in a band is the dense double-precision solver on the zero l
             seed, exact.count, moved, exact.max, exact.mean, usual.max, usual.mean);
         INFO("seed " << seed);
         CHECK(exact.count > 1000);
-        CHECK(moved > 0.8);  // otherwise the surface has hardly moved, and there is nothing to compare
+        CHECK(moved > 0.8);  // in voxels; if the surface had hardly moved, there would be nothing to compare
         CHECK(exact.max < 1e-3);
         CHECK(usual.mean < 1e-3);
         CHECK(usual.max < 1e-2);

@@ -2,7 +2,7 @@
 
     COVOL=build/bin/covol PYTHONPATH=build/python python3 -m pytest tests/property/lattice_test.py
     COVOL_LATTICES=1000 ...            # so many instead of 30
-    COVOL_LATTICES=1000:250:500 ...    # of a thousand those from 250 to 499
+    COVOL_LATTICES=1000:250:500 ...    # of a thousand lattices those from 250 to 499
 
 Each lattice depends only on its number: spacings, rotation, order of axes, mirrors, shear, position, unit. Formats that store no
 shear, or no directions, get the nearest lattice that they can store. Files are written and read without covol by lattice_files.py.

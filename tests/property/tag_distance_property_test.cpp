@@ -29,10 +29,10 @@ TEST_CASE("D is chosen so that real scans are closed") {
         return;
     }
     const std::vector<RealCloud> clouds = {
-        // The ball's missing cap is a hole of radius 21 to 23 mm.
+        // The ball lacks a cap, which leaves a hole of radius 21 to 23 mm (voxels); D must close it.
         {"clouds/apc_rawlings_baseball.ply", 0.001, {}, 21.0, 24.5},
         {"clouds/apc_fitness_gear_3lb_dumbbell.ply", 0.001, {}, 10.0, 15.0},
-        // The nuclei are 4.1 apart, so that 1.8 spacings are 3.7 voxels.
+        // D is 1.8 mean spacings if the points enclose nothing. The nuclei are 4.1 apart, so that this is 3.7 voxels.
         {"clouds/drosophila_embryo_nuclei.xyz", 2.0, {}, 2.3, 3.7},
         {"phantoms/embryo_ve_points.ply", 0.35, {{89.6, 89.6, 28.5}}, 2.0, 3.2},
         {"phantoms/embryo_exe_points.ply", 0.35, {}, 1.8, 3.2},

@@ -229,7 +229,7 @@ def test_several_structures(tmp_path, program):
         assert result.report["fit"]["points_to_surface"]["bias"] > 0.05 and result.report["fit"]["marks_off"]["count"] > 0
     (overlap,) = found.overlaps
     assert overlap["structures"] == ("left", "right") and overlap["volume"] > 10
-    # the program with the same files
+    # The program covol gives the same result from files.
     covol.save_mask(tmp_path / "i.nrrd", np.asarray(image.array, np.uint8), image)
     for name, marks in points.items():
         np.savetxt(tmp_path / f"{name}.xyz", marks, "%.17g")

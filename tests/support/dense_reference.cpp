@@ -31,11 +31,11 @@ Matrix inverse(const Matrix& m) {
 struct Tetrahedron {
     std::array<int, 3> q;                      // offset in voxels
     std::array<std::array<int, 3>, 2> vertex;  // each component 0 or 1: the vertex at p + vertex - 1/2
-    Matrix gradient;                           // maps (u_q - u_p, u_a - u_p, u_b - u_p) to h ∇u
+    Matrix gradient;  // maps (u_q - u_p, u_a - u_p, u_b - u_p), a and b the vertices, to h ∇u
 };
 
-/// One for each of the four edges of each of the six faces. The gradient of the linear function through four points
-/// solves (x_c - x_p) . ∇u = u_c - u_p for the three other corners c.
+/// One tetrahedron for each of the four edges of each of the six faces. The gradient of the linear function through
+/// four points solves (x_c - x_p) . ∇u = u_c - u_p for the three other corners c.
 std::array<Tetrahedron, 24> make_tetrahedra() {
     std::array<Tetrahedron, 24> all;
     int l = 0;
@@ -66,7 +66,7 @@ std::array<Tetrahedron, 24> make_tetrahedra() {
 
 const std::array<Tetrahedron, 24> kTetrahedra = make_tetrahedra();
 
-/// The vertex at (i,j,k) - 1/2: the mean of the eight voxels around it.
+/// The value at the vertex (i,j,k) - 1/2: the mean of the eight voxels around it.
 double vertex_value(const DenseField& u, int i, int j, int k) {
     double sum = 0;
     for (int a = -1; a <= 0; ++a)

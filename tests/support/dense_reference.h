@@ -58,7 +58,7 @@ struct DenseOptions {
     double edge_epsilon = 1e-3;     ///< slope of g per voxel
     double attraction_range = 0.0;  ///< 0: unlimited
     double image_yields = 0.0;
-    /// a solve ends when no Gauss-Seidel correction exceeds this fraction of the first sweep's
+    /// A solve ends when no Gauss-Seidel correction exceeds this fraction of the first sweep's
     double solver_tolerance = 1e-10;
     int max_sweeps = 100000;
     PrintedForm printed;
@@ -81,13 +81,15 @@ using Gradient = std::array<double, 3>;
 /// The integral of attraction_taper from 0 to distance.
 [[nodiscard]] double attraction_potential(double distance, double range);
 
-/// The fields of Eq. (3), null if the weight is 0. NaN: unknown there, no pull across that voxel's faces.
+/// The fields of Eq. (3), each null if its weight in the equation is 0. A voxel at which a field is unknown has the
+/// value NaN, and this field then exerts no pull across the voxel's faces.
 struct DenseFields {
     const DenseField* distance = nullptr;
     const DenseField* edge = nullptr;
 };
 
-/// The matrix of one time step: u_p + Σ_q a_pq (u_q - u_p) = u_p of the step before.
+/// The linear system of one time step: for each active voxel p with the neighbours q,
+/// u_p + Σ_q a_pq (u_q - u_p) = u_p of the step before.
 struct DenseSystem {
     std::vector<std::ptrdiff_t> neighbour;  ///< offset of each q from p in a DenseField; six unless printed.neighbours
     std::vector<std::size_t> voxel;         ///< the active voxels, by their position in a DenseField
@@ -114,7 +116,7 @@ double dense_evolve(DenseField& u, const std::vector<char>& active, const DenseF
 /// The implicit heat equation over `time`, in `steps` steps of backward Euler.
 void dense_heat(DenseField& image, double time, int steps);
 
-/// g = 1/(1 + K s²) with s the mean of |∇I| over the 24 tetrahedra, Eq. (2).
+/// g = 1/(1 + K s²), Eq. (2), with K = edge_k and s the mean of |∇I| over the 24 tetrahedra of a voxel.
 [[nodiscard]] DenseField dense_edge(const DenseField& image, double edge_k);
 
 }  // namespace covol::test

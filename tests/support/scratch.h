@@ -55,7 +55,8 @@ inline std::string message_of(const std::function<void()>& call) {
     return {};
 }
 
-/// The code of the covol::Error that `call` throws; its message begins with `begin`. Other exceptions are passed on.
+/// The code of the covol::Error that `call` throws. Throws std::logic_error if `call` throws none, or one whose message
+/// does not begin with `begin`. Other exceptions are passed on.
 inline covol::Errc code_of(const std::function<void()>& call, const std::string& begin = "") {
     try {
         call();

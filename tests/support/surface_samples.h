@@ -77,7 +77,7 @@ inline Solid3 ball(double radius) {
     return {[radius](const Vec3& p) { return norm(p) - radius; }, {{-r, -r, -r}, {r, r, r}}};
 }
 
-/// A torus around the z axis.
+/// A torus around the z axis: a tube of radius `tube` along a circle of radius `around`.
 inline Solid3 torus(double around, double tube) {
     const double r = around + tube + 0.02, z = tube + 0.02;
     return {[around, tube](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - around, p[2]) - tube; },

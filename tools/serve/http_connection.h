@@ -59,7 +59,8 @@ private:
     std::optional<StringResponse> response_;
     std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
     bool is_head_ = false, keeps_ = false, is_posting_ = false;
-    std::optional<bool> wants_to_stay_;  // set for a POST, whose parser is moved before the answer
+    // Result of wants_to_stay() for a POST, stored because parser_ is moved before the answer; otherwise nullopt.
+    std::optional<bool> wants_to_stay_;
     std::size_t drained_ = 0;
     std::optional<MessageRate::Time> waits_since_;
 };

@@ -52,7 +52,7 @@ public:
     bool is_posting = false;               ///< a POST is being read or handled; one at a time, as bodies may be large
     /// Threads of handlers. There are two pools, so that messages are answered while many images are being read.
     boost::asio::thread_pool get_pool, live_pool;
-    boost::asio::io_context io{1};  // declared after the pools, to which its pending handlers refer
+    boost::asio::io_context io{1};  // destroyed before the pools, to which its pending handlers refer
 
     /// Serves an accepted socket. If there are too many connections, closes the one that has been waiting longest for a
     /// request, or refuses the new one if all are busy.

@@ -25,14 +25,15 @@ inline constexpr auto kOptions<BandOptions> =
 struct BandReport {
     double tag_distance = 0;     ///< the value of BandOptions::tag_distance that was used
     double enclosed_volume = 0;  ///< volume of the voxels that the flood fill did not reach, world units^3
-    /// volume of the cores, the parts of these voxels in which the distance to the points exceeds D, world units^3
+    /// volume of the cores, that is, of the voxels that the flood fill did not reach and that are farther than
+    /// `tag_distance` from all points; world units^3
     double core_volume = 0;
-    /// Whether the points have gaps that D does not close: the body contains no core, neither for D nor for three
-    /// smaller distances down to 0.6 D, or it would contain a further core if it were tagged with D + h, where h is the
-    /// voxel size.
+    /// Whether the points have gaps that the tag distance D does not close. Either the body contains no core (a part
+    /// farther than D from all points), neither for D nor for three smaller distances down to 0.6 D, or it contains one
+    /// and would contain a further one if it were tagged with D + h, where h is the voxel size.
     bool leaks = false;
-    /// If the body leaks: the smallest tested distance above D, in world units, at which it would contain a further
-    /// core; 0 if none was found.
+    /// If the body leaks: the smallest tested tag distance above the one used, in world units, with which the body
+    /// would contain a further core (a part farther than the tag distance from all points); 0 if none was found.
     double holding_distance = 0;
     std::int64_t active_voxels = 0;
 

@@ -45,7 +45,7 @@ inline constexpr auto kOptions<BrickOptions> = std::tuple{
 struct Brick {
     VoxelBox core;  ///< voxels of the lattice that belong to the brick: whole leaves, limited by the domain
     std::int64_t active_voxels = 0;  ///< estimated from the coarse solve
-    /// indices of the bricks whose cores are within `overlap` voxels of this core
+    /// indices of the other bricks whose cores are within BrickOptions::overlap voxels of the core of this brick
     std::vector<std::size_t> neighbours;
 };
 
@@ -107,9 +107,9 @@ private:
     std::unique_ptr<Parts> parts_;
 };
 
-/// The maximum distance, in voxels, between the surfaces of a brick and of its neighbours, in the three layers of
-/// voxels on each side of the faces between their cores. kHalfWidthVoxels if a state is missing or a surface lies
-/// outside the other state's band.
+/// The maximum distance, in voxels, between the surfaces in the states of a brick and of its neighbours, in the three
+/// layers of voxels on each side of the faces between their cores; 0 if no surface lies there. kHalfWidthVoxels if a
+/// state is missing, or if the surface of one state lies outside the narrow band of the other.
 [[nodiscard]] COVOL_API double measure_seams(const BrickPlan& plan, std::size_t brick, const BrickStates& states);
 
 }  // namespace covol

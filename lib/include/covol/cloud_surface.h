@@ -32,7 +32,8 @@ struct CloudReport {
                                  ///< the points form no sheet there; the surface follows the indicator there
     /// number of pieces of the surface that were removed because they have too few points
     std::size_t dropped_pieces = 0;
-    /// number of small pieces that were joined to the nearest piece because there are points all along the gap
+    /// number of small pieces of the surface that were joined to the nearest piece because there are points all along
+    /// the gap between both
     std::size_t joined_pieces = 0;
     std::size_t held_voxels = 0;  ///< number of voxels whose sign is that of the indicator, so that the surface has the
                                   ///< indicator's simpler topology
@@ -51,8 +52,9 @@ struct CloudSurface {
 /// Near the points, the level set is a blend of the signed distances to local quadrics (implicit moving least squares;
 /// Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others, Multi-level
 /// partition of unity implicits, 2003). Each quadric is fitted to a neighbourhood that is as wide as the noise of the
-/// points requires. Elsewhere the level set follows the level 1/2 of the indicator, or of the screened indicator if
-/// there is one. If the points enclose nothing or fill a solid, the whole surface is this level.
+/// points requires. Elsewhere the level set follows the level 1/2 of the cloud's indicator function, which is
+/// Orientation::screened or, if that is null, Orientation::indicator. If the points enclose nothing or fill a solid,
+/// the whole surface is this level.
 ///
 /// If the level set has more pieces and handles in total than the indicator, it gets the indicator's topology, unless
 /// this would reduce the number of large pieces or change the sign of too many voxels.

@@ -84,7 +84,8 @@ struct Sections;
 /// Marks on slices, with additional points between them, dense enough to determine a level set.
 struct Contours {
     std::vector<Vec3> marks;  ///< as they were set, world units
-    /// points on the lines through the marks, including the marks; for a network, fewer points at equal distances
+    /// points on the lines through the marks, including the marks, at most ContourOptions::step apart; for a network,
+    /// points at equal distances instead, at most about 1,500 in total
     std::vector<Vec3> along;
     std::vector<Vec3> between;                  ///< points on the interpolated surface between slices and on the domes
     std::shared_ptr<const ContourSolid> solid;  ///< null if there is no closed contour on parallel slices
@@ -93,7 +94,8 @@ struct Contours {
     /// All marks lie in one plane and no thickness is given, so that the thickness of the body is an estimate; false if
     /// the image consists of that slice only.
     bool flat = false;
-    /// median distance between neighbouring marked slices, world units; the image's spacing for one slice
+    /// median distance between neighbouring marked slices, world units; for a single slice, the image's spacing (1
+    /// without an image); 0 without `solid`
     double slice_distance = 0;
     std::string summary;      ///< one line for the user
     bool is_network = false;  ///< the planes have several directions: `solid` is null, and the sides of positions are
@@ -120,7 +122,8 @@ struct Contours {
 ///     messages name the line).
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,
                                          const ContourOptions& options, const RunContext& run = {});
-/// The same for clouds in world units without an image.
+/// Adds points between the marks on lines and interpolates the surface, as the overload with an image does; for clouds
+/// in world units.
 [[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options,
                                          const RunContext& run = {});
 

@@ -35,8 +35,8 @@ struct EdgeOptions {
     std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
                                           ///< the band
     /// percentile of s in the band that is used as the automatic edge_contrast, as a fraction in (0,1); automatic: 0.9
-    /// for slopes. For lines, the automatic edge_contrast is a third of the median of s, so that g depends on the
-    /// brightness relative to the surroundings.
+    /// for EdgeFeature::Slope. For BrightLine and DarkLine, edge_contrast is then a third of the median of s, so that g
+    /// depends on the brightness relative to the surroundings.
     std::optional<double> contrast_percentile;
     /// intensities mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
     std::optional<std::array<double, 2>> intensities;

@@ -38,11 +38,12 @@ struct SliceEvidence {
     double marks_mean = 0, marks_max = 0;  ///< mean and maximum distance from these marks to the surface, world units
 };
 
-/// A slice in which further marks would help, and the position in it where they would help most.
+/// A slice in which further marks would support surface that neither marks nor the image's edges support, and the
+/// position in the slice at which they would support most of it.
 struct Suggestion {
     int slice = 0;
-    /// area of unsupported surface that marks along the outline in this slice would support, without the area that
-    /// earlier suggestions would support
+    /// unsupported area within EvidenceOptions::reach of the surface's outline in this slice, which marks along the
+    /// outline would support; without the area that earlier suggestions would support; world units^2
     double area = 0;
     Vec3 index{0, 0, 0};  ///< voxels of the image
     Vec3 world{0, 0, 0};
@@ -79,7 +80,8 @@ struct Evidence {
 /// @param distance  distance to the points, from compute_distance() with max_distance >= reach
 [[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
                                                                double reach, const RunContext& run = {});
-/// The same fraction, from a temporary distance grid whose voxel size is a third of `reach`.
+/// Fraction of a surface's area that is farther than `reach` from every point, from a temporary distance grid whose
+/// voxel size is a third of `reach`.
 [[nodiscard]] COVOL_API double measure_fraction_without_points(const TriangleMesh& mesh,
                                                                const std::vector<Vec3>& points, double reach,
                                                                const RunContext& run = {});

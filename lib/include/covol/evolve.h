@@ -32,7 +32,8 @@ struct EvolveOptions {
     /// in [0,1]: factor of θ far from all trusted marks (EvolveFields::trusted). It increases to 1 towards these marks,
     /// with the same dependence on the distance as the attraction of the points.
     double guess_weight = 1.0;
-    /// the band moves with the surface; needed for starts other than tagging, whose band is only 6 voxels wide
+    /// the narrow band moves with the surface; needed unless the start was tagged, because the bands of all other
+    /// starts are only 6 voxels wide
     bool follow = false;
     int max_steps = 500;  ///< upper bound on time steps, >= 0
     /// the flow is steady if the zero crossings move by less than tolerance * τ per step on average. It is also steady

@@ -48,8 +48,8 @@ struct GuidanceReport {
     /// Estimated root mean square distance between the border that the image alone gives and the true border, measured
     /// at held-out marks. It is rather too large, because a standard error is added.
     double image_error = 0;
-    /// Estimated root mean square distance of the guess from the true border. It is rather too small, because a
-    /// standard error is subtracted from its growth with the distance from the marks.
+    /// Estimated root mean square distance of the guess from the true border. It is rather too small: it is assumed to
+    /// grow with the distance from the marks, and a standard error is subtracted from the estimate of this growth.
     double guess_error = 0;
     /// fraction of the area in which the image determines the result more than the guess does
     double confident_fraction = 0;

@@ -20,7 +20,7 @@ enum class Holes {
 template <>
 inline constexpr auto kWords<Holes> = std::array{"auto", "close", "open", "flat"};
 
-/// Whether the policy requires a mesh in addition to the level set.
+/// Whether the policy requires a mesh in addition to the level set, because the holes are cut out of a mesh.
 [[nodiscard]] constexpr bool needs_mesh(Holes policy) { return policy == Holes::Open || policy == Holes::Flat; }
 
 struct HolesOptions {
@@ -89,9 +89,9 @@ struct TreatedHoles {
 [[nodiscard]] COVOL_API TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                 double distance, double slack, const RunContext& run = {});
 
-/// Cuts the same holes and closes each with a surface of minimum area (Pinkall and Polthier, Computing discrete minimal
-/// surfaces and their conjugates, Experimental Mathematics 2, 1993). The result may intersect itself; a level set made
-/// from it does not.
+/// Cuts holes as trim_holes() does and closes each with a surface of minimum area (Pinkall and Polthier, Computing
+/// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). The resulting mesh may intersect
+/// itself; a level set made from it does not.
 [[nodiscard]] COVOL_API TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
                                                    double distance, double slack, const RunContext& run = {});
 

@@ -126,9 +126,11 @@ public:
     /// other images this does nothing.
     /// @throws Error InvalidInput (a damaged file), Io, Cancelled, InvalidOptions (needs more than run.memory_budget).
     COVOL_API void load(const Domain& frame, const std::vector<VoxelBox>& boxes, const RunContext& run = {}) const;
-    /// The same for samples at single positions in the world.
+    /// Decodes in parallel the chunks that samples at these world positions will need. Does nothing for an image whose
+    /// chunks are not read on request.
     COVOL_API void load(const std::vector<Vec3>& places, const RunContext& run = {}) const;
-    /// The same for a box of held voxels that will be requested from copy() or at().
+    /// Decodes in parallel the chunks of a box of held voxels that will be requested from copy() or at(). Does nothing
+    /// for an image whose chunks are not read on request.
     COVOL_API void load(const VoxelBox& box, const RunContext& run = {}) const;
 
     /// Returns the accessed pages of a mapped file to the system; they are read again on request. Does nothing for
@@ -235,7 +237,7 @@ struct ImageInfo {
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
-/// The same with key/value pairs, which only NRRD stores.
+/// Writes an image as the functions above do, with key/value pairs, which only NRRD stores.
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
                            const std::vector<std::pair<std::string, std::string>>& metadata);
 COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,

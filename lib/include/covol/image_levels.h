@@ -50,7 +50,7 @@ public:
     /// Size of a level's chunks along i, j, k in voxels; 0 for an image that is held in memory.
     [[nodiscard]] COVOL_API Index3 chunk_size(std::size_t level) const;
     /// The coarsest level that suffices for pixels that are `step` voxels of the finest level wide: the coarsest one
-    /// for which `step` is a multiple of its factors. @param step  >= 1
+    /// for which `step` is a multiple of Level::factor along each axis. @param step  >= 1
     [[nodiscard]] COVOL_API std::size_t level_for(int step) const;
     /// Copies the values of a box of a level's voxels to `out`, i fastest; the box's chunks are decoded in parallel.
     /// @pre the box lies in the level. @throws Error as Image::copy(); Cancelled.

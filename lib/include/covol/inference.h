@@ -31,10 +31,11 @@ struct InferenceReport {
     /// sides, 0 if they give no information.
     double bits = 0;
     double body_error = 0;  ///< median distance of the body from held-out marks, world units
-    /// the same for the surface of minimum bending energy that has the normals of the body at the marks
+    /// median distance, from held-out marks, of the surface of minimum bending energy that has the normals of the body
+    /// at the marks; world units
     double guess_error = 0;
-    /// in [0,1]: weight of that surface in the weighted mean of surface and body; chosen so that this mean predicts the
-    /// held-out marks best
+    /// in [0,1]: weight of the surface of minimum bending energy in its weighted mean with the body; chosen so that
+    /// this mean predicts the held-out marks best
     double weight_of_guess = 0;
     double agreement = 0;  ///< Dice coefficient of guess and body
     /// Root mean square error of the result divided by the distance from the nearest mark, measured at held-out marks;

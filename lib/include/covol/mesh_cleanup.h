@@ -49,14 +49,16 @@ struct CleanupReport {
 /// @throws Error InvalidOptions, InvalidInput (decimation without repair of a mesh that is not manifold).
 COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
 
-/// The same for a mesh of a level set; after decimation, relax_mesh() improves the triangles on that level set.
+/// Modifies the mesh of a level set as the overload without a level set does; after decimation, relax_mesh() also
+/// improves the triangles on that level set.
 COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0,
                                    const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// Number of pairs of triangles that have a point in common other than the vertices and the edge that they share.
 [[nodiscard]] COVOL_API int count_self_intersections(const TriangleMesh& mesh);
 
-/// Numbers of these pairs, by whether both triangles belong to the same component.
+/// Numbers of intersecting pairs of triangles, as count_self_intersections() counts them, by whether both triangles
+/// belong to the same component.
 struct Crossings {
     int within = 0;   ///< pairs within one component
     int between = 0;  ///< pairs of two components, which touch or overlap, like structures with a common border

@@ -158,7 +158,7 @@ inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, 
 
 /// For why_invalid(): appends a line "name: complaint" to `lines` unless the complaint is empty.
 COVOL_API void add_complaint(std::string& lines, const char* name, const std::string& complaint);
-/// Appends such a line if `value` is outside of the option's range.
+/// Appends a line "name: expected RANGE, got VALUE" to `lines` if `value` is outside of the option's range.
 COVOL_API void complain(std::string& lines, const OptionInfo& option, double value);
 
 namespace detail {

@@ -15,18 +15,21 @@ struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation of the points from the surface, along its normal
     double nearest = 0;  ///< median distance to the nearest other point
-    /// longest side of the bounding box of the largest part, in a cloud of several parts that are far apart
+    /// longest side of the bounding box of the cloud or, if the cloud consists of parts that are far apart compared to
+    /// their size, of its largest part
     double part = 0;
-    /// for groups of a point and its eleven nearest neighbours: median of the groups' radius, and of their standard
-    /// deviation from a quadric, which is 0.33 of the radius if the points fill a ball
+    /// for groups of a point and its eleven nearest neighbours: the median radius of the groups, and the median of the
+    /// standard deviation of a group's points from a quadric fitted to them. The second is 0.33 of the first if the
+    /// points fill a ball.
     double near_reach = 0, near_noise = 0;
 };
-/// Measures the scale from quadrics fitted to neighbourhoods of a sample of the points, with the radius at which the
-/// neighbourhoods are closest to a sheet.
+/// Measures the scale of a cloud. Quadrics are fitted to neighbourhoods of a sample of the points with increasing
+/// radii; spacing and noise are those at the radius for which the points' deviation from the quadrics, divided by the
+/// radius, is smallest.
 [[nodiscard]] COVOL_API CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
 
-/// The indicator function of a solid: about 1 inside and 0 outside, with a smooth transition over a few cells. Beyond
-/// its lattice it has the value of the nearest node. Thread-safe.
+/// The indicator function of a solid, stored on a lattice: about 1 inside and 0 outside, with a smooth transition over
+/// a few cells of the lattice. Beyond the lattice it has the value of the nearest node. Thread-safe.
 class Indicator {
 public:
     struct Values;
@@ -52,14 +55,15 @@ struct Orientation {
     std::vector<Vec3> normals;  ///< outward unit normals, one for each point; 0 if unknown
     std::vector<double> areas;  ///< area of the surface that each point represents, from the density, world units^2
     std::shared_ptr<const Indicator> indicator;  ///< from these normals and areas
-    /// the screened indicator, which is also fitted to 1/2 at the points; null: not needed
+    /// the screened indicator, which is also fitted to 1/2 at the points; null unless the points form sheets that
+    /// enclose nothing, or fill a solid
     std::shared_ptr<const Indicator> screened;
     /// fraction of the points whose normal was turned by more than 90 degrees in the last iteration
     double turned = 0;
     double off_half = 0;  ///< absolute difference between 1/2 and the indicator's mean over the points; 0 is ideal
     int iterations = 0;
-    /// number of normals that were replaced, because they were not perpendicular to the sheet of their neighbours or
-    /// pointed to its wrong side
+    /// number of normals that were replaced, because they differed by more than 60 degrees from the normals of the
+    /// sheet that the neighbouring points form, or pointed to the wrong side of it
     std::size_t mended = 0;
     /// number of points in layers of a scan that lie below other layers: their normals were turned, and the surface
     /// need not pass through them
@@ -124,8 +128,9 @@ struct CloudOrientation {
 /// neighbours or, if neighbours do not agree, each normal points to the side from which its point can be seen. If the
 /// points fill a solid, so that no neighbourhood is a sheet, the indicator is their density.
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
-/// The same, but uses normals and sensor directions if they are consistent: half of them has to predict the sides of
-/// the other half, and if the orientation without hints converges, the hints must not contradict it in whole regions.
+/// Orients a cloud with hints, which are used if they are consistent: half of them has to predict the sides of the
+/// other half, and if the orientation without hints converges, they must not contradict it in whole regions. Otherwise
+/// the cloud is oriented without them.
 /// From a sensor direction, a point gets the normal of its local plane on the side that was seen.
 /// @throws Error also InvalidInput (a list of hints that is neither empty nor as long as `points`)
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,

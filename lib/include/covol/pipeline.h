@@ -86,8 +86,9 @@ struct SegmentOptions {
     std::optional<WorldBox> roi;  ///< the domain, instead of the image's box; rounded to whole voxels
     /// World position of the centre of voxel (0,0,0); automatic: see choose_domain().
     std::optional<Vec3> lattice_origin;
-    /// for points without an image: distance from the points to the domain's boundary, world units, >= 0; automatic: D
-    /// + 6 voxels
+    /// for points without an image: distance from the points to the domain's boundary, world units, >= 0; automatic:
+    /// tag_distance + 6 voxels after tagging, a fifth of the longest side of the points' box + 6 voxels for a guess and
+    /// for a cloud, else 12 voxels
     std::optional<double> margin;
     bool keep_failed = false;  ///< errors are thrown as SegmentFailed, which requires memory for a copy of the start
     Start start;
@@ -193,7 +194,7 @@ struct SegmentReport {
     BandReport band;
     EdgeReport edge;
     EvolveReport solve;
-    /// of the mesh; if holes were trimmed, the volume is that of the closed mesh before trimming
+    /// measures of the mesh; if holes were trimmed, the volume is that of the closed mesh before trimming
     MeshMeasures surface;
     RelaxReport mesh;
     FitStatistics fit;

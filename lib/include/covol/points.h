@@ -69,7 +69,8 @@ struct PointCloud {
     std::optional<Vec3> sensor;  ///< position from which a scan was taken; sensor and normals only occur in World
     PointSpace space = PointSpace::World;  ///< World, Index, Local or Slices
     ReadPointsOptions reading;             ///< the options with which the file's coordinates were interpreted
-    /// whether the format or the caller specified `reading`; otherwise `reading` is an assumption
+    /// whether the format or the caller specified both the space of the coordinates and the order of the axes; false:
+    /// one or both are assumed
     bool stated = false;
     std::string source;  ///< path, for messages
     std::string rule;    ///< how coordinates were interpreted, one line for the user

@@ -13,7 +13,7 @@ namespace covol {
 /// JSON, the values of its strings remain the same.
 [[nodiscard]] COVOL_API std::string safe_text(std::string_view text);
 
-/// The same, but line breaks are kept.
+/// The text with the replacements of safe_text(), but with its line breaks kept.
 [[nodiscard]] COVOL_API std::string safe_lines(std::string_view text);
 
 }  // namespace covol

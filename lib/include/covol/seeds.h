@@ -15,7 +15,9 @@ namespace covol {
 /// neighbouring ones are at most `step` apart, also between the last and the first mark of a closed line.
 [[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, const ImageGeometry& geometry,
                                                         double step);
-/// The same without an image. @throws Error InvalidInput if the points need an image.
+/// The seeds of a cloud in world units, with additional points on lines that are at most `step` apart, without an
+/// image.
+/// @throws Error InvalidInput if the points need an image.
 [[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step);
 
 /// The result of checking seeds against a surface.
@@ -38,8 +40,9 @@ struct SeedCheck {
 [[nodiscard]] COVOL_API SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside,
                                               const std::vector<Vec3>& outside, double slack = 0);
 
-/// @throws Error InvalidInput if a position inside and a position outside are closer than `same`; the message contains
-/// the position.
+/// Checks that no position is given both as inside and as outside.
+/// @throws Error InvalidInput if a position inside and one outside are at most `same` (world units) apart; the message
+///     contains the position.
 COVOL_API void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double same);
 
 }  // namespace covol

@@ -73,7 +73,8 @@ struct SeparateResult {
                                                                    const ImageGeometry& geometry,
                                                                    const RunContext& run = {});
 
-/// The same label image for writing box by box (covol/image_stream.h), so that it is never completely in memory.
+/// The label image that make_label_image() returns, for writing box by box (covol/image_stream.h), so that it is never
+/// completely in memory.
 class COVOL_API LabelImage : public PixelSource {
 public:
     /// @param values  label values of the structures, instead of 1, 2, ...; the type is int32 if one is below 0 or

@@ -298,7 +298,8 @@ public:
 
     struct Applied {
         StudyHistory::Changed changed;
-        /// false: an action with this key was applied before; Changed::made is the id that it made
+        /// false: an action with the same key was applied before, and nothing changed; Changed::made is then the id of
+        /// the first object that the earlier action created
         bool is_new = true;
     };
     /// Applies an action, which is on the disk when this function returns. @throws Error InvalidInput (as

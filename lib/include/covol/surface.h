@@ -47,8 +47,8 @@ struct FitStatistics {
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
                                                   const RunContext& run = {});
 
-/// The same without a mesh: distances below the level set's half width are interpolated; larger ones are at most 0.12
-/// voxels too large. @throws Error InvalidInput (no point)
+/// Distances from points to the zero level set, without a mesh. They are interpolated for points within the level set's
+/// half width less one voxel; the others are at most 0.12 voxels too large. @throws Error InvalidInput (no point)
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface,
                                                   const RunContext& run = {});
 

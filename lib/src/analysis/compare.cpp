@@ -57,7 +57,7 @@ public:
 private:
     using Tree = FloatGrid::TreeType;
 
-    /// The level set of that isosurface, in index space: -0.5 in the voxels with the label and 0.5 in the others.
+    /// The level set of the mask's boundary, in index space: -0.5 in the voxels with the label and 0.5 in the others.
     FloatGridPtr level_set() {
         FloatGridPtr grid = make_grid({}, 0.5F, "mask");
         std::array<std::size_t, 3> blocks{};

@@ -199,7 +199,8 @@ private:
             for (int axis = 0; axis < 3; ++axis) sum[axis] += from[axis] + x * (to[axis] - from[axis]);
             ++count;
         }
-        // If the plane touches only the highest corner of the triangle, no side counts as intersected.
+        // If the slice's plane touches the triangle only at its highest corner or side, no side counts as intersected;
+        // the result is then the highest corner.
         if (count == 0)
             return mesh_.place(*std::max_element(
                 t.begin(), t.end(), [&](std::uint32_t a, std::uint32_t b) { return levels_[a] < levels_[b]; }));

@@ -89,8 +89,8 @@ private:
         for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
         return all;
     }
-    /// The structures that claim at least one of the six neighbours, ascending. If the voxel lies between two
-    /// structures that touch, both are among them.
+    /// The structures that claim at least one of the six neighbours of voxel (i,j,k), ascending. If the voxel lies
+    /// between two structures that touch, both are among them.
     [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
         std::vector<std::size_t> found;
         const Index3 here{i, j, k};

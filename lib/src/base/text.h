@@ -30,11 +30,11 @@ public:
     explicit Lines(std::string_view text);
     /// The next line, with blanks removed at both ends; false at the end of the text.
     bool next(std::string_view& line);
-    /// The same without removing blanks, because a leading tab means an empty first column.
+    /// The next line with its blanks, because a leading tab means an empty first column; false at the end of the text.
     bool next_untrimmed(std::string_view& line);
     /// The next line with content other than a comment, which begins with '#' and is removed.
     bool next_content(std::string_view& line);
-    /// The same, split into words at blanks.
+    /// The line that next_content() returns, split into words at blanks.
     bool next_words(std::string_view& line, std::vector<std::string_view>& words);
     [[nodiscard]] std::size_t number() const { return number_; }
     [[nodiscard]] std::string_view rest() const { return rest_; }

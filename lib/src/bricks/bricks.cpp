@@ -48,7 +48,8 @@ void require_supported(const Problem& problem, const Resolved& resolved) {
                " marks for a guess (with `model = paper`, or with more marks, there is a flow)");
 }
 
-/// The domain on the fine lattice: without image and roi, it covers the domain of the coarse solve.
+/// The domain on the fine lattice: that of the image or of the roi; without both, it covers the domain of the coarse
+/// solve.
 Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domain& coarse) {
     const Domain own = problem.domain(resolved.choices.h, resolved.marks.attracting, 0);
     if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
@@ -253,8 +254,8 @@ struct BrickJob::Parts {
         return solution;
     }
 
-    /// Edge length of a coarse voxel in fine voxels: the smallest power of two, at least kMinFactor, for which the box
-    /// is at most kCoarseVoxels coarse voxels long.
+    /// Edge length of a coarse voxel in fine voxels: the smallest power of two, at least kMinFactor, for which the
+    /// bounding box of the marks (without marks, the image's box) is at most kCoarseVoxels coarse voxels long.
     [[nodiscard]] double coarse_factor() const {
         const std::vector<Vec3>& attracting = resolved.marks.attracting;
         const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);

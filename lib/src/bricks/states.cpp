@@ -176,8 +176,9 @@ double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box) 
                 if ((*value < 0) == (next < 0)) continue;
                 float first = 0, second = 0;
                 const bool known = b_at.probeValue(p, first) && b_at.probeValue(q, second);
-                // The distance between the surfaces is the interpolated value of b at the zero crossing of a. The
-                // difference between the values of a and b would depend on their slopes as well.
+                // The distance between the surfaces of the level sets a and b is the interpolated value of b at the
+                // zero crossing of a. The difference between the values of a and b would depend on their slopes as
+                // well.
                 const double there = double(*value) / (double(*value) - next);
                 largest = std::max(largest, known ? std::abs(first + there * (second - first)) : kHalfWidthVoxels * h);
             }

@@ -21,8 +21,9 @@ void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels,
 [[nodiscard]] FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
                                     const BrickStates& states);
 
-/// Lower and upper bounds of the level set in a brick. They fix it to the start in the outermost layers of `part`, at
-/// the faces beyond which `whole` continues, and do not limit it elsewhere.
+/// Lower and upper bounds of the level set in a brick. They fix it to the start in the outermost layers of `part`,
+/// which is the brick with layers of its neighbours, at the faces beyond which `whole`, the domain of all bricks,
+/// continues. They do not limit it elsewhere.
 struct Frame {
     FloatGridPtr floor, obstacle;
 };

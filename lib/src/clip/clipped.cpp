@@ -234,8 +234,8 @@ public:
     }
 
 private:
-    /// Number of layers that are read. In up to three, the face may be nearer than the wall; two more are needed to
-    /// determine the slope.
+    /// Number of layers of voxels, counted from the face inward, whose distances are read. In up to three of them, the
+    /// face may be nearer than the wall, so that its distance is stored; two more are needed to determine the slope.
     static constexpr int kDepth = 5;
 
     /// @return whether the solid meets this face.

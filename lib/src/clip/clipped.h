@@ -20,7 +20,7 @@ struct LatticeClip {
     std::array<double, 3> low{-kFar, -kFar, -kFar}, high{kFar, kFar, kFar};
 
     /// The layer of voxels that represents a face: the first layer beyond the face or, if the last layer inside is less
-    /// than 0.1 voxels away from the face, this layer. A cell between them would be almost flat.
+    /// than 0.1 voxels away from the face, that last layer, because cells between it and the face would be almost flat.
     [[nodiscard]] int face_layer(int axis, bool upper) const;
     /// The position of a layer of voxels along the axis: the face for its face_layer() and all layers beyond, otherwise
     /// the index of the layer.

@@ -9,7 +9,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kLongestPiece = 1e6;  // points on one piece: limits the memory if the step is much too small
+constexpr double kLongestPiece = 1e6;  // points between two marks: limits the memory if the step is much too small
 
 Vec3 mix(const Vec3& a, const Vec3& b, double t) {
     return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};

@@ -43,7 +43,7 @@ double hermite(double v0, double v1, double m0, double m1, double t) {
 class Interval {
 public:
     enum class Kind { Below, Between, Above };
-    /// @param n  the slice below, or the end slice of a dome
+    /// @param n  index of the slice at the interval's beginning; for a dome, of the end slice on which it stands
     Interval(const ContourSolid::Data& data, Kind kind, std::size_t n) : data_(data), kind_(kind), n_(n) {}
 
     [[nodiscard]] double begin() const { return kind_ == Kind::Below ? slice().w - slice().cap : slice().w; }

@@ -268,7 +268,7 @@ std::vector<Vec3> Densifier::curve_through(const Line& line, const std::vector<V
                                                   : marks;
 }
 
-/// For planes of several directions: computes points along all lines, and positions of which the sections fix the side.
+/// For planes of several directions: computes points along all lines, and positions inside and outside the sections.
 void Densifier::make_network() {
     std::vector<std::vector<Vec3>> open, closed;
     double length = 0;
@@ -387,7 +387,7 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
     run_.check();
 }
 
-/// If neighbouring sections do not overlap, single contours are joined by a translation; several end between slices.
+/// Joins neighbouring sections that do not overlap by a translation if each is one contour; others end between slices.
 void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons) {
     std::vector<char> apart(data.slices.size(), 0);
     tbb::parallel_for(std::size_t(0), data.slices.size() - 1, [&](std::size_t n) {

@@ -16,9 +16,9 @@ namespace covol::detail {
 namespace {
 
 constexpr std::size_t kMaxFieldNodes = 6'000'000;
-constexpr std::size_t kMaxStops = 20'000'000;  // crossings of the lattice's edges with planes; 16 bytes each
-constexpr int kCoarsest = 16;                  // maximum cells of the first lattice along the longest side
-constexpr float kSettled = 1e-4F;              // maximum change of a value in a sweep
+constexpr std::size_t kMaxStops = 20'000'000;  // maximum number of PlaneCrossings, of 16 bytes each: limits the memory
+constexpr int kCoarsest = 16;                  // maximum number of cells along the longest side of the first lattice
+constexpr float kSettled = 1e-4F;              // maximum change of a value in a sweep after which the sweeps end
 constexpr int kMaxSweeps = 400;
 constexpr std::size_t kFolds = 6;
 constexpr float kClosest = 1e-3F;  // [cells] minimum distance of a node from a plane in its equation

@@ -13,7 +13,7 @@ namespace {
 constexpr double kSeedPiece = 8;
 
 struct Edge {
-    float x, y, dx, dy, inverse;  // in cells; inverse of the squared length
+    float x, y, dx, dy, inverse;  // start and direction in cells; inverse of the squared length, or 0
 };
 
 float squared_distance(const Edge& e, float x, float y) {

@@ -28,7 +28,7 @@ using detail::LeafBand;
 using detail::LeafBounds;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kHeatTolerance = 1e-4;  // maximum error, as a fraction of the brightness range
+constexpr double kHeatTolerance = 1e-4;  // maximum error of the smoothed image, as a fraction of the brightness range
 // [standard deviations] Distance beyond which the weights of the Gaussian are negligible: half and twice this distance
 // give the same result.
 constexpr double kHaloSigmas = 3.0;

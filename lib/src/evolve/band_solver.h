@@ -34,7 +34,8 @@ public:
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
-    /// The band's leaves, which of them are active, and the motion that the next step needs from the steps before.
+    /// What a solver passes on to the solver of the next band, see keep_inactive(): the band's leaves, which of them
+    /// are active, and how far the surface has moved in each.
     struct LeafStates {
         LeafBand band;
         std::vector<unsigned char> active;

@@ -36,7 +36,7 @@ void remove_flows(const std::string& folder) noexcept {
     }
 }
 
-/// Whether a regular file at the path contains exactly that text; files of other origin are not trusted.
+/// Whether a regular file at the path contains exactly that text.
 bool holds(const fs::path& path, const std::string& text) {
     std::error_code status;
     if (!fs::is_regular_file(path, status) || fs::file_size(path, status) != text.size()) return false;

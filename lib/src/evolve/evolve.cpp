@@ -218,7 +218,8 @@ private:
 
     [[nodiscard]] double inactive_below() const { return kEvolve.inactive_fraction * options_.tolerance * tau_; }
 
-    // For a fixed band. @return remaining motion of the surface, voxels per step
+    // For a fixed band: updates which leaves are active. @return remaining motion of the surface, voxels per step: the
+    // smaller one of `motion` and its net motion
     double keep_band(double motion) {
         solver_->update_active_leaves(solver_->largest_changes(), inactive_below());
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
@@ -240,7 +241,8 @@ private:
             rebuild_band(left, largest);
         else if (!front.is_distance)
             solver_->redistance(tracking_clamp(options_));
-        // After the redistancing, so that leaves become inactive in the same phase in which the evolution ends.
+        // After the redistancing: a leaf that becomes inactive then keeps values of the phase of the cycle in which the
+        // evolution ends.
         if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
         return std::min(motion, front.moved / kCycle);
     }
@@ -272,8 +274,9 @@ private:
                 *flattest >= detail::kFlattest && *steepest <= detail::kSteepest};
     }
 
-    // Rebuilds the band around the moved surface; solver_ is null afterwards if no surface remains. @param left  leaves
-    // that the front has left, or is about to. @param largest  in: for each previous leaf; out: for each new leaf
+    // Rebuilds the band around the moved surface; solver_ is null afterwards if no surface remains.
+    // @param left     leaves that the front has left, or is about to
+    // @param largest  displacements from measure_front(); in: for each previous leaf; out: for each new leaf
     void rebuild_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));

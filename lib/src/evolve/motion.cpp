@@ -213,8 +213,8 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
             flips += __builtin_popcountll(flipped);
         }
         const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
-        // A leaf in which the front has moved half of that distance is rebuilt with the others; otherwise the band
-        // would have to be rebuilt again soon.
+        // A leaf in which the front has moved half of kMotion.left_by is rebuilt together with those that are due;
+        // otherwise the band would have to be rebuilt again soon.
         states[leaf] = deep                           ? kDeepDown
                        : moved >= kMotion.left_by     ? kLeft
                        : moved >= kMotion.left_by / 2 ? kLeaving

@@ -16,7 +16,7 @@ struct LeafMotion {
     bool negative = false, positive = false;  ///< signs of u in the leaf
     bool finite = true;
 
-    /// The motion of a leaf with the same signs that no longer moves.
+    /// The motion in a later step in which the leaf's values do not change.
     [[nodiscard]] LeafMotion without_motion() const {
         LeafMotion still = *this;
         still.displacement = 0.0;
@@ -94,7 +94,8 @@ public:
     /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one with the same values, or
     /// -1
     void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
-    /// The leaves that are due or close to it; empty if the band does not have to be rebuilt.
+    /// The leaves to rebuild: those that are due, and those in which the front has moved at least half as far. Empty as
+    /// long as less than kCommon.minority of the leaves with a front are due and the front has passed no deep voxel.
     [[nodiscard]] std::vector<std::size_t> due_leaves(const LeafArray<float>& u) const;
     void exchange(StateFile& file);
 

@@ -39,7 +39,7 @@ public:
         }
         array(values.data(), values.size());
     }
-    /// A number that has to be the same when it is read. @throws Error InvalidInput.
+    /// Writes the number, or compares it with the one in the file. @throws Error InvalidInput if they differ.
     void same(std::uint64_t number);
     /// To be called after the last value. @throws Error Io, InvalidInput.
     void finish();

@@ -19,7 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// The process that holds a lock, as "process 712 (rsync)", from the system's list of locks.
+/// The process that holds a lock, as "process 712 (rsync)", from the system's list of locks; "another program" if it is
+/// not in this list.
 std::string holder_of(const FileId& file) {
     char place[64];
     std::snprintf(place, sizeof place, " %02x:%02x:%ju ", ::major(file.device), ::minor(file.device),

@@ -96,7 +96,8 @@ public:
         manifest_ = read_manifest(scratch_);
     }
 
-    /// @returns whether the folder may be removed
+    /// Puts the files of all folders of the set in place, or restores the old ones, as the set's commit states. Without
+    /// a commit, nothing is changed. @returns whether this scratch folder may be removed
     bool finish() {
         if (!manifest_) return !fs::exists(fs::symlink_status(scratch_ / kManifest));
         const std::size_t self = own_number();
@@ -132,8 +133,9 @@ private:
         return false;
     }
 
-    /// Reads the commit, which is in another folder.
-    /// @param known  becomes false if that folder is inaccessible and no file is in place
+    /// Reads the commit, which is in another folder; none if it was not written. If it cannot be read, but a file of
+    /// this folder is in place, the set is to be completed.
+    /// @param known  becomes false if that folder's parent is inaccessible and no file is in place
     [[nodiscard]] std::optional<SetOutcome> fate_elsewhere(bool& known) const {
         const ScratchPlace& first = manifest_->scratches.front();
         known = id_of(first.path.parent_path()).inode == first.folder;

@@ -53,12 +53,12 @@ enum class SetOutcome { Complete, PutBack };
 
 /// @throws Error Io.
 void write_manifest(const std::filesystem::path& scratch, const Manifest& manifest);
-/// Records that the set is to be completed, or undone. @throws Error Io.
+/// Records in the set's first scratch folder that the set is to be completed, or undone. @throws Error Io.
 void write_commit(const std::filesystem::path& first, const std::string& set, SetOutcome fate);
 
-/// Exchanges the files at `from` and `to`, or moves `from` if there is none at `to`.
+/// Exchanges the files at `from` and `to`, or moves `from` if there is none at `to`. @returns whether that succeeded
 bool exchange(const std::filesystem::path& from, const std::filesystem::path& to);
-/// Undoes exchange().
+/// Undoes exchange(). @returns whether that succeeded
 bool exchange_back(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Completes or removes what terminated processes left in a folder. @pre the folder is locked by the caller

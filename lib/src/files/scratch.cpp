@@ -76,7 +76,7 @@ AbandonedScratch::State AbandonedScratch::read_state() {
     const std::string text = read_all(lock_.get());
     if (text.empty()) return contents(folder_).empty() ? State::Unstarted : State::Foreign;
     for (const bool all : {true, false}) {
-        // A copy of such a folder has another inode, so the mark does not match.
+        // The mark contains the scratch folder's inode; in a copy of the folder, it therefore does not match.
         const std::string mark = scratch_mark(own.st_ino, all);
         if (!text.starts_with(mark)) continue;
         names_ = std::string(1, '\0') + text.substr(mark.size());

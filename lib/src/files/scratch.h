@@ -20,6 +20,8 @@ constexpr const char* kCommit = ".covol-commit";
 [[nodiscard]] bool is_output_name(const std::string& name);
 
 /// The beginning of the contents of a scratch folder's lock.
+/// @param folder  the folder's inode
+/// @param all     whether all its contents may be removed; false: only the files whose names follow
 [[nodiscard]] std::string scratch_mark(ino_t folder, bool all);
 
 /// A scratch folder that another process made. Its lock is a file of this user that begins with scratch_mark(),

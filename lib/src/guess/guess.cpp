@@ -61,7 +61,8 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& o
     if (const double stated = longest(options.deviation); options.max_deviation > stated && stated > 0)
         result.max_factor = options.max_deviation * options.max_deviation / (stated * stated);
     result.world = options.faces;
-    if (options.normals.size() == marks.size()) result.normals = options.normals;  // unusable if marks were left out
+    // If marks were left out, it is unknown to which marks the normals belong.
+    if (options.normals.size() == marks.size()) result.normals = options.normals;
     return result;
 }
 
@@ -176,7 +177,7 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
     if (doubtful.empty() || sure.size() < kCommon.ring || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kCommon.rounds && held != before;
-         ++round) {  // each round adds marks near the section's outline, which makes it more accurate
+         ++round) {  // marks that are added near the section's outline make the next round's body more accurate
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {

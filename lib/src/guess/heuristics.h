@@ -9,18 +9,20 @@ namespace covol {
 /// The guess from marks: guess.cpp.
 struct GuessHeuristics {
     /// [ellipsoids around the marks] Size of the ellipsoid on which constraints close a surface that extends beyond one
-    /// of twice that size; the surface through marks on half a ball closes within 2.
+    /// of twice that size. The surface through marks on half a ball closes within an ellipsoid of size 2, and gets no
+    /// constraints.
     double held_at = heuristic("guess.held_at", 1.5);
-    /// [pi] Minimum angle between the directions to neighbouring marks in a cut that counts as a gap: beside a straight
-    /// line of marks it is pi.
+    /// [pi] Minimum angle, in the plane of a cut, between the directions from a mark to two successive ones of its
+    /// nearest marks for which the mark counts as not surrounded. At a straight border of an area with marks it is pi.
     double way_out = heuristic("guess.way_out", 5.0 / 6);
 };
 COVOL_HEURISTICS GuessHeuristics kGuess{};
 
 /// A guess corrected by marks: guess_correction.cpp.
 struct CorrectionHeuristics {
-    /// [distances between mark and guess] Radius of a bump that moves the guess inward: above 2.11 the result is still
-    /// a level set (its slope does not change sign), see the public header.
+    /// [distances between mark and guess] Radius of a bump that moves the guess inward. Above 2.11 the bump is less
+    /// steep than the guess's distance, so that the result remains monotone across the surface
+    /// (covol/guess_correction.h).
     double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
     /// [distances between mark and guess] Radius of a bump that moves the guess outward; a wide one inflates the
     /// correct surface beside a missing part (tests/bench/marks/correction.py).

@@ -20,19 +20,21 @@ namespace {
 // Fraction of the stated variance below which marks count as exact, so that no smaller variance is tried: the standard
 // deviation is then about 1/30 of the stated one.
 constexpr double kExact = 1e-3;
-// Weight of the whole, relative to that of a patch at the patch's centre. It is small, because the whole only has to
-// continue the patches where their weights decrease to 0.
+// Weight of the whole (the surface through a spread-out subset of the marks), relative to that of a patch at its
+// centre. It is small, because the whole only has to continue the patches where their weights decrease to 0.
 constexpr double kWholeWeight = 1e-3;
 
 /// Number of marks whose normals are optimised first, from several initial directions. The time grows with the cube of
-/// the number, so that several attempts with a third of the marks take less time than one with all marks of the whole.
+/// the number, so that several attempts with a third of kMarks.whole marks take less time than one with all.
 std::size_t oriented_marks() { return kMarks.whole / 3; }
 
-/// Number of marks in a patch. Its core, a fourth of the marks and as many as a quadric is fitted to, lies within half
-/// of its radius; the patches are chosen such that each mark is in the core of one.
+/// Number of marks in a patch. A fourth of them, those nearest to its centre, are its core: as many as a quadric is
+/// fitted to. On a surface the core extends to about half of the patch's radius. Each mark is in the core of some
+/// patch.
 std::size_t part_marks() { return 4 * kCommon.quadric; }
 
-/// Ratio between successive variances that are compared: 4, so that the standard deviation doubles.
+/// Ratio between the variances of the marks that are tried one after the other: 4, so that the standard deviation
+/// changes by a factor of 2.
 double variance_step() { return std::pow(kCommon.growth, 4); }
 
 Vec3 unit_or_x(const Vec3& v) {

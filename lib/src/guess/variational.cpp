@@ -26,10 +26,11 @@ using Point = Eigen::Vector3d;
 constexpr int kPolynomial = 4;  // number of the polynomials 1, x, y, z, whose energy is 0
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
 constexpr int kMaxSteps = 500;       // maximum number of L-BFGS iterations; it converges earlier
-constexpr int kAmplitudeRounds = 3;  // number of estimates of the amplitude, which has then converged
-constexpr int kDirections = 64;      // number of points on an ellipsoid; half and twice as many give the same surfaces
+constexpr int kAmplitudeRounds = 3;  // number of estimates of the amplitude of f's covariance, which has then converged
+constexpr int kDirections = 64;      // points on an ellipsoid around the marks; half or twice as many change no surface
 constexpr double kMinLambda = 1e-9;  // minimum lambda, which keeps the matrix regular if marks coincide
-constexpr double kAround[] = {1.15, 1.5};  // sizes of the ellipsoids on which the sign of f is tested
+// Sizes of the ellipsoids around the marks on which the sign of f is tested; one of size 1 passes through a mark.
+constexpr double kAround[] = {1.15, 1.5};
 
 /// Minimum-energy interpolation at fixed nodes: for given values, the energy as a function of the gradients g is g^T H
 /// g + 2 c^T g + constant. energy() returns H, and linear() returns c and the constant.
@@ -93,10 +94,10 @@ public:
     [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
 
 private:
-    /// The energy of gradients is |W g|^2, W = L^-1 (Q^T E)', where E contains the gradients' unit vectors and '
-    /// removes the polynomials' rows. Q^T E = E - V T^T V^T E in the compact form of its reflections, so that W = [0;
-    /// S] - X Y, with S the inverse of the gradients' triangle of L, X = L^-1 V' and Y = T^T V^T E, which have four
-    /// columns and rows.
+    /// The energy of gradients is |W g|^2, W = L^-1 (Q^T E)'. Q is the factor of the polynomials' QR decomposition,
+    /// L the Cholesky factor of the matrix on their complement; E contains the gradients' unit vectors, ' removes the
+    /// polynomials' rows. Q^T E = E - V T^T V^T E with Q's reflections V, so that W = [0; S] - X Y, S being the inverse
+    /// of the gradients' corner of L, with X = L^-1 V' (four columns) and Y = T^T V^T E (four rows).
     void whiten() {
         const Index rest = size_ - kPolynomial;
         Matrix reflections = qr_.matrixQR();
@@ -355,7 +356,8 @@ bool span_space(const std::vector<Vec3>& marks) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    constexpr double kRounding = 1e-8;  // below this ratio of their variances, marks are coplanar
+    // Below this ratio of the smallest to the largest variance along a principal axis, marks are coplanar.
+    constexpr double kRounding = 1e-8;
     return axes[0] > kRounding * axes[2];
 }
 
@@ -404,7 +406,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     Vector values = Vector::Zero(count), variance = Vector::Zero(count);
     for (Index n = 0; n < marks; ++n) variance[n] = given.variance[std::size_t(n)] / (radius_ * radius_);
     for (Index n = marks; n < count; ++n) values[n] = given.seed_value[std::size_t(n - marks)] / radius_;
-    Vector before = Vector::Zero(3 * marks);  // the gradients of the function that is known beforehand
+    Vector before = Vector::Zero(3 * marks);  // Constraints::known_gradient, or 0 if there is no known function
     for (Index n = 0; n < Index(given.known_value.size()); ++n) {
         values[n] = -given.known_value[std::size_t(n)] / radius_;
         before.segment<3>(3 * n) = to_point(given.known_gradient[std::size_t(n)]);

@@ -104,7 +104,8 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
     constexpr double kIgnoredWeight = 1e-8;  // differences of weights up to this are ignored
-    // If most weights are 1, the sum starts from all_, so that only the places with other weights have to be added.
+    // If most weights are 1, the sum starts from all_, which has weight 1 for all places, so that only the places with
+    // other weights have to be added.
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
     const double maximum = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;
     Counts total = maximum > 0 ? all_ : Counts();

@@ -39,7 +39,7 @@ double squared(double x) { return x * x; }
 /// Moves a surface step by step from the guess to the border.
 class Guide {
 public:
-    /// @param guess  a start: a signed distance, clamped to the narrow band
+    /// @param guess  the initial surface: a signed distance, clamped to the narrow band
     Guide(FloatGridPtr guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
           GuidanceReport& report, const RunContext& run)
         : marks_(marks),
@@ -82,7 +82,7 @@ private:
 
     struct ValidationResult {
         double prior2, error2, response, slope2;
-        std::vector<double> off2;  // squared difference between offset and mark, by mark
+        std::vector<double> off2;  // by mark: squared difference between mark and offset, world units^2
     };
     [[nodiscard]] ValidationResult cross_validate(const OffsetField& field, double prior) const;
     [[nodiscard]] std::vector<double> local_error2(const ValidationResult& validation) const;
@@ -101,10 +101,10 @@ private:
     double h_;
     FloatGridPtr surface_;
     FloatGridPtr start_;                    // the signed distance to the guess in a wide band
-    std::optional<WideDistance> distance_;  // the same for the current surface
+    std::optional<WideDistance> distance_;  // the signed distance to surface_ in a wide band
 
     // about the guess:
-    double guess2_ = 0;  // squared error of the guess at the marks, world units
+    double guess2_ = 0;  // squared error of the guess at the marks, world units^2
     double misfit_ = 0;  // 0: the errors of the marks explain their distances from the guess; 1: they do not
     double prior_ = 0;   // prior standard deviation of the offsets, chosen in the first iteration
     double sigma_ = 0;

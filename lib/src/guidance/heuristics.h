@@ -13,7 +13,8 @@ struct GuidanceHeuristics {
     double farthest = heuristic("guidance.farthest", 12.0);
     /// [voxels] Width of a patch of the surface with a single offset.
     double patch_width = heuristic("guidance.patch_width", 2.0);
-    /// [patches] Maximum number along the marks' spacing: offsets are not resolved at shorter lengths.
+    /// [patches] Maximum number of patches side by side within the spacing of the marks, because offsets are not
+    /// resolved at shorter lengths. If marks are farther apart, the patches are wider.
     double patches_per_spacing = heuristic("guidance.patches_per_spacing", 4);
     /// [marks] Weight of the prior when a distribution or an error is estimated from some marks. For nearby marks the
     /// prior is the estimate from all marks.

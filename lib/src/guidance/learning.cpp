@@ -119,7 +119,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
         const SmoothImage::Line line = image.along(first, {step * normal[0], step * normal[1], step * normal[2]});
         if (!line.sample(0, row.values[0])) continue;
         for (const int side : {-1, 1}) {
-            int checked = 0;  // last step that needs no further evaluation of the distance
+            int checked = 0;  // last step up to which no other part of the surface can be closer
             for (int s = 1; s <= reach; ++s) {
                 if (s > checked) {
                     const double away = s * step;
@@ -176,7 +176,9 @@ LearntProfile::LearntProfile(const Scene& scene, const std::vector<PatchMark>& m
     });
 }
 
-/// Predicts each mark from the profile at the other marks. Replaces the current settings if the prediction is better.
+/// Predicts each mark from the profile at the other marks, with several degrees of trust in the image. The profile and
+/// the trust with the largest gain minus its standard error of all tests so far are kept.
+/// @param local  whether nearby marks have higher weights
 void LearntProfile::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
                          bool local) {
     std::vector<BorderTable> tables(marks.size());

@@ -64,7 +64,9 @@ private:
               bool local);
 
     BorderProfile profile_;
-    std::vector<BorderTable> tables_, held_out_;  // tables_: by place, or one if not local_; held_out_: by place
+    // tables_ contains one table for each place, or a single one if not local_; held_out_ contains for each place a
+    // table that was learnt without it.
+    std::vector<BorderTable> tables_, held_out_;
     // Standard deviation of the Gaussian by which marks are weighted with their distance, if the profile varies with
     // the position.
     double radius_ = 0;

@@ -29,7 +29,8 @@ using namespace guidance;
 
 constexpr int kStepsOfSample = kStepsPerVoxel / 2;
 constexpr int kParts = 8;  // offsets are compared at multiples of 1 / kParts of a step
-// [voxels] The smallest difference between offsets.
+// [voxels] The smallest difference between offsets that are compared, and the smallest step in the search for a
+// translation.
 constexpr double kFinest = 1.0 / (kStepsPerVoxel * kParts);
 constexpr double kMinNoise = 1e-6;  // of the variance of intensity; the noise, a divisor, is 0 between equal images
 
@@ -240,12 +241,12 @@ double Motion::mismatch(const Vec3& shift) const {
         all.add(of_patch[n]);
         expected += samples[n];
     }
-    // A shift by which most samples leave the image is rejected.
+    // A shift by which most samples leave the image is rejected: the result is the maximum of 1 - correlation.
     return 2 * all.count() < expected ? 2.0 : 1 - all.correlation();
 }
 
-/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), with steps from half of the maximum movement down to a
-/// fraction of a voxel.
+/// Searches the translation with the smallest mismatch() by a pattern search (Hooke and Jeeves, J. ACM 8(2), 1961),
+/// with steps from half of the maximum movement down to a fraction of a voxel.
 void Motion::translate() {
     double best = mismatch(translation_);
     const double standing = best;

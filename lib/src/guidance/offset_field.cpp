@@ -91,7 +91,8 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     const std::vector<double> pull = *precision_ * field;
     std::vector<double> site(count, 0.0), prior_precision(count), known(count, 0.0), right(count);
     for (int round = 0; round < (requested ? kCommon.rounds : 1); ++round) {
-        // The current offset of a patch is used as its prior mean; its precision grows with that of its neighbours.
+        // The prior of a patch for its evidence has the current offset as its mean. Its precision is that of the
+        // patch's own prior and fixed offset, plus half of the precision of each neighbour's evidence and fixed offset.
         for (std::size_t i = 0; i < count; ++i) {
             prior_precision[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
             for (const std::uint32_t j : patches_.neighbours[i])

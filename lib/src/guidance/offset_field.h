@@ -31,7 +31,7 @@ public:
     /// @param evidence         by patch
     /// @param fixed, fixed_precision  other known offsets, such as those of marks, and their 1 / variance, by patch;
     /// precision 0: unknown
-    /// @param shift  a change of the prior's mean, for Fit::carried; may be null
+    /// @param shift  by patch, a change of the prior's mean, of which Fit::carried is the effect; null: not computed
     [[nodiscard]] Fit fit(const std::vector<double>& mean, const std::vector<double>& deviation,
                           const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,
                           const std::vector<double>& fixed_precision, const std::vector<double>* shift) const;

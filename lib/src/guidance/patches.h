@@ -47,7 +47,7 @@ struct Patches {
 void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
 /// Interpolates values of patches to a smooth function on the vertices.
-/// @param width  of the patches
+/// @param width  of the patches, world units
 [[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
                                               const std::vector<double>& by_patch);
 

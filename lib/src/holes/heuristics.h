@@ -6,17 +6,19 @@ namespace covol {
 
 /// Holes of a cloud: holes.cpp.
 struct HolesHeuristics {
-    /// [spacings, and voxels] Automatic distance from the points beyond which a surface is a hole: the larger one.
+    /// [spacings, and voxels] Automatic distance from the points beyond which a surface is a hole: so many spacings of
+    /// the points or so many voxels, whichever is longer.
     double far = heuristic("holes.far", 3);
-    /// [fraction of that distance] Standard deviation of the smoothing of the rim: removes undulations shorter than
-    /// about three standard deviations.
+    /// [fraction of that distance] Standard deviation of the smoothing of a hole's rim, relative to the distance beyond
+    /// which a surface is a hole. It removes undulations shorter than about three standard deviations.
     double smoothing = heuristic("holes.smoothing", 0.5);
 };
 COVOL_HEURISTICS HolesHeuristics kHoles{};
 
 /// The cut along a hole's rim: cut.cpp.
 struct CutHeuristics {
-    /// [edges] Distance from the line below which a vertex is moved onto it.
+    /// [edges] Distance of a vertex from the line of the cut, measured along an edge of the mesh, below which the
+    /// vertex is moved onto the line.
     float close = heuristic("cut.close", 0.3F);
 };
 COVOL_HEURISTICS CutHeuristics kCut{};

@@ -67,7 +67,8 @@ detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
 }
 
 /// Divides a mesh into holes, which are removed, and a kept part: a triangle is kept if no ball of radius `distance` -
-/// `slack` around a bare position reaches it, and if it is not in a small piece.
+/// `slack` around a bare position, which is at least `distance` from all points, reaches it, and if it is not in a
+/// small piece.
 class HoleFinder {
 public:
     HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)

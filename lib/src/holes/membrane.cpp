@@ -14,8 +14,9 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-// Maximum number of solutions, each with the cotangents of the previous one: Pinkall and Polthier, Computing discrete
-// minimal surfaces, Exp. Math. 2(1), 1993. The iteration usually converges in fewer rounds.
+// Maximum number of times that the positions of the vertices are solved for, each time with the cotangents of the
+// previous positions: Pinkall and Polthier, Computing discrete minimal surfaces, Exp. Math. 2(1), 1993. The iteration
+// usually converges in fewer rounds.
 constexpr int kMaxRounds = 20;
 // Weights are limited to between this cotangent and its inverse, because triangles without area have no cotangents. The
 // limits hardly affect the result, because such triangles contribute no area.

@@ -15,7 +15,7 @@ namespace covol::detail {
 BeyondPoints measure_beyond(const FloatGrid& surface, const std::vector<Vec3>& points, double distance,
                             const RunContext& run) {
     const KdTree tree(points);
-    std::vector<double> distances;  // of the piece's vertices to the points; the previous piece's are kept
+    std::vector<double> distances;  // from the piece's vertices to the points; kept for vertices in the next piece
     std::uint64_t first = 0;
     double area = 0, beyond = 0;
     BeyondPoints result;

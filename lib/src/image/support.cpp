@@ -10,7 +10,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr int kWindow = 4, kBeside = 10;  // half steps: window around a position, and distance of the windows beside it
+// Half steps along a normal: half width of a window, and distance from a place to the two windows beside it.
+constexpr int kWindow = 4, kBeside = 10;
 constexpr int kReach = 10, kPlaces = 2 * kReach + 1;
 
 /// Voxels and values of the image at multiples of half a step along the normal at a place. Negative positions are
@@ -109,7 +110,7 @@ double mean_strength(const std::vector<Strengths>& lines, int at) {
     return 2 * count < lines.size() ? 0 : sum / double(count);
 }
 
-/// Probability that a value of `first` exceeds one of `second`.
+/// Probability that a value of `first` exceeds one of `second`; equal values count half.
 double probability_above(const std::vector<double>& first, std::vector<double> second) {
     std::sort(second.begin(), second.end());
     double sum = 0;

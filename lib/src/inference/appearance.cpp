@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFeatureSigmas[kScales] = {0.6, 1.2, 2.4};  // [smallest spacing of the lattice]
 constexpr int kRounds = 20;
-constexpr double kConverged = 1e-2;  // change of a coefficient below which the iteration ends
+constexpr double kConverged = 1e-2;  // Newton's method ends if no coefficient changes by more
 
 }  // namespace
 

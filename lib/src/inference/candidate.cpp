@@ -209,7 +209,7 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
             const double above =
                 std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.above_hull);
             double value = std::clamp(appearance.log_odds(at), -maximum, maximum);
-            value = std::max(value - maximum * above, -maximum);  // decreases with the height above the hull
+            value = std::max(value - maximum * above, -maximum);  // inside is less probable with height above the hull
             if (refine != nullptr) {
                 const double off = refine->lattice.value(coarse, lattice.place(i, j, k)) / refine->lattice.finest();
                 if (std::abs(off) > kHalfWidthVoxels) value = off < 0 ? maximum : -maximum;

@@ -44,7 +44,7 @@ struct Solid {
     std::vector<char> inside;  ///< for each node, whether it is inside; empty if there is no body
 
     [[nodiscard]] bool empty() const { return inside.empty(); }
-    /// Approximate signed distance to its surface, smoothed by less than a cell.
+    /// Approximate signed distance to the body's surface, negative inside, smoothed by less than a cell.
     [[nodiscard]] Field level() const;
 };
 

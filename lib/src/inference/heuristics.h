@@ -18,29 +18,33 @@ struct InferenceHeuristics {
     std::size_t guess_marks = heuristic("inference.guess_marks", 150);
     /// [spacings] Height above the marks' convex hull from which on a body is improbable.
     double above_hull = heuristic("inference.above_hull", 0.5);
-    /// [log odds] Maximum for a single position, and the decrease per spacing above that height.
+    /// [log odds] Maximum for a single position, and the decrease of the log odds of inside per spacing of height above
+    /// above_hull.
     double max_odds = heuristic("inference.max_odds", 4);
-    /// [cells of surface] Area that costs as much as one cell on the wrong side of log odds of 1.
+    /// [cells of surface] Area of surface of weight 1 that costs as much as a cell that is put inside although its log
+    /// odds of outside are 1, or the reverse.
     double odds_weight = heuristic("inference.odds_weight", 0.6);
-    /// [cells or voxels] Maximum plausible distance of a correct mark from the surface that it marks.
+    /// [cells or voxels] Maximum plausible distance of a correct mark from the surface that it marks: cells on the
+    /// lattice of an inferred body, otherwise voxels.
     double off_cells = heuristic("inference.off_cells", 2);
     /// [of the marks] Maximum fraction that may lie off a body; with more, the body is rejected. It is also the maximum
     /// fraction that is left out as wrong.
     double max_off = heuristic("inference.max_off", 0.2);
     /// [of the marks] Fraction that is expected to be wrong. Parts of a body near a smaller fraction are dropped.
     double wrong = heuristic("inference.wrong", 0.05);
-    /// [voxels] Maximum distance by which a guess may miss a mark.
+    /// [voxels] Distance up to which misses of a guess are measured: margin of the box around the missed marks in which
+    /// the distances from its surface are computed.
     double farthest_miss = limit("inference.farthest_miss", 30);
     /// [bits] Minimum information that the image gives about the two sides of a guess; with less it is not redrawn.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
-    /// [1 - Dice] Expected value for a result whose error times its area equals its volume. It was fitted to 118 runs
-    /// of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were not used for the fit,
-    /// 92 % lie in the interval.
+    /// [1 - Dice] Expected value for a result whose mean error at held-out marks times its area equals its volume. It
+    /// was fitted to 118 runs of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were
+    /// not used for the fit, 92 % lie in the interval that follows from expected_factor.
     double expected_scale = heuristic("inference.expected_scale", 0.47);
-    /// [power] Of that error in the expected value of 1 - Dice.
+    /// [power] Exponent of the ratio error * area / volume in the expected value of 1 - Dice.
     double expected_power = heuristic("inference.expected_power", 1.15);
-    /// [ratio] Of the actual to the expected 1 - Dice: it is larger in one of twenty runs, and smaller than the inverse
-    /// in one of twenty.
+    /// [ratio] Ratio of the actual to the expected 1 - Dice that one of twenty runs exceeds; in one of twenty it is
+    /// smaller than the inverse.
     double expected_factor = heuristic("inference.expected_factor", 2);
 };
 COVOL_HEURISTICS InferenceHeuristics kInference{};

@@ -38,7 +38,7 @@ struct HeldOut {
     std::vector<double> of_body, of_guess;
     std::vector<double> to_rest2;  // squared distance to the nearest mark of the training set
 
-    /// Weighted mean of both distances. @param shrink  factor by which a finer lattice reduces the body's errors
+    /// Weighted mean of of_guess and of_body. @param shrink  factor by which a finer lattice reduces of_body
     [[nodiscard]] double of_both(std::size_t n, double guess_weight, double shrink = 1) const {
         return guess_weight * of_guess[n] + (1 - guess_weight) * shrink * of_body[n];
     }
@@ -60,7 +60,8 @@ public:
     [[nodiscard]] bool find(InferenceReport& report);
     /// The body that was found, on a finer lattice.
     [[nodiscard]] Solid refined() const;
-    /// Whether further marks are probably wrong. They are left out from here on, and the body has to be recomputed.
+    /// Leaves out further marks that are probably wrong; returns false if there are none, or too many. Otherwise the
+    /// body has to be recomputed.
     [[nodiscard]] bool leave_out_wrong(const HeldOut& held);
     [[nodiscard]] bool leaves_out(const Vec3& mark) const {
         return std::find(wrong_.begin(), wrong_.end(), mark) != wrong_.end();
@@ -252,9 +253,9 @@ public:
                             std::clamp(held.of_guess[n], -maximum, maximum)});
     }
 
-    /// The weight of the guess, in [0,1], for which the weighted mean of both predicts the marks best (stacking:
-    /// Wolpert, Neural Networks 5(2), 1992), by the mean absolute error, smoothed about 0, which is minimized by
-    /// iteratively reweighted least squares.
+    /// The weight of the guess, in [0,1], for which the weighted mean of guess and body predicts the marks best
+    /// (stacking: Wolpert, Neural Networks 5(2), 1992), by the mean absolute error, smoothed about 0, which is
+    /// minimized by iteratively reweighted least squares.
     [[nodiscard]] double weight_of_guess() const {
         constexpr int kRounds = 30;
         double weight = 0.5;
@@ -450,7 +451,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });
-        const auto reject_body = [&](const char* reason) {  // also restores marks that the body shows as wrong
+        const auto reject_body = [&](const char* reason) {  // marks that the body showed as wrong are restored
             report.wrong_marks.clear();
             result.marks = world;
             keep_guess(reason);

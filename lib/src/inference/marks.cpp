@@ -82,7 +82,9 @@ void Marks::choose_spread() {
 
 void Marks::make_hull(const ImageGeometry& geometry) {
     constexpr int kDirections = 200;
-    constexpr double kTowards = 0.3;         // minimum cosine between an axis of the image and directions to its end
+    // If marks are close to an end of the image, half-spaces are dropped whose normal has at least this cosine with the
+    // direction of the axis towards this end.
+    constexpr double kTowards = 0.3;
     for (int n = 0; n < kDirections; ++n) {  // directions of a Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653, r = std::sqrt(1 - z * z);
         const Vec3 direction{r * std::cos(phi), r * std::sin(phi), z};

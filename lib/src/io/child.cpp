@@ -27,16 +27,17 @@
 namespace covol::detail {
 namespace {
 
-/// File descriptors in the started program: the shared memory of the orders and of the results, the writing end of a
-/// pipe that is closed when the program ends, and the first descriptor that the program does not inherit.
+/// File descriptors in the started program: the shared memory with the Orders (the pieces to process), the shared
+/// memory for the results, the writing end of a pipe that is closed when the program ends, and the first descriptor
+/// that the program does not inherit.
 constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
 // Signals that stop programs. The started program ignores them, because wait_for() stops it.
 constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};
 
 enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kNoMemory, kCrashed };
 
-/// State and answer of a piece, shared by both processes. In new memory, which is zero, each piece has the state
-/// kWaiting.
+/// State and answer of a Piece (a file to read), shared by both processes. In new memory, which is zero, each piece has
+/// the state kWaiting.
 struct Slot {
     std::uint32_t state;
     std::int32_t code;
@@ -59,8 +60,8 @@ struct Slot {
     }
 };
 
-/// Layout of the orders in shared memory: this header, a Place for each piece, a Slot for each piece, and the texts of
-/// the pieces.
+/// Layout of the shared memory of Orders, which describes the pieces that the started program processes: this header, a
+/// Place for each piece, a Slot for each piece, and the texts of the pieces.
 struct Head {
     std::uint64_t count;
     std::uint32_t task;
@@ -103,7 +104,7 @@ private:
     SharedMemory memory_;
 };
 
-/// The pieces with the indices [begin, end), which one process works on.
+/// The pieces (files to read) with the indices [begin, end), which one process works on.
 struct Batch {
     Slot* slots;
     std::size_t begin, end;
@@ -202,7 +203,8 @@ double cpu_seconds(pid_t process) {
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-/// Waits until the program ends. Kills the program if it takes too long for a piece, or if the run is cancelled.
+/// Waits until the program ends. Kills the program if it takes too long for a piece (a file to read), or if the run is
+/// cancelled.
 /// @param pipe  the reading end of a pipe whose writing end is closed when the program ends
 /// @param seconds  maximum CPU time for one piece
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {

@@ -63,10 +63,10 @@ struct PieceOutcome {
     std::vector<char> answer;      ///< kAnswerBytes bytes; empty if the piece crashed or was refused
 };
 
-/// Runs `program` for the pieces, and starts it again for the remaining ones after a piece has crashed it. Each process
-/// works on a batch of pieces; as many processes run at once as the caller's arena has threads. A process inherits no
-/// environment variable but LD_LIBRARY_PATH and no file descriptors of the caller, and ignores SIGINT, SIGTERM and
-/// SIGHUP; it is killed when the calling thread ends.
+/// Runs `program` for the pieces (files to read), and starts it again for the remaining ones after a piece has crashed
+/// it. Each process works on a batch of pieces; as many processes run at once as the caller's arena has threads. A
+/// process inherits no environment variable but LD_LIBRARY_PATH and no file descriptors of the caller, and ignores
+/// SIGINT, SIGTERM and SIGHUP; it is killed when the calling thread ends.
 /// @param task     what the program does with each piece; run_pieces() passes this number on without interpreting it
 /// @param results  memory for the pieces' results
 /// @param seconds  maximum CPU time for one piece; the elapsed time may be ten times as long

@@ -12,7 +12,8 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kMaxInLines = 4;  // maximum number of structures; with more, only warnings are logged
+// Maximum number of structures of which all messages are logged; with more, only warnings are.
+constexpr std::size_t kMaxInLines = 4;
 
 /// Adds the normals and the directions to the sensor of a cloud whose points `world` are the last points of `marks`.
 /// The points without a normal or a direction get a vector of zeros; a list remains empty until a cloud has values for

@@ -44,8 +44,8 @@ private:
     std::map<const PaintedImage*, Painted> images_;
 };
 
-/// Rejects a tag distance above the diagonal of the points' box, because no enclosed position is that far from all
-/// points.
+/// Rejects a tag distance, half of the widest gap between points that is closed, above the diagonal of the points' box,
+/// because no enclosed position is that far from all points.
 void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
     if (points.empty()) return;
     const WorldBox box = bounding_box(points);
@@ -58,7 +58,7 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
                     "tag_distance");
 }
 
-/// Prepares one structure after the other.
+/// Makes the StructureInput of one structure after the other.
 class Preparer {
 public:
     Preparer(std::vector<Marks> structures, const std::optional<ImageGeometry>& image, const SegmentOptions& options,

@@ -48,7 +48,7 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     for (std::uint32_t c = 0; c < corners; ++c) {
         if (opposite_[c] != kNone) continue;
         on_boundary_[vertex(next(c))] = on_boundary_[vertex(previous(c))] = 1;
-        corner_of_[vertex(next(c))] = next(c);  // the first corner: no triangle follows clockwise
+        corner_of_[vertex(next(c))] = next(c);  // the vertex's first corner: no triangle follows clockwise
     }
 }
 
@@ -93,7 +93,7 @@ void CornerTable::unflip(std::uint32_t corner) {
     link(c, o);
     if (corner_of_[w] == previous(c)) corner_of_[w] = o;
     if (corner_of_[v] == previous(o)) corner_of_[v] = c;
-    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // if a is on the boundary: its first corner
+    if (corner_of_[a] == next(c)) corner_of_[a] = previous(o);  // corner_of_ must be the first corner at a boundary
     if (corner_of_[b] == next(o)) corner_of_[b] = previous(c);
 }
 

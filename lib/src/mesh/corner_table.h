@@ -73,7 +73,7 @@ private:
     std::vector<std::uint8_t> on_boundary_;
 };
 
-/// Removes the triangles marked as gone, and vertices without triangles.
+/// Removes the triangles whose first vertex is CornerTable::kNone, see is_gone(), and vertices without triangles.
 void remove_gone(std::vector<Triangle>& triangles, Positions& positions);
 
 }  // namespace covol::meshing

@@ -12,8 +12,9 @@
 namespace covol::meshing {
 namespace {
 
-/// Margin for rounding errors of triple products, as a fraction of the cube of the triangles' size. The errors are far
-/// smaller, because the products are computed in double precision from single-precision coordinates.
+/// Margin for rounding errors of triple products of sides or corners of triangles, as a fraction of the cube of the
+/// triangles' size. The errors are far smaller, because the products are computed in double precision from
+/// single-precision coordinates.
 constexpr double kRounding = 1e-13;
 constexpr double kFacing = 0.05;  // minimum cosine between a normal and the direction of a single sheet
 
@@ -144,7 +145,7 @@ void ContactFinder::rebuild() {
     float longest = 0;
     for (int a = 0; a < 3 && !positions.empty(); ++a) longest = std::max(longest, high[a] - low[a]);
     const float scale = longest > 0 ? float((1 << kBits) - 1) / longest : 0.0F;
-    std::vector<std::uint64_t> keyed;  // high 32 bits: position along a Z-order curve; low: number
+    std::vector<std::uint64_t> keyed;  // high 32 bits: position of a triangle along a Z-order curve; low: its number
     keyed.reserve(triangles.size());
     for (std::size_t n = 0; n < triangles.size(); ++n)
         if (triangles[n][0] < positions.size()) keyed.push_back(n);
@@ -238,7 +239,8 @@ void ContactFinder::find_single_sheets() {
     cell_origin_ = boxes_[0].low;
     const float whole = std::max({boxes_[0].high[0] - boxes_[0].low[0], boxes_[0].high[1] - boxes_[0].low[1],
                                   boxes_[0].high[2] - boxes_[0].low[2]});
-    if (!(cell_size_ > 1e-5F * whole)) return;  // cell indices might not fit into 21 bits each, see key_of()
+    // With relatively smaller cells, no sheets are found: a cell's indices might not fit into 21 bits each (key_of()).
+    if (!(cell_size_ > 1e-5F * whole)) return;
     // Margin for rounding, so that the centres of triangles that touch lie in neighbouring cells.
     cell_size_ *= 1.001F;
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;

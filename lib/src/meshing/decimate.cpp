@@ -119,7 +119,7 @@ public:
 
     void preprocess_collapse(const CollapseInfo& edge) override {
         gather(edge.v0v1);
-        // The neighbours' collapses have to be chosen again.
+        // The collapse changes triangles around the neighbours, whose own collapses therefore have to be chosen again.
         for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();
     }
 
@@ -264,11 +264,11 @@ private:
     bool trust_ = false;
     std::size_t left_ = 0, refreshed_ = 0;           // number of triangles: now, and at the last rebuild of finder_
     std::uint32_t requested_ = kNoVertex;            // the vertex whose edges the decimater queries
-    bool queued_ = false;                            // whether the edge chosen for requested_ was among these
-    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // by vertex: edge to be collapsed; invalid if none can be
+    bool queued_ = false;                            // whether the edge chosen for requested_ was queried
+    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // by vertex: edge to collapse; invalid: none, or not chosen yet
     std::vector<float> cost_;                        // by vertex: cost of the chosen collapse
     std::vector<std::pair<float, HalfEdges::HalfedgeHandle>> candidates_;
-    // By vertex: whether a chosen collapse was refused because triangles would touch.
+    // By vertex: whether a chosen collapse was refused because triangles would touch; see is_free_still().
     std::vector<std::uint8_t> check_contacts_;
     std::vector<ContactFinder::Change> changed_;  // triangles that the collapse under examination changes
     std::array<std::uint32_t, 2> gone_{};
@@ -301,8 +301,8 @@ void decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     TriangleMesh work = mesh;
     if (decimate(work, surface, goal, true, run))
         mesh = std::move(work);
-    else
-        decimate(mesh, surface, goal, false, run);  // now with a contact check before each collapse
+    else  // triangles touch in a sheet that was trusted: starts again, with a contact check before each collapse
+        decimate(mesh, surface, goal, false, run);
     remove_gone(mesh.triangles, mesh.vertices);
 }
 

@@ -75,7 +75,7 @@ const Level::Cell& Level::cell_at(const openvdb::Coord& base) const {
 
 void Level::load_cell(Cell& cell) const {
     const openvdb::Coord& base = cell.base;
-    float v[4][4][4];  // the corners and their neighbours along the axes; other entries are not read
+    float v[4][4][4];  // values at the cell's corners and their neighbours along the axes; other entries are not read
     const auto fill = [&](const auto& value) {
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j < 4; ++j)
@@ -126,7 +126,9 @@ Level::Sample Level::sample(const Vec3& world) const {
                (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) +
                    t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
 
-    for (int a = 0; a < 3; ++a) {  // subtracts t (1 - t) / 2 times the second difference along axis a
+    // Corrects the trilinear value: subtracts, for each axis, t (1 - t) / 2 times the second difference along it, where
+    // t is the position in the cell, 0 to 1.
+    for (int a = 0; a < 3; ++a) {
         const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
         const auto& bend = cell.bend[a];
         const double first = bend[0] + t[c] * (bend[1] - bend[0]), second = bend[2] + t[c] * (bend[3] - bend[2]);

@@ -110,7 +110,8 @@ int fill_holes(SurfaceMesh& mesh) {
     return int(borders.size());
 }
 
-/// Returns the number of holes that were filled.
+/// Fills holes, separates parts of the surface at non-manifold vertices, and removes self-intersections. @return the
+/// number of holes before the removal of self-intersections, which may leave new holes that are filled, too
 int repair(SurfaceMesh& mesh) {
     pmp::stitch_borders(mesh);
     pmp::duplicate_non_manifold_vertices(mesh);

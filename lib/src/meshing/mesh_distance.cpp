@@ -123,8 +123,8 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
 
 double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
     constexpr std::size_t kMaxRays = 512;
-    // The result is this quantile of the thicknesses along the rays, not the minimum, because single slivers do not
-    // represent the wall.
+    // The result is this quantile of the distances from triangles along inward rays to the opposite side of the wall,
+    // not the minimum, because single slivers do not represent the wall.
     constexpr double kThinFraction = 0.01;
     const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMaxRays);
     std::vector<double> walls(rays, std::numeric_limits<double>::infinity());

@@ -151,7 +151,7 @@ private:
     std::vector<std::uint32_t> undo_flips(const std::vector<std::uint32_t>& some, std::vector<Flip>& turned) {
         std::vector<std::uint8_t> dirty(mesh_.triangles.size(), 0);
         for (const std::uint32_t t : some) dirty[t] = 1;
-        for (bool grown = true; grown;) {  // adds flips that have a triangle in common with an added one
+        for (bool grown = true; grown;) {  // marks both triangles of a flip as dirty if one of them is
             grown = false;
             for (const Flip& flip : turned) {
                 std::uint8_t &s = dirty[flip.corner / 3], &t = dirty[flip.across / 3];
@@ -171,7 +171,7 @@ private:
     }
 
     /// The position of a vertex after a step towards the mean of its neighbours; unchanged if it must not move, or if
-    /// the new position cannot be projected onto the surface.
+    /// the new position cannot be projected onto the surface or is too far from it (kRelax.drop).
     [[nodiscard]] Position moved(std::uint32_t v) const {
         const Position& here = mesh_.vertices[v];
         if (holds_[v] & (kFixed | kChamfer)) return here;

@@ -96,7 +96,8 @@ std::map<int, VoxelBox> boxes_of(const Image& labels) {
     return all;
 }
 
-/// Whether the slices across the axis were painted one by one, separately or in thin runs.
+/// Whether the slices across the axis were painted one by one: no two adjacent ones have an area, or the runs of
+/// adjacent ones are at most half as long as the widest patch is wide.
 bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) {
     if (paint.areas.empty()) return false;
     if (paint.longest_run == 1) return true;

@@ -36,7 +36,8 @@ End end_of(const std::vector<std::size_t>& areas, bool elongated) {
 /// blunt, 1 if both lie at the image's ends.
 double blunt_ends(const Paint& piece, int axis) {
     const AxisPaint slice_paint = properties_across(piece, axis);
-    // Such a piece is a stroke, or a wall of strokes on neighbouring slices, and has no blunt end.
+    // A piece of at most the width of a stroke, in its slices or across them, is a stroke or a wall of strokes on
+    // neighbouring slices, and has no blunt end.
     if (slice_paint.widest <= kOutline.widest_stroke || int(slice_paint.voxels.size()) <= kOutline.widest_stroke)
         return 0;
     const auto largest = *std::max_element(slice_paint.voxels.begin(), slice_paint.voxels.end());
@@ -65,7 +66,7 @@ bool is_cube(const VoxelBox& box, const Vec3& spacing) {
 }  // namespace
 
 std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry) {
-    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // mean of blunt_ends(); voxels of blunt pieces
+    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // by axis: mean of blunt_ends(); voxels of blunt pieces
     for (const Paint& piece : paint.pieces())
         for (int a = 0; a < 3; ++a) {
             const double ends = blunt_ends(piece, a);

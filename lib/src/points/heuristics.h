@@ -28,7 +28,7 @@ struct ScanNoiseHeuristics {
     /// [voxels] Maximum mean distance of points from the local plane at which a voxel size is large enough for the
     /// layer of points to appear as one surface.
     double thin_fraction = heuristic("scan_noise.thin_fraction", 0.35);
-    /// [voxels] Radius of the neighbourhood to which the local plane is fitted.
+    /// [voxels] Radius of the neighbourhood to which the local plane is fitted, in voxels of the size that is tested.
     double plane_voxels = heuristic("scan_noise.plane_voxels", 2.5);
     /// [passes] Number of times that average_layers() projects all points onto local planes.
     int passes = heuristic("scan_noise.passes", 2);

@@ -95,7 +95,7 @@ public:
     }
 
 private:
-    /// The part of one of the eight surrounding leaves or tiles that the cells need.
+    /// The values that a leaf's cells need from one of eight leaves or tiles: the leaf itself and the seven next ones.
     struct Block {
         const float* buffer;  ///< null: all values are `constant`
         float constant;

@@ -66,8 +66,8 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
 }
 
 // Solves the eikonal equation leaf by leaf. Leaves have two colours like the fields of a chessboard, and those of one
-// colour are visited in parallel. If a leaf across a face has changed since its last visit, a leaf is visited again in
-// the rows next to the changes.
+// colour are visited in parallel. A leaf is visited again, in the rows next to the changes, if a leaf across one of its
+// faces has changed since.
 void LocalDistance::spread() {
     const SchemeKernels& kernel = kernels();
     std::vector<RowMask> decreased(band_.size() + 1, 0);  // by leaf: rows with values that decreased in its last visit

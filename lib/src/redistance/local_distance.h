@@ -56,7 +56,7 @@ private:
     const Domain& domain_;
     float clamp_, width_;
     LeafArray<float> far_;
-    Scratch scratch_;  // compute() replaces the cuts by the settled values
+    Scratch scratch_;  // compute() at last replaces `cuts`, the cuts of voxel edges by the surface, by settled()
 };
 
 }  // namespace covol::detail

@@ -141,7 +141,7 @@ float near_distance(const float* u) {
 
 std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
                                       double clamp) {
-    // `region` has one more ring of leaves than `changed`. Their values are only read.
+    // `region` is `changed` with one more ring of leaves. The values in this ring are only read.
     std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());

@@ -22,7 +22,7 @@ public:
         Vec3 gradient;  ///< with respect to world coordinates
     };
     [[nodiscard]] Sample at(const Vec3& world);
-    /// Only the value; outside the band that of the nearest voxel.
+    /// The value without the gradient; if the nearest voxel is inactive, as outside the band, that voxel's value.
     [[nodiscard]] double value(const Vec3& world);
     [[nodiscard]] double voxel_size() const { return h_; }
 
@@ -42,7 +42,7 @@ private:
 /// @throws Error InvalidInput if there are none, or the voxels are not cubes.
 [[nodiscard]] WorldBox surface_box(const FloatGrid& grid);
 
-/// The extent of the same centres along the axes of a basis.
+/// The extent, along the axes of a basis, of the centres of voxels within a voxel of the surface.
 [[nodiscard]] Extent surface_extent(const FloatGrid& grid, const Basis& basis);
 /// The extent, relative to `center`, of all rotations of the surface about the z axis through `center`, seen from an
 /// elevation in degrees.

@@ -166,7 +166,7 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
         int cut = 0;
         for (const WorldBox& box : boxes) {
             const auto range = inside(range_of(box, axis, geometry), axis, geometry);
-            // Near a box's end, a slice cuts only the tip of the structure and is not counted as cutting it.
+            // Near the end of a structure's box, a slice cuts only its tip and is not counted as cutting the structure.
             const double tip = 0.15 * (range[1] - range[0]);
             cut += slice >= range[0] + tip && slice <= range[1] - tip ? 1 : 0;
         }

@@ -22,7 +22,8 @@ namespace {
 constexpr double kLow = 0.005, kHigh = 0.998;  // intensity percentiles shown as black and white
 constexpr double kRegionMargin = 0.08;         // around the structures on slices, fraction of their longest side
 constexpr double kVolumeMargin = 0.15;
-constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // margins, as fractions of a view
+// Margins on each side of views without and with the image's volume, as fractions of the view.
+constexpr double kViewMargin = 0.03, kVolumeView = 0.07;
 // Opacity of structures around others, and of all structures if the image's volume is to be visible inside.
 constexpr double kEnclosingOpacity = 0.35, kVolumeOpacity = 0.16;
 constexpr double kVolumeDensity = 4.0;

@@ -16,8 +16,10 @@ namespace {
 constexpr double kMaxOfCode = 65535;
 constexpr int kFastest = 1;  // zlib's level of compression: a user waits for the slice
 constexpr int kMaxPixels = 1024;
-constexpr int kTile = 32;           // pixels: the box of voxels around a tile is small, whatever its direction
-constexpr double kMaxOfTile = 1e7;  // maximum number of voxels in that box
+// [pixels] Side of the square tiles in which the slice is computed: the box of voxels around a tile is small, whatever
+// the slice's direction.
+constexpr int kTile = 32;
+constexpr double kMaxOfTile = 1e7;  // maximum number of voxels in a tile's box for the box to be read as a whole
 
 Vec3 place_of(const ObliqueRequest& wanted, double x, double y) {
     Vec3 place{};

@@ -26,7 +26,7 @@ Index3 shown_size(const VoxelBox& region, const Index3& step) {
     return {std::max(1, size[0] / step[0]), std::max(1, size[1] / step[1]), std::max(1, size[2] / step[2])};
 }
 
-/// The held voxels in the box of the positions, with a margin.
+/// The box of the positions `places` with a margin, limited to `held`, the voxels that the image holds; indices.
 VoxelBox around(const ImageGeometry& geometry, const VoxelBox& held, const std::vector<Vec3>& places) {
     Vec3 low, high;
     low.fill(std::numeric_limits<double>::max());

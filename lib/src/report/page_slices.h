@@ -17,6 +17,7 @@ struct SlicePlan {
 };
 /// Chooses at most `maximum` voxels, unless three along each axis are more: all held voxels, or, if these are too many,
 /// those around `places`, which are subsampled along the axis with the smallest spacing first if necessary.
+/// @param held    the voxels of the image that can be read, see Image::held()
 /// @param places  world units; if there are none, all held voxels are used
 [[nodiscard]] SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held,
                                     const std::vector<Vec3>& places, std::int64_t maximum);

@@ -82,7 +82,8 @@ void close_faces(Fraction* c, const int lo[3], const int hi[3]) {
             if (at[axis] == lo[axis]) closed += std::exchange(c[fraction_at(2 * axis, n)], Fraction{0});
             if (at[axis] == hi[axis]) closed += std::exchange(c[fraction_at(2 * axis + 1, n)], Fraction{0});
         }
-        // c = a/(1+S): without the closed fraction x of S it becomes a/(1+S-x) = c / (1 - closed).
+        // c = a / (1 + S), where S is the sum of a over the six faces. Without the closed faces, whose sum is x, it
+        // becomes a / (1 + S - x) = c / (1 - closed), where closed = x / (1 + S).
         const double scale = outside                  ? 0.0
                              : closed < kFractionUnit ? 1.0 / (1.0 - double(closed) / kFractionUnit)
                                                       : 1.0;

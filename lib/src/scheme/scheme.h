@@ -18,7 +18,8 @@ inline constexpr int padded(int i, int j, int k) { return ((i + 1) * 10 + (j + 1
 /// Neighbours q of a voxel in the order of the coefficient arrays.
 enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
 
-/// Marks an unknown value of d or g. There is no attraction across a face beside a voxel with an unknown value.
+/// Marks an unknown value of the points' potential phi or of the edge detector g. There is no attraction across a face
+/// beside a voxel with an unknown value.
 inline constexpr float kUnknown = -1.0F;
 
 /// A coefficient of a row, 0 to 1, in units of 1/kFractionUnit: half the memory of a float, because sweeps are limited
@@ -61,9 +62,9 @@ struct RowFacts {
 struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
-    /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22), divided by the row's diagonal, c[q] = -a_pq / a_pp >= 0,
-    /// so that a row is u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each c is accurate to half of 1/kFractionUnit,
-    /// and their sum is less than 1.
+    /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22) of the paper (see evolve.cpp), divided by the row's
+    /// diagonal, c[q] = -a_pq / a_pp >= 0, so that a row is u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each c is
+    /// accurate to half of 1/kFractionUnit, and their sum is less than 1.
     /// @param u      padded, with edges and corners
     /// @param phi    padded (faces), potential of the points' attraction; null if there is none
     /// @param g      padded (faces), edge detector; null if there is none

@@ -149,7 +149,8 @@ struct Star {
     [[nodiscard]] Lanes difference(int face) const { return ((q[face] >= 0.0F) & (p >= 0.0F)) ? q[face] - p : Lanes{}; }
 };
 
-// Adds to velocity[f] = v_pq / h² for each face f, Eqs. (17), (20).
+// Adds the attraction by points to velocity[f] = v_pq / h² for each face f; the next function adds that by the image.
+// Eqs. (17), (20) of the paper (see evolve.cpp).
 inline void add_point_attraction(const Star& phi, float theta, Lanes velocity[6]) {
     for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
 }
@@ -362,8 +363,9 @@ inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
     return first + (limit > third ? three : limit);
 }
 
-// A neighbour that is higher by less than this is not updated: it would decrease by less than the square of this.
-constexpr float kDownwind = 0.02F;  // voxels
+// [voxels] If a value has decreased, a neighbour that is higher than it by less than this is not updated: the neighbour
+// would decrease by less than the square of this.
+constexpr float kDownwind = 0.02F;
 
 RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
     const Lanes one = broadcast(1.0F);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kMaxReach = 1 << 22;  // [voxels] maximum distance from a lattice's origin, with some margin
 
-/// Sets the weights of terms of Eq. (3) to zero if the input that they need is missing.
+/// Sets the weight of an input that is missing to 0: theta if there are no points, rho if there is no image.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
     EvolveOptions evolve = problem.options.evolve;
     if (!has_points && evolve.theta > 0) {
@@ -47,8 +47,8 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     const double far = away[std::size_t(farthest)];
     std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
     const double maximum = away[away.size() * 99 / 100];
-    // The farthest point is no outlier if it fits, or if the others hardly fit without it, because the voxels are too
-    // small.
+    // The farthest point is no outlier if a lattice can hold it, or if even without it a lattice could hardly hold the
+    // others, because the voxels are too small.
     if (far < kMaxReach * h || maximum >= kMaxReach / 2 * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
@@ -199,7 +199,8 @@ Resolved resolve(const Problem& problem) {
         const Timed timed(c.report.seconds.tag);
         c.start = StartMethod::Cloud;
         c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
-        // Without quadrics (the cloud encloses nothing, or fills a solid) the surface is that of the indicator alone.
+        // Without quadrics (the cloud encloses nothing, or fills a solid) the surface is that of the indicator alone,
+        // and the voxel size follows from the indicator's cells.
         const double h = c.cloud->has_quadrics ? 0 : kCommon.precision_voxels * c.cloud->orientation.screened->cell();
         if ((h > c.h || c.cloud->fills) && (!options.voxel_size || options.voxel_size_may_grow)) {
             c.h = h;

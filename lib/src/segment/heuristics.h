@@ -34,7 +34,8 @@ struct FlowHeuristics {
     /// [voxels a step] Minimum tolerance of a flow whose result is the start of another flow. A larger value would end
     /// it too early, because a surface far from edges and points also moves slowly.
     double rough_tolerance = heuristic("flow.rough_tolerance", 5e-3);
-    /// [voxels] Automatic time step of such a flow. In approach(), the given time step is multiplied by this number.
+    /// [voxels] Automatic time step of the flow on a coarse level. In approach(), the first flow after tagging, the
+    /// given time step is multiplied by this number if the band follows the surface.
     double rough_tau = heuristic("flow.rough_tau", 2.0);
     /// [voxels] Minimum width of a domain for an automatic coarse level: in a smaller one it saves little time, and
     /// thin structures may be lost.
@@ -74,8 +75,9 @@ struct DoubtsHeuristics {
     /// nucleus with poor labels); below 0.5 for 15 of these 34 structures if the marks are of a body 0.6 times as
     /// large, and for 25 if that body is 1.5 times as large.
     double border_fraction = heuristic("doubts.border_fraction", 0.6);
-    /// [ratio] Estimated noise over the deviation of neighbouring points from a sheet, above which folds were mistaken
-    /// for noise: up to 1.5 for noise of such thin sheets, 2.0 to 11 for folds, shells and misaligned scans.
+    /// [ratio] Estimated noise divided by the deviation of twelve neighbouring points from a sheet. Above this ratio,
+    /// folds were mistaken for noise: up to 1.5 for noisy thin sheets, 2.0 to 11 for folds, shells and
+    /// misaligned scans.
     double folded_noise = heuristic("doubts.folded_noise", 1.75);
     /// [marks] Minimum number per handle of a surface through marks with several handles; with fewer, these are
     /// doubted.

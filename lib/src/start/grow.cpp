@@ -239,13 +239,16 @@ private:
 
     const Box& box_;
     const std::vector<float>&image_, &level_;
-    double voxel_, correlated_faces_;  // number of faces of a front with correlated errors
+    // Edge of a voxel, world units; and number of faces of a front whose errors are correlated by the smoothing.
+    double voxel_, correlated_faces_;
     Spread inside_;
     std::vector<float> arrival_;
     std::vector<char> taken_;
     std::vector<std::uint32_t> order_;
     std::priority_queue<Waiting> waiting_;
-    double change_ = 0, start_edge_ = 0, best_edge_ = 0;  // change: sum over the front's faces, from inside to outside
+    // Sum of the image's changes over the front's faces, from inside to outside; edge() of the start; maximum of edge()
+    // of later fronts.
+    double change_ = 0, start_edge_ = 0, best_edge_ = 0;
     std::int64_t faces_ = 0;
     std::size_t start_count_ = 0, best_count_ = 0;
 };

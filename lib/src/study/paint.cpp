@@ -14,7 +14,7 @@ namespace {
 
 using detail::refuse;
 
-constexpr double kMaxVoxels = double(1 << 28);  // maximum, of the box around a structure's paint
+constexpr double kMaxVoxels = double(1 << 28);  // maximum number in the box around a structure's paint
 constexpr double kMaxVisits = double(1 << 30);  // maximum of visited voxels per stroke: some seconds
 constexpr int kMargin = 10;  // voxels around the paint: more than the 8 over which outlines are smoothed
 

@@ -77,7 +77,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
     const double extent = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2], h});
     double volume = 1;
     for (int a = 0; a < 3; ++a) volume *= std::max(box.max[a] - box.min[a], extent / 64);
-    // On the first grid the cells are twice as large as those that the last one may have.
+    // On the first grid the points' box, which the tube fills, has at most an eighth of max_tube_voxels.
     double a = std::max(h, 2 * std::cbrt(volume / double(kTagDistance.max_tube_voxels)));
     double radius = extent;
     TagDistanceChoice choice;

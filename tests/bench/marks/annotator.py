@@ -67,7 +67,7 @@ def draw_contours(structure, axis, which, every, rng, minimum=8):
     return contours
 
 
-# ---- marks of the measurements -----------------------------------------------------------------------------------
+# ---- marks for the scripts that measure -----------------------------------------------------------------------------
 
 def marks_of(structure, count, draw):
     """Random by area; if there are only twenty, spread over outlines."""

@@ -21,7 +21,7 @@ COUNTS = (5, 10, 30)
 MORE = ("hippocampus", "left atrium", "ventricle, left", "caudate", "putamen", "hippocampus 2", "brain stem")
 
 
-# ---- mistakes: (structure, rng) -> mask -------------------------------------------------------------------------------
+# ---- mistakes: (structure, rng) -> mask ----------------------------------------------------------------------------
 
 def quarter(structure, rng):
     """Removes a quarter, beyond a plane."""

@@ -30,8 +30,9 @@ SHAPES = {"sphere": (15, 15, 15), "ellipsoid": (14, 11, 15)}
 CUTS = [(faces, fraction) for faces in ("one", "two ends", "corner") for fraction in (0.2, 0.5, 0.8) if (faces, fraction) != ("corner", 0.8)]
 ON_THE_CUT = ("none", "outline", "all over")
 OPTIONS = {"marks alone": ("--rho", 0), "both": ()}
-# Accepted errors: relative error of the area on the end face; relative error of the volume; height of the surface above
-# an end face or beyond it, in units of the smallest spacing.
+# Accepted maxima. END_SLICE: relative error of the area of the body on an end face of the image. VOLUME: relative error
+# of the volume. FLAT: distance of the surface beyond the image, and of the part that closes the body at an end face
+# from this face; in units of the smallest spacing.
 END_SLICE, VOLUME, FLAT = 0.03, 0.01, 0.1
 BRIGHT, DARK, NOISE = 180, 60, 15
 
@@ -47,7 +48,7 @@ class Scene:
         centre = spacing * ((sizes - 1) / 2 + rng.uniform(-0.5, 0.5, 3))
         # Length of the body beyond an end of the image, along each axis.
         beyond = 2 * radii * fraction + rng.uniform(-0.5, 0.5) * spacing
-        # (axis, 0: low end or 1: high end).
+        # Ends of the image that cut the body: (axis, 0: low end or 1: high end).
         self.ends = {"one": [(2, 0)], "two ends": [(2, 0), (2, 1)], "corner": [(2, 0), (0, 0)]}[faces]
         if faces == "two ends":
             sizes[2] = max(3, round((2 * radii[2] - beyond[2]) / spacing[2]))
@@ -118,7 +119,8 @@ class Scene:
             face = self.high[axis] if high else self.low[axis]
             foot = vertices.copy()
             foot[:, axis] = face
-            # More than 2 units of length within the section of the body by the end face.
+            # `deep`: vertices whose projections on the end face lie more than 2 units of length inside the body, and
+            # that are as far from the other end faces.
             deep = self.body.distance(foot) < -2
             for other, other_high in self.ends:
                 if other != axis:

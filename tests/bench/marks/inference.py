@@ -20,7 +20,7 @@ from common import Bench, dice_cell, pivot, summary
 COUNTS = (20, 60, 300)
 BAD, GOOD = 0.8, 0.9
 WARNING = "the body is probably inaccurate"
-# Structures that were not used while the method was developed.
+# Structures that were not used while covol's inference (lib/src/inference) was developed.
 KEPT_ASIDE = {"caudate, right", "ventricle, left", "thalamus", "liver", "aorta", "worm nucleus 81", "hippocampus 2", "vertebra",
               "mouse nucleus 395", "embryo nucleus 6", "hippocampus, posterior"}
 

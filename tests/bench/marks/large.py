@@ -35,7 +35,8 @@ def scroll(browser, axis, slices, pause=0.02):
     end, last = browser.js("return performance.now()"), browser.js("return mark.panels[arguments[0]].at", axis)
     seen = browser.js("return window.seen")
     places = [place for n, (_, place, _) in enumerate(seen) if n == 0 or seen[n - 1][1] != place]
-    # `thick` slices lie in one voxel of a coarse level and have the same picture, so they count as one.
+    # A voxel of the shown level of the image is `thick` slices high. These slices have the same picture, so that they
+    # count as one.
     thick = browser.js("const p = mark.panels[arguments[0]]; return mark.slices.thickness(arguments[0], p.slice.step)", axis)
     seconds = (end - begin) / 1000
     gaps = [b[0] - a[0] for a, b in zip(seen, seen[1:])]

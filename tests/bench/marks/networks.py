@@ -129,7 +129,8 @@ def reconstruct(options, folder, planes, mesh, rng):
     count = 20000
     true, found = on_surface(*mesh, count, rng), on_surface(*read_stl(folder / "s.stl"), count, rng)
     error = (cKDTree(true).query(found)[0].mean() + cKDTree(found).query(true)[0].mean()) / 2
-    # Mean distance between two independent samples of the same surface, which is subtracted.
+    # Mean distance between two independent samples of the same surface. It is subtracted, because it is due to the
+    # spacing of the samples.
     floor = cKDTree(true).query(on_surface(*mesh, count, rng))[0].mean()
     return {"error, %": 100 * max(error - floor, 0) / diagonal, "pieces": surface["components"], "genus": surface["genus"],
             "CPU s": round(seconds, 1)}

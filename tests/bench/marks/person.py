@@ -119,8 +119,9 @@ class Person:
         places, axes, slices = self.on_slices()
         missed = cKDTree(seen * spacing).query(places * spacing)[0]
         border = cKDTree(places * spacing)
-        # The largest difference may be a part of the outline that is far from the border. The person then clicks on the
-        # point of the border that is nearest to this part.
+        # `missed`: distances of the true border from the nearest shown outline. `beyond`: distances of the outline from
+        # the true surface. If the largest distance is one of the outline, the person clicks on the point of the border
+        # that is nearest to that part of the outline.
         near = np.any([np.abs(seen[:, axis] - k) < 0.5 for axis, k in slices], axis=0)
         beyond, nearest = self.structure.surface_tree.query(seen[near] * spacing)
         if len(beyond) and beyond.max() > missed.max():

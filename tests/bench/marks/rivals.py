@@ -17,8 +17,8 @@ from skimage.segmentation import random_walker, watershed
 
 from variational import Surface
 
-# Voxels in the bounding box of the gap; if it has more, the methods of FROM_SEEDS use every second voxel along each
-# axis.
+# If the bounding box of the gap between inner and outer seeds has more voxels, the methods of FROM_SEEDS use every
+# second voxel along each axis.
 MANY_VOXELS = 1_500_000
 
 
@@ -34,7 +34,7 @@ def where_negative(function, structure, margin):
     stride = np.maximum(1, np.round(4 * structure.h / structure.spacing)).astype(int)
     if np.prod(high - low) < 100_000:
         stride[:] = 1
-    # Ends at or beyond the last voxel, so that every voxel lies in a cell.
+    # The lattice ends at or beyond the last voxel, so that every voxel lies in a cell.
     lattice = [np.arange(a, b + s, s) for a, b, s in zip(low, high, stride)]
     coarse = _evaluate(function, structure, lattice)
     if (stride == 1).all():
@@ -110,8 +110,8 @@ def seeds(structure, marks, guess):
     spacing = structure.spacing[::-1]
     if not guess.any() or guess.all():
         return None
-    # The width of the gap is at most half of the maximum depth, and thus at most a quarter of the smallest extent.
-    # Voxels farther than this from the mask are outside, and distances are not computed for them.
+    # `gap` is at most half of the maximum depth of the guess, and thus at most a quarter of its smallest extent. Voxels
+    # that are farther than this from the guess have the label 2, outside, and no distances are computed for them.
     around = ndimage.find_objects(guess)[0]
     room = min((s.stop - s.start) * h for s, h in zip(around, spacing)) / 4 + 3 * structure.h
     around = tuple(slice(max(0, s.start - int(room / h) - 1), s.stop + int(room / h) + 1) for s, h in zip(around, spacing))

@@ -2,8 +2,9 @@
 # Builds covol and measures the quality of results from few marks; writes tables (.csv, .md) and curve.png into
 # tests/bench/marks/results.
 #
-#   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]      (PART: table contours curve bias cut silence correction inference wrong)
+#   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]
 #
+# PART is table, contours, curve, bias, cut, silence, correction, inference or wrong; by default, all are run.
 # Options are those of the scripts (table.py --help). Results of the same binary and the same scripts are kept in
 # build/marks and not measured again. Table, contours, curve, silence, correction, inference and wrong need the images
 # of COVOL_DATA and are skipped without them.

@@ -24,7 +24,7 @@ class Structure:
     name: str
     image: pathlib.Path
     truth: np.ndarray           # bool [z, y, x]: the inside
-    spacing: np.ndarray         # of the voxels along x, y, z
+    spacing: np.ndarray         # distance of neighbouring voxels along x, y, z, in world units
     options: tuple = ()         # options of covol that the image needs, such as --spacing
     contour_axis: int = 2       # the axis across the slices in which a person draws contours: 0 x, 1 y, 2 z
     large: bool = False         # fewer draws of marks are measured
@@ -178,7 +178,7 @@ def spacing_of(path):
         return np.ones(3)
 
 
-# ---- outlines ---------------------------------------------------------------------------------------------------------
+# ---- outlines ------------------------------------------------------------------------------------------------------
 
 def off_end_faces(structure, positions):
     return ((positions > 0) & (positions < structure.sizes - 1)).all(1)

@@ -119,7 +119,7 @@ class Made:
     path: pathlib.Path
     cpu: float = 0
     wall: float = 0
-    peak: int = 0  # bytes; the maximum over the steps
+    peak: int = 0  # memory in bytes; the maximum over the programs that were run one after the other
 
 
 class Trial:

@@ -2,8 +2,9 @@
 # Builds covol and the programs with which it is compared, measures surfaces from points, and writes results.csv and
 # table.md into tests/bench/reconstruct/results. README.md in this folder has details.
 #
-#   [COVOL_DATA=FOLDER] bash tests/bench/reconstruct/run.sh [--poisson-recon BINARY] [--shapes NAME,NAME] ...     (--help lists all)
+#   [COVOL_DATA=FOLDER] bash tests/bench/reconstruct/run.sh [--poisson-recon BINARY] [--shapes NAME,NAME] ...
 #
+# --help lists all options.
 # Paths are relative to the repository's folder. Results of the same programs are kept in build/reconstruct and not
 # measured again.
 set -euo pipefail

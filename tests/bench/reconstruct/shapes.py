@@ -64,7 +64,7 @@ def head(p):
         horn = bent((side * 0.22, -0.05, 0.36), (side * 0.85, -0.25, 0.7), (side * 0.5, 0.1, 1.35), 16)
         f = union(f, path(p, horn, np.linspace(0.105, 0.014, len(horn))), 0.06)
         ear = bent((side * 0.36, -0.1, 0.1), (side * 0.6, -0.1, 0.2), (side * 0.85, -0.2, 0.05), 6)
-        # The ear is a tube in coordinates stretched along y, and thus flat.
+        # An ear is a tube in coordinates that are stretched 2.2 times along y, so that it is flat in world coordinates.
         flat = (p - np.array([0, -0.13, 0], p.dtype)) * np.array([1, 2.2, 1], p.dtype)
         f = union(f, path(flat, ear - [0, -0.13, 0], np.array([0.05, 0.09, 0.12, 0.12, 0.1, 0.07, 0.03])) / 2.2, 0.04)
     return f

@@ -132,7 +132,7 @@ TEST_CASE("a rotated anisotropic mask agrees with the mesh and the level set of 
         const CompareReport report = compare(mask, *other);
         CHECK(report.dice > 0.998);
         CHECK(report.volume_a == Approx(whole).epsilon(0.01));
-        // Because the surface lies between neighbouring centres, which are at most 0.13 apart.
+        // Both surfaces lie between neighbouring voxel centres of the mask, which are at most 0.13 apart.
         CHECK(report.hausdorff <= 0.13);
         CHECK(report.assd < 0.03);
     }
@@ -181,7 +181,7 @@ TEST_CASE("one label is picked, or any") {
 }
 
 TEST_CASE("rows through edges and corners are counted once") {
-    // A cube whose faces, edges and corners lie on the rows of the lattice.
+    // A cube whose faces, edges and corners lie on rows of voxel centres.
     ImageGeometry geometry;
     geometry.size = {8, 8, 8};
     const Solid voxels = mask_of(geometry, [](const Vec3& p) {
@@ -196,8 +196,8 @@ TEST_CASE("rows through edges and corners are counted once") {
     cube.mesh->triangles = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
                             {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
     const CompareReport report = compare(voxels, cube);
-    // The mesh's cube from 2 to 6 contains the rows 2, 3, 4 and 5 along each axis, as the mask does: a row in the lower
-    // face counts as inside, one in the upper face as outside.
+    // The mesh's cube from 2 to 6 contains the voxel centres at 2, 3, 4 and 5 along each axis, as the mask does: a row
+    // of centres in a lower face of the cube counts as inside, one in an upper face as outside.
     CHECK(report.dice == 1.0);
     CHECK(report.volume_b == Approx(64));
     cube.mesh->triangles.erase(cube.mesh->triangles.begin());

@@ -129,8 +129,8 @@ TEST_CASE("The suggested outline is the one that reaches the most bare surface")
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 20});
     REQUIRE(e.suggestions.size() >= 2);
-    // Marks at elevation t cover the elevations from t - kAngle to t + kAngle. The given marks cover everything up to
-    // kAngle, so the lowest outline that covers only bare surface is at 2 kAngle.
+    // Marks at elevation t cover (are within kReach of) the elevations from t - kAngle to t + kAngle. The given marks
+    // cover everything up to kAngle, so the lowest outline that covers only bare surface is at 2 kAngle.
     const double z = kR * std::sin(2 * kAngle);
     CHECK(std::abs(-10.5 + 0.7 * e.suggestions[0].slice - z) <= 0.7);
     CHECK(e.suggestions[0].area == Approx(2 * M_PI * kR * kR * (std::sin(3 * kAngle) - std::sin(kAngle))).epsilon(0.1));

@@ -63,7 +63,7 @@ TEST_CASE("points lie on the surface that the labels bound") {
     REQUIRE(phantom.points.size() == 200);
     const ImageGeometry& g = phantom.image.geometry();
     for (const Vec3& p : phantom.points) {
-        int inside = 0, outside = 0;  // among the voxels around the point
+        int inside = 0, outside = 0;  // numbers of labelled and unlabelled voxels among the 64 around the point
         for (int c = 0; c < 64; ++c) {
             Index3 at;
             for (int a = 0; a < 3; ++a)
@@ -78,7 +78,8 @@ TEST_CASE("points lie on the surface that the labels bound") {
 
 TEST_CASE("points cover a solid's surface evenly") {
     // The mean of a function over points that are uniform by area equals its mean over the surface: |z| on a sphere has
-    // the mean r/2, z^2 on a torus r^2/2. The mean of x^2 on the box is the area-weighted mean over its faces.
+    // the mean r/2, z^2 on a torus with a tube of radius r has the mean r^2/2. The mean of x^2 on the box is the
+    // area-weighted mean over its faces.
     const int n = 20000;
     const auto mean = [](const Phantom& phantom, auto f) {
         double sum = 0;
@@ -89,8 +90,8 @@ TEST_CASE("points cover a solid's surface evenly") {
           Approx(0.4).margin(0.01));
     CHECK(mean(make_phantom(options_of("torus", 16, n)), [](const Vec3& p) { return p[2] * p[2]; }) ==
           Approx(0.3 * 0.3 / 2).margin(0.001));
-    // If points were uniform in the angle around the tube, their mean distance from the torus's axis would be R. As
-    // they are uniform by area, it is R + r^2 / (2R).
+    // If points were uniform in the angle around the tube, their mean distance from the torus's axis would be R = 0.75,
+    // the radius of the ring. As they are uniform by area, it is R + r^2 / (2R), with r = 0.3 the radius of the tube.
     CHECK(mean(make_phantom(options_of("torus", 16, n)), [](const Vec3& p) { return std::hypot(p[0], p[1]); }) ==
           Approx(0.75 + 0.09 / 1.5).margin(0.005));
     const double x_faces = 0.7 * 0.5, others = 0.9 * (0.7 + 0.5);

@@ -165,10 +165,10 @@ TEST_CASE("file_set: the next run clears after one that was killed, and leaves t
     });
     CHECK(folder.file_count() == 2);
     const ScratchFolder living(root);
-    CHECK(folder.file_count() == 2);  // the file, and the folder of the living run
+    CHECK(folder.file_count() == 2);  // the file, and the folder of this run; that of the killed one is removed
     const ScratchFolder another(root);
     CHECK(fs::exists(living.path()));
-    const ScratchFolder inner(living.path());  // a living folder does not prevent another one inside of it
+    const ScratchFolder inner(living.path());  // another folder can be made in that of a living run
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 

@@ -20,7 +20,7 @@ TEST_CASE("what steers a terminal is written as its number") {
     CHECK(safe_text("C1 \xC2\x9B"
                     "31m") == "C1 \\u009b31m");
     CHECK(safe_text("vdb.\xE2\x80\xAE"
-                    "exe") == "vdb.\\u202eexe");  // reverses the direction of the text after it
+                    "exe") == "vdb.\\u202eexe");  // U+202E reverses the direction of the text after it
     CHECK(safe_text("\xE2\x81\xA6\xE2\x80\x8F") == "\\u2066\\u200f");
     CHECK(safe_text("line\xE2\x80\xA8separator") == "line\\u2028separator");
 }

@@ -169,7 +169,7 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     const SegmentResult mesh = with.join(plan, known), lean = without.join(plan, known, true);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.u == nullptr);
-    // Rounding errors, because each brick has its own origin.
+    // The surfaces differ only by rounding errors, because each brick has its own origin.
     CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);
     CHECK(lean.report.surface.genus == 0);
     CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
@@ -191,7 +191,7 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     CHECK(once.stop_reason == StopReason::Steady);
     CHECK(once.steps > 0);
     CHECK(apart(*once.state, *again.state).maximum == 0);
-    CHECK(measure_seams(plan, 1, none) > 1);  // the neighbours have no states yet
+    CHECK(measure_seams(plan, 1, none) > 1);  // kHalfWidthVoxels, because no brick has a state here
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }
 

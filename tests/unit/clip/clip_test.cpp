@@ -164,8 +164,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                 }
             const Truth truth = measure_truth(scene);
             const double coarse = cut.h / std::min({radii[0], radii[1], radii[2]});
-            // The edges of the triangles are chords, which cut off a part of a ball's volume and a larger fraction of
-            // its cap.
+            // The edges of the triangles are chords, which cut off a fraction of the volume that grows with the square
+            // of h over the radius, and a larger fraction of the cap's area.
             const double chords = (cut.fraction < 0.5 ? 1.0 : 0.7) * coarse * coarse;
             const double volume = m.volume / truth.volume - 1,
                          cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;

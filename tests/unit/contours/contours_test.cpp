@@ -343,7 +343,8 @@ TEST_CASE("between skipped slices an ellipsoid is met closer than by straight li
         }
     CHECK(linear > 0.7);
     CHECK(cubic < 0.5 * linear);
-    // The poles lie 3 beyond the last slices. compute_cap_height() finds them, as the area there is linear in w.
+    // The poles lie 3 beyond the first and the last slice. compute_cap_height() finds them, because the area of the
+    // ellipsoid's sections is nearly linear in the height there.
     for (const double sign : {-1.0, 1.0}) {
         CHECK(c.solid->level({50, 50, 50 + sign * 29}) < 0);
         CHECK(c.solid->level({50, 50, 50 + sign * 31}) > 0);
@@ -612,7 +613,8 @@ TEST_CASE("contours in planes of other directions are a network whose directions
     REQUIRE_FALSE((network.inside.empty() || network.outside.empty()));
     for (const Vec3& p : network.inside) CHECK(is_in_ring(p));
     for (const Vec3& p : network.outside) CHECK_FALSE(is_in_ring(p));
-    // Parallel planes that are tilted against the image have a frame of their own, and their contours make a body.
+    // Contours in parallel planes that are tilted against the image are no network: they make a body in slices along
+    // the normal of these planes.
     std::vector<Vec3> other = square(10, 30, 0.5);
     for (Vec3& p : other) p[2] += 6;
     const Contours tilted = Drawing(cube(40)).add(square(10, 30, 0.5)).add(other).densify(1);

@@ -36,7 +36,7 @@ TEST_CASE(
     "the field between planes: inside between sections, linear beyond the last one, and 0 half way to a further "
     "plane") {
     const SectionField field({square(10, 0), square(10, 1)}, 0.1, {0, 0, 0}, {});
-    CHECK(field.plane_distance() == Approx(0.5));  // the height of the box, 1, divided by the number of planes
+    CHECK(field.plane_distance() == Approx(0.5));  // the height of the sections' box, 1, over the number of planes
     CHECK(value(field, {0, 0, 0.5}) == Approx(-1).margin(1e-3));
     for (const double z : {0.05, 0.1, 0.2, 0.25, 0.3, 0.45}) {
         INFO("beyond by " << z);

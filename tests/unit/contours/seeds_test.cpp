@@ -45,7 +45,9 @@ TEST_CASE("the surface between two seeds is their middle plane, within half thei
     const FloatGridPtr grid = start_from_seeds(cube(64), {{20, 32, 32}}, {{40, 32, 32}});
     CHECK(value_at(*grid, {30, 32, 32}) == Approx(0).margin(0.05));
     CHECK(value_at(*grid, {29, 32, 32}) == Approx(-1).margin(0.1));
-    CHECK(value_at(*grid, {30, 34, 32}) >= -0.01);  // outside of the ball around the seed, within which the plane ends
+    // The body lies within a ball around the seed inside, with half of the seeds' distance as radius. This position is
+    // in the middle plane, but outside of the ball.
+    CHECK(value_at(*grid, {30, 34, 32}) >= -0.01);
     CHECK(value_at(*grid, {10, 32, 32}) == Approx(0).margin(0.1));
     CHECK(value_at(*grid, {20, 32, 42}) == Approx(0).margin(0.1));
 }

@@ -107,8 +107,8 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
     std::vector<Vec3> moved = points;
     for (Vec3& p : moved) p = {-p[2], p[0], -p[1]};
     const DistanceResult a = compute_distance(points, domain, {3.0}), b = compute_distance(moved, domain, {3.0});
-    // The result depends on the order of the sweeps: each of the two grids may miss the nearest point of a few voxels
-    // and have a slightly larger distance there.
+    // The result depends on the order of the sweeps, which is not rotated with the cloud: each of the two grids may
+    // miss the nearest point of a few voxels and have a slightly larger distance there.
     double worst = 0, sum = 0;
     for (auto value = a.grid->cbeginValueOn(); value; ++value) {
         const openvdb::Coord c = value.getCoord();

@@ -279,7 +279,8 @@ TEST_CASE("lines take their contrast from a third of the median") {
     });
     const EdgeResult r = detect_edges(oblique, *where, o);
     std::int64_t above = 0;
-    // G at the median, which is three times the contrast: 1 / (1 + 3^2).
+    // At the median brightness, which is three times the contrast, g is 1 / (1 + 3^2) = 0.1. Half of the voxels are
+    // brighter and therefore have a smaller g.
     for (auto v = r.grid->cbeginValueOn(); v; ++v) above += *v < 0.1;
     CHECK(double(above) / double(r.grid->activeVoxelCount()) == Approx(0.5).margin(0.01));
 }

@@ -253,7 +253,7 @@ TEST_CASE("it stops when it is steady, and says so") {
 }
 
 TEST_CASE("an automatic step grows by its ratio while the surface hardly moves") {
-    // In a field g of constant slope, a plane moves by slope x step in each step.
+    // In a distance field of constant slope, a plane moves by the slope times the time step in each step.
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
     set_distance(p, [](const Vec3& x) { return 10 - 0.02 * x[0]; });
     EvolveOptions o = evolve_options(p.options, 6);

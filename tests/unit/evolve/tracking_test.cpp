@@ -82,7 +82,8 @@ TEST_CASE("a band is tracked to first order as by exact distances, from whatever
     detail::track_surface(*fast, kDomain, kClamp);
     const Difference apart = difference(*fast, *exact);
     CHECK(apart.signs == 0);
-    // Neither method may move the surface. Only in the groove between the balls do the two results differ.
+    // Neither redistance() nor track_surface() may move the surface. Their results differ only in the groove between
+    // the balls.
     CHECK(difference(*fast, *before).crossing <= difference(*exact, *before).crossing);
     CHECK(difference(*exact, *before).crossing < 0.03);
     CHECK(apart.largest < 0.25);

@@ -249,7 +249,7 @@ TEST_CASE("the precision of marks is their standard deviation, as segment() mean
     GuidanceOptions options;
     const GuidanceReport automatic = guide(*guess, marks, image, options).report;
     REQUIRE(automatic.used);
-    // The automatic precision: the standard deviation of a uniform distribution over a voxel.
+    // The automatic precision of marks is the standard deviation of a uniform distribution over a voxel.
     options.mark_precision = kUniformDeviation * g.spacing[0];
     const GuidanceReport stated = guide(*guess, marks, image, options).report;
     CHECK(stated.gain == Approx(automatic.gain));

@@ -269,7 +269,8 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
     const std::vector<hsize_t> shape{2, 2, 4};  // one chunk
     const std::vector<std::uint16_t> values = ramp(shape);
     const auto bytes = std::string(reinterpret_cast<const char*>(values.data()), 2 * values.size());
-    // Sizes are big endian; a block whose compressed size equals its size is stored uncompressed.
+    // In the format of the LZ4 filter, sizes are big endian, and a block whose compressed size equals its size is
+    // stored uncompressed.
     const std::string lz4 = std::string("\0\0\0\0\0\0\0\x20\0\0\0\x20\0\0\0\x20", 16) + bytes;
     const std::string lzf = std::string(1, char(31)) + bytes;  // one run of 32 literals
     std::string zstd(ZSTD_compressBound(bytes.size()), '\0');

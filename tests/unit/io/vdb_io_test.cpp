@@ -59,7 +59,7 @@ TEST_CASE("grids come back as they were written, by name or as the first") {
     CHECK(read->getGridClass() == openvdb::GRID_LEVEL_SET);
     CHECK(read_vdb(path)->getName() == "surface");
     CHECK(same_tree(*read_vdb(path), *first));
-    // the caller's grids are not modified
+    // The metadata are written to the file only: the caller's grids are not modified.
     CHECK(first->getCreator().empty());
     CHECK_FALSE(first->getMetadata<openvdb::StringMetadata>("covol_delta"));
 }

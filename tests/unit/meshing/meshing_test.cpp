@@ -19,7 +19,8 @@ namespace {
 
 TriangleMesh solid_mesh(unsigned seed) { return extract_mesh(*test::random_solid(seed).level_set); }
 
-/// Compares the table's opposite corners with those that are computed anew from the triangles that are left.
+/// Compares the table's opposite corners with those that are computed anew from the triangles that the table has not
+/// marked as gone.
 void check_table(const CornerTable& table, std::vector<Triangle> triangles) {
     std::vector<std::size_t> numbers;
     std::vector<Triangle> kept;

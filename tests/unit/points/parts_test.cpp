@@ -38,8 +38,8 @@ TEST_CASE("Parts whose gaps are narrower than a cell, or that are hardly smaller
     const std::vector<Vec3> beside = joined(ball, test::sphere_cloud(3000, 1, 3, {3, 0, 0}));
     CHECK(largest_part_side(beside, 192, 0.5) == longest_side(bounding_box(beside)));
     const std::vector<Vec3> close = joined(ball, test::sphere_cloud(3000, 1, 3, {2.5, 0, 0}));
-    // The small ball is not separated, because the other part would be hardly smaller than the whole. Otherwise the
-    // side would be that of the large ball, 4.
+    // The small ball is not separated, because the large ball alone, with a side of 4, would be hardly smaller than
+    // the whole, whose longest side is about 5.
     CHECK(largest_part_side(joined(test::sphere_cloud(9000, 2, 5), test::sphere_cloud(300, 0.1, 6, {3, 0, 0})), 192,
                             0.01) > 4.9);
     CHECK(largest_part_side(close, 8, 0.01) == longest_side(bounding_box(close)));

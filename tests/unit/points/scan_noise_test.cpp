@@ -26,8 +26,8 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
     for (Vec3& p : plane) p = {x(random), x(random), 0};
     CHECK(measure_layer_thickness(plane, 0.1) < 1e-9);
     const std::vector<Vec3> block = test::box_cloud(40000, {{0, 0, 0}, {1, 1, 1}}, 5);
-    // The least-squares plane fits better than others, and balls extend beyond the block. Therefore the result is less
-    // than 3/8 of the radius, but not by much.
+    // 3/8 of the radius is the mean distance from a plane through the centre of a filled ball. The result is less,
+    // because the least-squares plane fits better, and because some neighbourhoods extend beyond the block.
     CHECK(measure_layer_thickness(block, 0.1) < 0.0375);
     CHECK(measure_layer_thickness(block, 0.1) > 0.75 * 0.0375);
     CHECK(measure_layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
@@ -43,7 +43,8 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
     const std::vector<Vec3> averaged = average_layers(points, 0.15);
     REQUIRE(averaged.size() == points.size());
     CHECK(mean_off_sphere(points, 1) == Approx(0.02));
-    // A plane that is fitted to a cap lies below it: with these weights by radius^2 / 8, in each of two passes.
+    // A plane that is fitted to a cap lies below its top: with the weights of average_layers(), (1 - (r / radius)^2)^2
+    // at a distance r, by radius^2 / 8 on a unit sphere, in each of two passes.
     const double sag = 0.15 * 0.15 / 4;
     CHECK(mean_off_sphere(averaged, 1) < 1.15 * sag);
     const std::vector<Vec3> thin = test::sphere_cloud(40000, 1, 3);
@@ -51,8 +52,8 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
 }
 
 TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
-    // At voxels of 5.7 spacings, neighbourhoods of 2.5 voxels contain the whole sphere or a large part of it. Its bend
-    // must not be taken for noise.
+    // With voxels of 4 spacings, the largest candidates, neighbourhoods with a radius of 2.5 voxels would contain
+    // the whole sphere of 50 points. Its bend must not be taken for noise.
     for (const int count : {50, 100, 300, 1000}) {
         const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
         const double spacing = 6 * std::sqrt(M_PI / count);

@@ -124,7 +124,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
 
 TEST_CASE("a scale bar is as long as it says") {
     figure::Canvas canvas(300, 100, figure::gray(1));
-    // A third of 250 pixels of 0.5 um is 40 um: the bar is 20 um long, 40 pixels.
+    // The bar may take 0.32 of 250 pixels of 0.5 um, that is 40 um. The next smaller round length is 20 um, 40 pixels.
     figure::draw_scale_bar(canvas, 280, 90, 250, 0.5, "um", {figure::gray(0), 14, 0});
     const Bounds bar = find(canvas.picture(), {0, 88, 300, 2}, is_ink);
     CHECK(bar.right == 279);

@@ -182,7 +182,7 @@ TEST_CASE("coded slices know where their voxels lie in the world") {
     plan.size = {8, 4, 3};
     const detail::CodedSlices coded = detail::encode_slices(image, plan, 90, {});
     REQUIRE(coded.jpegs.size() == 3);
-    // Means of two voxels along i and j; the second of three slices.
+    // A voxel of the coded slices is the mean of two voxels along i and j, in the second of three slices.
     CHECK(coded.geometry.origin == Vec3{0.5, 0.5, 3.5});
     CHECK(coded.geometry.spacing == Vec3{2, 2, 10.5});
     CHECK(coded.black == Approx(0).margin(0.1));

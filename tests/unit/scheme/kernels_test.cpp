@@ -35,8 +35,8 @@ struct Rows {
     double sum = 0.0;
 };
 
-// Row (i,j,l) of the system by definition: from the four tetrahedra of each face, whose corners are the voxels p and q
-// and two vertices of the face.
+// The row of voxel (i,j,l) by definition: from the four tetrahedra of each face, whose corners are the centres of this
+// voxel and of its neighbour across the face, and two vertices of the face.
 Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const SchemeConstants& k, int i, int j, int l) {
     const auto at = [](const Padded& f, int a, int b, int c) { return double(f[padded(a, b, c)]); };
     // The value at the voxel's vertex in the direction (si, sj, sk), each +-1: the mean of the eight voxels around it.
@@ -182,8 +182,8 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
             if (!is_closed) kept += open(f, n);
             if (is_closed || !on) REQUIRE(closed(f, n) == 0.0F);
         }
-        // The kernel divides coefficients by the diagonal 1 + S, so that S = Σc / (1 - Σc). Before the division, the
-        // coefficients of open faces are the same in both.
+        // The kernel divides the coefficients of a row, whose sum is S, by 1 + S. The sum of the quotients c then gives
+        // S = Σc / (1 - Σc). Before the division, closing faces does not change the coefficients of the other faces.
         if (on && j <= 6)
             REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
     }

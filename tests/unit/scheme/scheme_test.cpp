@@ -40,7 +40,7 @@ double mirror_defect(const Problem& p, const Solver& solver, int axis) {
 
 TEST_CASE("a linear function has its exact gradient on all 24 tetrahedra") {
     const Domain d = cube_domain(3, kH);
-    const DenseField u = [&] {  // with the linear values in the ghosts, too, instead of mirrored ones
+    const DenseField u = [&] {  // ghosts, too, have the values of the linear function, not mirrored ones
         DenseField f(3, 3, 3, kH);
         for (int i = -1; i <= 3; ++i)
             for (int j = -1; j <= 3; ++j)

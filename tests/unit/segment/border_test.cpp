@@ -54,7 +54,8 @@ TEST_CASE("a surface that is inside out is refused unless something says so") {
         problem, *start_from_sphere(make_domain(image.geometry().world_box(), 1), center, 5), {}));
     CHECK(message_of([&] { pipeline::require_outside(problem, *inverted, {}); }).find("is inside out: ") !=
           std::string::npos);
-    // Allowed if marks or seeds lie all over the border, or if the start was given explicitly.
+    // A surface that is inside out is allowed if marks or seeds lie all over the image's border, or if the start was
+    // given explicitly.
     CHECK_NOTHROW(pipeline::require_outside(Problem(&image, all_over, plain, run), *inverted, {}));
     SegmentOptions seeds;
     seeds.inside = all_over;

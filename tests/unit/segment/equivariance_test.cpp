@@ -15,8 +15,8 @@ using namespace covol;
 namespace {
 
 constexpr double kMaxDice = 0.002;  // maximum difference of two Dice coefficients
-// The same for views with flipped or exchanged axes. It is larger, because the forward differences of the minimal
-// surface, the cells of patches and the directions of the hull have no mirror symmetry.
+// The same maximum for views with flipped or exchanged axes. It is larger, because the forward differences of the
+// minimal surface, the cells of patches and the directions of the hull have no mirror symmetry.
 constexpr double kMaxDiceOfTurned = 0.01;
 
 /// Three quarters of a ring that tapers to its ends: thin, curved, with ends. Negative inside.

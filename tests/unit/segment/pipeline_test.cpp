@@ -183,7 +183,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
 }
 
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
-    // A plate three voxels thick, which is one and a half voxels at the coarse level with twice the voxel size.
+    // A flat ellipsoid, four voxels thick at its centre, which is two voxels at the coarse level.
     const Image image = ellipsoid_image({24, 24, 2});
     const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
     CHECK(both.report.surface.closed);

@@ -166,7 +166,7 @@ TEST_CASE("a client that is sent texts all the while is told, too, why it is clo
     Live live(echo.site());
     CHECK(live.receive() == "hello");
     std::jthread talker([&] {
-        for (int n = 0; n < 50; ++n) {  // some before and some after the server has sent the reason
+        for (int n = 0; n < 50; ++n) {  // some texts before the server has sent its reason for closing, and some after
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
             (void)echo.site().server.send(echo.last(), "x");
         }
@@ -275,7 +275,7 @@ TEST_CASE("a client that does not answer is closed after a while") {
     Options options;
     options.live_idle = std::chrono::milliseconds(400);
     Echo echo(options);
-    Live silent(echo.site());  // it answers pings only while it reads
+    Live silent(echo.site());  // it never reads, and therefore answers no pings
     CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
     Live there(echo.site());
     CHECK(there.receive() == "hello");

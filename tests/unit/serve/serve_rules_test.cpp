@@ -415,7 +415,7 @@ TEST_CASE("texts wait in order, up to a limit") {
     Outbox box(100);
     CHECK(box.add(text(1), true) == Outbox::Added::Refused);  // not before the greeting
     const SharedText first = text(150), second = text(10);
-    CHECK(box.add(first, false) == Outbox::Added::First);  // a single message may be larger
+    CHECK(box.add(first, false) == Outbox::Added::First);  // a single text may exceed the limit
     CHECK(box.next() == first);
     CHECK_FALSE(box.written());
     CHECK(box.add(first, true) == Outbox::Added::First);

@@ -181,7 +181,7 @@ TEST_CASE("Options, guesses and labels are undone and done again") {
     CHECK_THROWS_AS(history.apply(act::SetOptions{{0.0, {}, {}, {}}}), Error);
     CHECK_THROWS_AS(history.apply(act::SetOptions{{{}, 1.5, {}, {}}}), Error);
     CHECK(history.state().size() == 2);
-    // The values of labels are kept in masks.
+    // The value of a label in the label image is also its value in masks.
     const std::vector<Marks> marks =
         marks_of(history.state(), {image_of(), [](const StudyGuess&, const RunContext&) { return GivenGuess{}; }});
     REQUIRE(marks.size() == 2);

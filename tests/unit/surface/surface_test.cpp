@@ -180,7 +180,8 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
             const detail::PatchHit hit = detail::nearest_on(fan, arm);
             REQUIRE(std::sqrt(hit.squared) == Approx(std::sqrt(exact)).margin(1e-4));
             const bool above = std::sqrt(exact) < 2.99 && hit.is_interior;
-            if (above) {  // within the patch, and therefore in the patch's cylinder
+            // Its nearest position lies within the patch, so that the voxel is in the patch's cylinder.
+            if (above) {
                 ++reached;
                 REQUIRE(patch[std::size_t(p)] == 7);
             }

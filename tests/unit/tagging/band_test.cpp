@@ -235,7 +235,7 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         const TagDistanceChoice choice =
             choose_tag_distance(box_cloud(4000, {{-25, -25, 0}, {25, 25, 0.01}}, 6), kDomain, {});
         CHECK(choice.reason.find("spacing") != std::string::npos);
-        CHECK(choice.tag_distance == Approx(1.5));  // the minimum; 1.8 times 0.4 is less
+        CHECK(choice.tag_distance == Approx(1.5));  // the minimum of 1.5 voxels; 1.8 times the spacing of 0.4 is less
     }
     SECTION("one point") { CHECK(choose_tag_distance({{1, 1, 1}}, kDomain, {}).tag_distance >= 1.5); }
 }

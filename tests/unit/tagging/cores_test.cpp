@@ -105,8 +105,8 @@ std::vector<Vec3> points_on_balls(const std::vector<std::array<double, 4>>& ball
 }  // namespace
 
 TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with runs between leaves and without") {
-    // The domain's end cuts the second ball. Depending on `radius`, a large part of the balls lies beyond the tube, or
-    // nothing.
+    // The domain's end cuts the second ball. With the smallest `radius` of the tube, a large part of the balls lies
+    // beyond the tube; with the largest one, nothing does.
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
     const double radius = GENERATE(6.0, 9.5, 40.0);
     const bool has_seed = GENERATE(false, true);

@@ -19,9 +19,9 @@ bl_info = {
     "category": "Import-Export",
 }
 # Custom properties of objects:
-ROLE = "covol_role"  # role of a child of the space: "surface" or "volume"
-MESHES = "covol_meshes"  # names of a surface's meshes, one for each frame of a time-lapse
-START = "covol_start"    # frame of Blender that shows the first of these meshes
+ROLE = "covol_role"      # of an object below the space: the result that it shows, "surface" or "volume"
+MESHES = "covol_meshes"  # of the surface: names of its meshes, one per line, one for each frame of a time-lapse
+START = "covol_start"    # of the surface: the frame of Blender in which the first mesh of MESHES is shown
 FIGURES = ("volume", "area", "genus")
 TICK = 0.1           # seconds between two checks whether the running program has sent events
 
@@ -148,7 +148,8 @@ def show(context, space, run, found):
     surface = child_of(space, "surface", lambda: bpy.data.meshes.new("covol surface"), context)
     known = next(each for each in found if each is not None)
     for mesh, each in zip(meshes_of(surface, len(found)), found):
-        known = each or known  # a frame that failed shows the previous one
+        # A frame that failed gets the mesh of the last successful frame before it, or else of the first one after it.
+        known = each or known
         fill(mesh, *known[:2])
         for key in FIGURES:
             mesh[f"covol_{key}"] = surface[f"covol_{key}"] = known[2]["surface"][key]

@@ -92,7 +92,7 @@ void Session::add_common_flags() {
 CLI::App* Session::add_command(const std::string& name, const std::string& description, std::function<void()> body) {
     CLI::App* command = app_.add_subcommand(name, description);
     add_help_flags(*command);
-    command->fallthrough();  // the common flags may follow the subcommand
+    command->fallthrough();  // options of the program, such as --threads, are accepted after the subcommand, too
     command->footer(
         "Every command also takes the options that covol --help lists: --threads, --quiet, --json and others.");
     bodies_[command] = std::move(body);
@@ -172,7 +172,8 @@ int Session::execute() {
             ScratchFolder::remove_all();
             ::_exit(code);
         });
-        // Called after the guard has created its thread, so that this thread is not counted as available for TBB.
+        // Called after the memory guard has created its thread, because limit_threads() counts the threads that can
+        // still be created for TBB.
         const ThreadCount threads = limit_threads(threads_);
         provenance_.emplace(*command_, inputs_of(*command_), report_);
         outputs_.protect(provenance_->inputs());

@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kLargeScene = 10000;  // world units; Blender's default clipping hides larger objects
 constexpr double kSmallScene = 0.01;   // world units; the default view shows smaller objects as a dot
-constexpr double kFlatVoxels = 3;      // ratio of spacings above which an image is mostly interpolated along one axis
-constexpr double kFarPoint = 20;       // distance of an outlier from its nearest neighbour, divided by the median
+constexpr double kFlatVoxels = 3;      // largest / smallest spacing; above it, most of a surface is interpolated
+constexpr double kFarPoint = 20;       // nearest-neighbour distance of an outlier, divided by the median of all points
 
 /// Collects what a file would cause in other programs: problems, which fail the check, and remarks, which do not.
 class Findings {
@@ -156,7 +156,8 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool of_chunks = chunks && chunks->read < chunks->total;
-    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of mapped files, only some slices
+    // Whether the range was found from a part of the voxels: some chunks, or some slices of a mapped file.
+    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);
     if (of_chunks)
         findings.remark(std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
                         " chunks were read: problems of the others are found only when these are read");

@@ -56,7 +56,7 @@ struct CompareJob {
         session.print(text.str());
     }
 
-    /// The mesh of a level set, as other commands write it.
+    /// The relaxed mesh of a level set, as other commands write it by default.
     static TriangleMesh mesh_of(const FloatGrid& level_set, const RunContext& run) {
         TriangleMesh mesh = extract_mesh(level_set, {}, run);
         relax_mesh(mesh, level_set, {}, run);

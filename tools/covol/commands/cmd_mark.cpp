@@ -156,7 +156,7 @@ struct MarkJob {
         if (!link || !link->open()) std::cout << "open " << server->url() << std::endl;
         session.note("the study is " + folder + "; every action is saved immediately. Ctrl-C ends the program.");
         while (!session.run().cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        server->stop();  // before the flag is cleared, which cancels requests in progress
+        server->stop();  // before accept_interrupt() clears the flag that cancels requests in progress
         accept_interrupt();
     }
 

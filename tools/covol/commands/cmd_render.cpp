@@ -82,7 +82,7 @@ private:
         return with_suffix(output, "_" + padded(n + 1, 4));
     }
 
-    /// The unit of length that the .vdb states.
+    /// The unit of length that the .vdb states; empty if it states none.
     [[nodiscard]] std::string stated_unit() const {
         for (const VdbGridInfo& grid : list_vdb(input))
             if (const auto found = grid.metadata.find("covol_unit"); found != grid.metadata.end())

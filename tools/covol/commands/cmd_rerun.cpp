@@ -102,7 +102,7 @@ public:
     }
 
     /// The value of an option, with the current path of the input instead of its file name.
-    /// @throws Error if the value names a file that is not an input of the run
+    /// @throws Error if the value names a file that is not an input of the run, or is "-", standard input
     [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
         if (value == "-") refuse(source_, "an input of that run came through a pipe");
         const std::size_t begin = path_within(value).first;
@@ -132,7 +132,7 @@ private:
         return rest.empty() || rest == "/" || (rest.front() == ':' && rest.find("..") == std::string::npos);
     }
 
-    /// Whether the value is a position, or a start that is not read from a file.
+    /// Whether the value of an option is a position such as 1,2,3 or NAME=1,2,3, or a value of --init without a file.
     static bool names_no_file(const std::string& value) {
         try {
             return parse_start("", value).path.empty();
@@ -304,7 +304,8 @@ private:
         return words;
     }
 
-    /// The output with the name of the original file, or else the only .vdb output, if the original file was renamed.
+    /// The .vdb output with the name of the original file, or, if the original file was renamed, the only .vdb output.
+    /// @throws Error if no output has this name and there is not exactly one.
     [[nodiscard]] std::string result_in(const KeptFolder& scratch) const {
         std::vector<fs::path> made;
         for (const fs::directory_entry& entry : fs::directory_iterator(scratch.path()))

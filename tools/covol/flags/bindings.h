@@ -134,7 +134,7 @@ struct PointFlags : Given<ReadPointsOptions> {
     void bind_options(CLI::App& command) { tool::bind_options(command, *this, Offered::SingleStep); }
 };
 
-/// How files of marks are read; "-" is standard input.
+/// The options with which files of marks are read; the name "-" stands for standard input.
 [[nodiscard]] ReadMarksOptions reading_of(const PointFlags& flags, const RunContext& run);
 /// Reads all points, in world units.
 [[nodiscard]] std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional<ImageGeometry>& geometry,

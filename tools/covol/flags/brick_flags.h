@@ -18,9 +18,11 @@ struct BrickFlags : Given<BrickOptions> {
 
 /// Memory for solving a band with this number of voxels, including the program itself, bytes.
 [[nodiscard]] double memory_of_band(double active_voxels);
-/// The same for a brick with this number of voxels, which is solved with layers of its neighbours.
+/// Memory for solving a brick with this number of band voxels, which is solved together with layers of its neighbours,
+/// bytes.
 [[nodiscard]] double memory_of_brick(double active_voxels);
-/// Memory for joining the bricks of such a band, without and with the whole mesh, bytes.
+/// Memory for joining the solved bricks of a band with this number of voxels, bytes. The first function is for a job
+/// that does not hold the whole mesh, the second for one that does.
 [[nodiscard]] double memory_of_joined(double active_voxels);
 [[nodiscard]] double memory_of_joined_mesh(double active_voxels);
 

@@ -13,7 +13,8 @@ struct PaintedFlags : Given<PaintedOptions> {
     std::vector<std::string> paths;
 
     void bind(CLI::App& command);
-    /// @throws UsageError if a file that is given as NAME=FILE has several labels; Error
+    /// @throws UsageError if a file that is given as NAME=FILE has several labels;
+    /// Error as for read_image() and make_painted()
     [[nodiscard]] std::vector<std::shared_ptr<const PaintedImage>> read(const RunContext& run) const;
 };
 

@@ -49,7 +49,7 @@ const Json& three(const Json& json, const char* name) {
 }
 
 Index3 index_of(const Json& json, const char* name) {
-    constexpr std::int64_t kMaxIndex = 1 << 24;  // voxels; indices of a valid lattice are at most half of this
+    constexpr std::int64_t kMaxIndex = 1 << 24;  // voxels; less than half of this in a valid plan: domain_of_plan()
     Index3 index{};
     for (int a = 0; a < 3; ++a)
         index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kMaxIndex, kMaxIndex);

@@ -264,7 +264,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         plan = solver->plan(job.bricks.resolve(limit));
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        return in_one();  // if the job itself is invalid, the error occurs again
+        return in_one();  // if the job is invalid, and not only its division into bricks, this fails, too
     }
     if (memory_of_band(double(plan.active_voxels())) < double(*limit)) {
         solver.reset();

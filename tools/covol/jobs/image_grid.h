@@ -11,6 +11,7 @@ namespace covol::tool {
 [[nodiscard]] double bytes_of_grid(const ImageGeometry& geometry, double h);
 
 /// The lattice of the grid as an image geometry, limited to the bounding box of its active voxels.
+/// @throws Error InvalidInput if it has none.
 [[nodiscard]] ImageGeometry geometry_of(const FloatGrid& grid);
 
 /// Trilinear samples of the grid at the voxel centres of `geometry`, i fastest.

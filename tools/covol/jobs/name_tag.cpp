@@ -54,7 +54,8 @@ struct SplitPath {
 };
 
 SplitPath split_ending(std::string path) {
-    while (path.size() > 1 && path.back() == '/') path.pop_back();  // slashes from completion by a shell
+    // A shell's completion adds a slash to the name of a folder, such as a.zarr/.
+    while (path.size() > 1 && path.back() == '/') path.pop_back();
     const std::size_t end = path.size() - long_ending(path).size();
     return {path.substr(0, end), path.substr(end)};
 }

@@ -59,7 +59,7 @@ void write_page(const std::string& path, const ReportPage& page, Session& sessio
 void write_page(const std::string& path, const StructuresOutput& output, ReportPage page, Session& session) {
     Json facts = page_facts(session);
     facts.update(to_json(output), true);
-    std::vector<Evidence> distances(output.structures.size());  // shown if there is no image
+    std::vector<Evidence> distances(output.structures.size());  // only distances to marks: shown without other evidence
     for (std::size_t n = 0; n < output.structures.size(); ++n) {
         const StructureOutput& s = output.structures[n];
         PageStructure shown;

@@ -60,7 +60,7 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     Stopwatch watch;
     SegmentResult result = reconstruct(input.points, options, quiet);
     Start start = result.report.resolved.start;
-    if (geometry && is_any<CloudStart>(start)) {  // the job with the image cannot use this start
+    if (geometry && is_any<CloudStart>(start)) {  // CloudStart is only for jobs without an image
         options.start = start = TagStart{};
         watch = {};
         result = reconstruct(input.points, options, quiet);

@@ -96,7 +96,7 @@ void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const
                     const RunContext& run) {
     if (!image || reading.space != PointSpace::Unstated || marks.points.empty()) return;
     const bool in_lengths = std::all_of(marks.rules.begin(), marks.rules.end(), [](const std::string& rule) {
-        return rule.ends_with("x, y, z in world units");  // how a file is read that states no unit
+        return rule.ends_with("x, y, z in world units");  // the text for coordinates that were read as lengths
     });
     if (!in_lengths) return;
     const std::optional<double> ratio = edges_if_voxels(marks.points, *image);

@@ -23,11 +23,11 @@ namespace covol::tool {
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<Marks>& structures);
 
 /// Reads the start of --init from its file. With several structures, each gets its own grid of a .vdb.
-/// @throws UsageError if several structures would start from one shape; Error.
+/// @throws UsageError if several structures would start from one shape; Error if the file cannot be read.
 void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const RunContext& run);
 
 /// Reads the structures' files, and chooses their common voxel size.
-/// @throws UsageError if there are neither an image nor marks; Error.
+/// @throws UsageError if there are neither an image nor marks; Error if a file is invalid or cannot be read.
 [[nodiscard]] StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& structures,
                                                 const std::optional<Image>& image, Session& session,
                                                 const RunContext& run);

@@ -206,7 +206,8 @@ Json input_of(const StructureOutput& s) {
     if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
     if (!s.contour_rules.empty()) {
         json["contours"] = {{"paths", s.files.contours}, {"rules", s.contour_rules}};
-        if (const auto& contours = s.result.report.resolved.contours)  // null for a network: its points are marks
+        // resolved.contours is null if the curves form a network: their points are then used as marks.
+        if (const auto& contours = s.result.report.resolved.contours)
             json["contours"].update({{"closed", contours->closed},
                                      {"open", contours->open},
                                      {"slices", contours->slices},

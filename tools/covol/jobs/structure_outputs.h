@@ -44,7 +44,8 @@ struct StructuresOutput {
 [[nodiscard]] bool is_density_in_output(const SegmentJob& job);
 [[nodiscard]] std::string density_name(const StructuresOutput& output, const StructureOutput& structure);
 
-/// Called with the tagged name of an output, empty if it is not requested, and the function that writes it.
+/// Called for each output, with its path as named for this frame by NameTag, and the function that writes it. The path
+/// is empty if the output is not requested.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
 void queue_outputs(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                    Session& session, const Sink& sink);

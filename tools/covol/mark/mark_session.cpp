@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kSuggestions = 5;
 constexpr std::uint64_t kKeptVersion = 1;     // version number of kept surfaces; new surfaces have larger ones
-constexpr double kMaxRead = double(1 << 27);  // maximum number of voxels that are read for the mean intensity
+constexpr double kMaxRead = double(1 << 27);  // maximum number of voxels read for the intensity inside a surface
 
 serve::Response refused(int status, const std::string& why) {
     serve::Response response;
@@ -105,7 +105,8 @@ bool MarkSession::show_kept(const std::shared_ptr<const StudyStructure>& structu
     return true;
 }
 
-/// Starts the solver for each structure whose marks have changed. @pre `mutex_` is locked
+/// Starts the solver for each of these structures whose marks, outlines, paint or guess have changed; removes deleted
+/// structures from the solver. @pre `mutex_` is locked
 void MarkSession::follow(const std::vector<StudyId>& structures) {
     for (const StudyId id : structures) {
         const auto structure = study_.history().find(id);
@@ -128,7 +129,7 @@ void MarkSession::receive(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
     Json reported;
-    std::shared_ptr<const StudyStructure> from;  // if not null, the surface is kept for it
+    std::shared_ptr<const StudyStructure> from;  // if not null, the structure for which kept_ stores the new surface
     StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
         intensity = intensity_within(image_(), *result.surface->surface, kMaxRead, run_);
@@ -233,7 +234,7 @@ void MarkSession::publish(const StudyHistory::Changed& changed) {
     if (changed.options) {
         solver_->set_options(options());
         for (auto& [id, solved] : solved_) {
-            solved.from = nullptr;  // so that it is solved again, with the new options
+            solved.from = nullptr;  // so that follow() solves the structure again, with the new options
             structures.push_back(id);
         }
     }

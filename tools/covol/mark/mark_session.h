@@ -76,7 +76,8 @@ private:
     Study::Applied apply(const KeyedAction& action);
     void publish(const StudyHistory::Changed& changed);
     [[nodiscard]] SegmentOptions options() const { return study_.history().options().applied_to(view_.options); }
-    /// The mesh that is displayed. @pre `mutex_` is locked
+    /// The displayed mesh: that of the last result, or one kept from an earlier session; null if there is none.
+    /// @pre `mutex_` is locked
     [[nodiscard]] static std::shared_ptr<const TriangleMesh> mesh_of(const Solved& solved);
     /// Displays the kept surface of a structure. @return whether there is one @pre `mutex_` is locked
     bool show_kept(const std::shared_ptr<const StudyStructure>& structure);

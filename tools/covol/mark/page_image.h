@@ -37,7 +37,9 @@ public:
 private:
     struct Channel {
         ImageLevels levels;
-        std::array<double, 2> range{0, 1}, window{0, 1};  // values encoded in slices; black and white at first
+        /// `range`: the lowest and the highest value that slices encode; `window`: the values that the page displays as
+        /// black and as white until the user changes them.
+        std::array<double, 2> range{0, 1}, window{0, 1};
     };
     [[nodiscard]] Channel made_of(ImageLevels levels) const;
     [[nodiscard]] const Channel& channel_of(const serve::Request& request) const;

@@ -29,7 +29,7 @@ def _notebooks():
     try:
         from jupyter_server.serverapp import list_running_servers
         ports = {int(server["port"]) for server in list_running_servers()}
-    except Exception:  # noqa: BLE001 - the list is read from files of another program, which may be invalid
+    except Exception:  # noqa: BLE001 - list_running_servers() reads files of Jupyter, which may be invalid
         ports = set()
     return [f"http://localhost:{port}" for port in sorted(ports or {8888})]
 

@@ -35,7 +35,8 @@ constexpr struct {
               {'i', 2, PixelType::Int16}, {'u', 4, PixelType::UInt32}, {'i', 4, PixelType::Int32},
               {'f', 4, PixelType::Float}, {'f', 8, PixelType::Double}};
 
-/// The array, converted to a number type that covol supports if necessary.
+/// The array, converted if necessary to a number type that covol supports and to the byte order of this machine.
+/// @throws Error Unsupported if its elements are not integers, floats or Booleans.
 py::array known_numbers(py::array array) {
     const char kind = array.dtype().kind();
     const auto bytes = array.dtype().itemsize();

@@ -86,7 +86,7 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
     return cloud;
 }
 
-/// The guess of the marks: a mask, a level set, or the path of a mesh.
+/// The guess of `marks` as an argument of structures(): a mask, a level set, or, for a mesh, its `path`.
 py::object guess_of(const Marks& marks, const std::string& path) {
     const Start start = marks.guess({}).start;
     if (const auto* mask = std::get_if<MaskStart>(&start)) return py::cast(*mask->mask);

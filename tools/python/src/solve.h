@@ -16,7 +16,7 @@ struct LevelSet {
     FloatGridPtr grid;
 };
 
-/// A start or a guess: a text as for --init on the command line, the path of a file, a level set, or a mask.
+/// A start or a guess: none, a text as for --init on the command line, the path of a file, a level set, or a mask.
 using Shape = std::variant<std::monostate, std::string, LevelSet, Image>;
 
 /// The marks and other inputs of one structure.

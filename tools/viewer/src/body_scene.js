@@ -32,7 +32,8 @@ export class BodyScene extends Stage3D {
     for (let n = 0; n < 8; ++n) box.expandByPoint(new Vector3(...this.space.toWorld([0, 1, 2].map((a) => corners[n >> a & 1][a]))));
     this.imageBox = box;
     this.setBox(box);
-    this.sphere.radius *= 1.15;  // the sphere is circumscribed about the box
+    // The box's corners lie on its bounding sphere, and look() places the camera 7 % too near for the whole sphere.
+    this.sphere.radius *= 1.15;
     this.addImageBox(corners);
     this.addPlanes();
     this.addRing();

@@ -68,7 +68,7 @@ export class PlanePanel {
     const {plane} = this, before = this.view?.zoom ?? 1, fit = Math.min(plane.scaleX, plane.scaleY) / before;
     const zoom = Math.min(LARGEST_VOXEL / fit, before * factor);
     this.setView(zoom <= 1.001 ? null : this.viewWith(zoom, plane.unplace(px, py), [px, py]));
-    this.draw();  // at once, because the next event uses the updated plane
+    this.draw();  // immediately: draw() updates this.plane, with which the next event computes positions
   }
 
   /** Scrolls to a position if it is outside of the zoomed view. */

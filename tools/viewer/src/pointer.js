@@ -2,7 +2,7 @@
 // press.
 
 export const CLICK = 4, TAP = 10;  // CSS pixels that the pointer may move during a click of the mouse, and during a tap
-const NOTCH = 30;  // scroll distance of one step, for wheels without notches
+const NOTCH = 30;  // scroll distance per slice, in CSS pixels, for wheels without notches
 
 /** Whether the space bar is pressed: then a drag moves the image. */
 const keys = {space: false};

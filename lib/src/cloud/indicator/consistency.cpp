@@ -48,7 +48,7 @@ Consistency::Consistency(const std::vector<Vec3>& points, std::vector<double> ar
       cells_(points, reach),
       beside_(neighbours_of(cells_)) {}
 
-void Consistency::solve(const std::vector<Vec3>& normals) {  // the field's last solution is the initial value
+void Consistency::solve(const std::vector<Vec3>& normals) {  // starts from the solution for the former normals
     std::vector<Vec3> vectors(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(),
                       [&](std::size_t n) { vectors[n] = times(areas_[n], normals[n]); });
@@ -95,8 +95,8 @@ void Consistency::take_better(const std::vector<Vec3>& other, std::vector<Vec3>&
     };
     std::vector<Vec3> all = taken([](std::size_t) { return true; });
     std::vector<double> all_off = off(all);
-    // For each patch, the decrease of the deviation by the other orientation, summed over its cells and the cells next
-    // to them.
+    // For each patch, by how much the normals of `other` decrease the sum of the deviations over the points in its
+    // cells and in adjacent cells that belong to no patch.
     std::vector<double> in_cell(cells_.cell_count()), gain(std::size_t(patches), 0.0);
     for_points_of(cells_, [&](std::size_t cell, std::uint32_t n) { in_cell[cell] += own_off[n] - all_off[n]; });
     for (std::size_t cell = 0; cell < patch.size(); ++cell) {

@@ -16,19 +16,21 @@ struct CloudHeuristics {
     double flat = heuristic("cloud.flat", 0.25);
     /// [cosine] Minimum between the normals of two parts of one sheet; with a smaller one, they meet in a crease.
     double same_sheet = heuristic("cloud.same_sheet", 0.9);
-    /// [fraction of the points] Fraction below which deviations are attributed to single points.
+    /// [fraction of the points] Fraction below which points that were reversed or removed, contradict the indicator of
+    /// all points, or form a separate piece, count as exceptions.
     double few = heuristic("cloud.few", 0.002);
-    /// [fraction of the points, or of the area] Fraction above which deviations are not attributed to noise.
+    /// [fraction of the points, or of the area] Fraction above which points that a surface misses, that contradict an
+    /// orientation, or that are visible from one side only, are not attributed to noise.
     double some = heuristic("cloud.some", 0.02);
-    /// [rounds] Number of updates after normals were reversed, until their directions agree with the indicator again;
-    /// maximum number of rounds that reverse single normals or remove stray points.
+    /// [rounds] Number of updates of indicator and normals after normals were reversed, until both agree again. Also
+    /// the maximum number of rounds that reverse single normals or remove stray points.
     int settling = heuristic("cloud.settling", 3);
 };
 COVOL_HEURISTICS CloudHeuristics kCloud{};
 
 /// The grids of the indicator function: indicator.cpp.
 struct IndicatorHeuristics {
-    /// [cells] Minimum number of cells along the longest side.
+    /// [cells] Minimum number of cells along the longest side of the box in which the indicator is computed.
     int min_cells = heuristic("indicator.min_cells", 48);
     /// [square roots of the area that a point represents] Maximum cell size at the point, unless the finest grid is
     /// coarser: the coarsest grid within this limit is used, so that sparser points have coarser grids.
@@ -44,11 +46,12 @@ struct IterationHeuristics {
     /// [indicator] Deviation of a cell's mean indicator from 1/2 from which on the cell belongs to a patch whose
     /// normals are reversed on trial.
     double patch_off = heuristic("iteration.patch_off", 0.12);
-    /// [V-cycles] Number of multigrid cycles in each update while patches are reversed.
+    /// [V-cycles] Number of multigrid cycles for each solution while patches are reversed on trial: few, because the
+    /// solution for the former normals is the initial value.
     int patch_cycles = heuristic("iteration.patch_cycles", 2);
-    /// [1 - cosine] Mean change of the normals below which the iteration ends.
+    /// [1 - cosine] Mean change of the normals in one update, below which the updates end.
     double steady = heuristic("iteration.steady", 1e-4);
-    /// [V-cycles] Number of multigrid cycles in the last iteration.
+    /// [V-cycles] Number of multigrid cycles in the last update, and after the repair of normals by repair_torn().
     int last_cycles = heuristic("iteration.last_cycles", 4);
 };
 COVOL_HEURISTICS IterationHeuristics kIteration{};

@@ -8,7 +8,8 @@ namespace covol::cloud {
 /// The longest side of the box in which the indicator is computed.
 /// @param longest  longest side of the points' box
 [[nodiscard]] double indicator_side(double longest);
-/// `cell`, or a smaller cell size if the longest side would have fewer than kIndicator.min_cells cells.
+/// `cell`, or a smaller cell size if the longest side of the indicator's box, indicator_side(), would have fewer than
+/// kIndicator.min_cells cells.
 [[nodiscard]] double indicator_cell(const std::vector<Vec3>& points, double cell);
 /// Grids around the points, coarser where the points are sparse, with a margin so wide that the indicator may be set to
 /// 0 at its end. The cell size is that of indicator_cell().

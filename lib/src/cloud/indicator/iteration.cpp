@@ -103,7 +103,7 @@ void Iteration::turn_patches(WindingField& field, Orientation& result) {
     const PointCells cells(points_, kCloud.coarse * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
     for (int round = 0; round < kCommon.rounds; ++round) {
-        turn(field, result, kIteration.patch_cycles);  // first updates the indicator, which is measured below
+        turn(field, result, kIteration.patch_cycles);  // updates field.indicator(), which mean_off() needs
         const std::vector<double> off = mean_off(cells, field.indicator());
         const std::vector<int> patch = patches_of(beside, sides_of(off));
         const int patches = 1 + *std::max_element(patch.begin(), patch.end());

@@ -23,8 +23,8 @@ public:
     /// @param points, areas  must outlive the object; areas in world units squared
     Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, const RunContext& run);
 
-    /// Performs one stage. The first one starts from result.normals or, if there are none, from normals by the density
-    /// of the points; later ones start from the indicator of the stage before.
+    /// Performs one stage. The first one starts from result.normals or, if there are none, from normals in the
+    /// direction in which the density of the points decreases; later ones start from the indicator of the stage before.
     /// @throws Error Cancelled
     void run(const Stage& stage, Orientation& result);
     /// Repairs the normals by repair_torn() and then recomputes the indicator.

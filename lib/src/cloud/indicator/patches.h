@@ -10,9 +10,10 @@ namespace covol::cloud {
 /// For each cell, its neighbouring cells that contain points.
 [[nodiscard]] std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells);
 
-/// For each cell, the number of its patch, from 0; -1 for cells of side 0. A patch consists of connected cells of the
-/// same side.
+/// For each cell, the number of its patch, from 0; -1 for cells with side 0. A patch consists of connected cells with
+/// the same value of `side`.
 /// @param beside  the result of neighbours_of()
+/// @param side    for each cell, the value by which patches are formed; 0 if the cell belongs to no patch
 [[nodiscard]] std::vector<int> patches_of(const std::vector<std::vector<std::uint32_t>>& beside,
                                           const std::vector<int>& side);
 

@@ -44,7 +44,8 @@ bool does_enclose(const CloudOrientation& cloud) {
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double spacing = cloud.scale.spacing;
-    // If the orientation is settled, the cells may be as small as the points allow.
+    // If the orientation is settled, the cells may be as small as the points allow; otherwise they are those of the
+    // first attempt of orient().
     const double first = is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size())
                                        : first_cell(cloud.scale, cloud.points.size());
     const double cell = cloud::indicator_cell(cloud.points, first);

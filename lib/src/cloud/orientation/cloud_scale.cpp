@@ -20,7 +20,7 @@
 namespace covol {
 namespace {
 
-constexpr double kCellRadii = 2;      // edge of the cells by which points are sorted, in first radii
+constexpr double kCellRadii = 2;      // edge of the cells that sort the points, relative to the smallest radius
 constexpr std::size_t kNearest = 12;  // points in a group of nearest ones: twice a quadric's coefficients
 
 /// Standard deviation of points from the best-fitting quadric over the plane of the second and third axes.
@@ -81,7 +81,7 @@ Around measure_around(const cloud::PointCells& cells, const Vec3& at, double rad
 /// Measures the group of kNearest points, of which one is the point itself, for every `step`-th point.
 std::vector<Around> measure_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
                                     std::size_t step) {
-    tbb::concurrent_vector<Around> around;  // the order does not affect the medians
+    tbb::concurrent_vector<Around> around;  // its order varies with the threads, but does not affect the medians
     cloud::for_nearest(
         cells, 2 * nearest, kNearest - 1,
         [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {

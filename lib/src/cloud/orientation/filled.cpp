@@ -47,16 +47,16 @@ Neighbourhood spread_around(const PointCells& cells, const Vec3& at, double radi
     return {count, std::sqrt(std::max(0.0, axes.eigenvalues()[0]))};
 }
 
-/// [radii] Thickness of random points that fill a ball. The formula was fitted to balls of 8 to 100 points such that
-/// few of them have a smaller thickness.
+/// [radii] Expected thickness, as in Neighbourhood, of `count` random points that fill a ball. The formula was fitted
+/// to balls of 8 to 100 points such that few of them have a smaller thickness.
 double expected_thickness(double count) { return std::sqrt(0.2) * (1 - 1.25 / std::sqrt(count)); }
 
 }  // namespace
 
 bool fill_a_solid(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     const auto all = double(points.size());
-    // With fewer points, the sizes to be tested, from kCommon.ring points to an eighth of all points, would not span a
-    // factor of 12.
+    // Neighbourhoods of kCommon.ring points to an eighth of all points are tested. With fewer points, these two numbers
+    // would not differ by a factor of 12.
     if (all < 96 * double(kCommon.ring) || !(spacing > 0)) return false;
     const PointCells cells(points, spacing);
     std::vector<Neighbourhood> around(std::min(points.size(), kCommon.sample));

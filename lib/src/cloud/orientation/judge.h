@@ -6,17 +6,20 @@
 
 namespace covol::cloud {
 
-/// Cell size of the finest grid, world units; larger if there are more points than the iteration uses.
+/// Smallest cell size that the points allow for the indicator, world units: at least the noise; larger if there are
+/// more points than the iteration uses.
+/// @param points  number of points
 [[nodiscard]] double finest_cell(const CloudScale& scale, std::size_t points);
-/// Cell size of the first attempts, world units. With larger cells, fewer normals are reversed; only thin parts require
-/// smaller ones.
+/// Cell size of the indicator's finest grid in the first attempt of orient(), world units: at least finest_cell(), and
+/// at most kOrientation.first_along cells along the largest part. On larger cells, fewer normals change their sides
+/// during the iteration; later attempts have smaller cells for thin parts.
 [[nodiscard]] double first_cell(const CloudScale& scale, std::size_t points);
 
 /// Whether the noise is small compared to the spacing, so that the nearest points are on the sheet of a point, not
 /// above or below it.
 [[nodiscard]] bool is_clean(const CloudScale& scale);
 
-/// Distance from a point beyond which a surface misses it, world units.
+/// Distance between a point and a surface above which the surface counts as missing the point, world units.
 [[nodiscard]] double miss_reach(const CloudScale& scale);
 
 /// Measure of doubt in an orientation: the fraction of normals that changed their side in the last iteration, plus a

@@ -17,8 +17,8 @@ namespace {
 
 using Patch = std::vector<std::uint32_t>;  // indices of points
 
-/// Finds the cells of points whose mean free direction is opposed to the sum of the mean free directions of the cells
-/// around them.
+/// Finds the cells of points whose mean free direction, in which the view from them is not blocked (free_directions()),
+/// is opposed to the sum of those of the cells around them, up to the distance kLayers.farthest_layer * between.
 class Opposed {
 public:
     Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
@@ -26,7 +26,7 @@ public:
         std::vector<Vec3> places, frees;
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             places.push_back(cells.sorted()[cells.cell(c).begin]);
-            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // the same for all points of a cell
+            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // that of the cell's first point
         }
         const PointCells near(places, cells.edge());
         const double reach = kLayers.farthest_layer * between, touching = std::sqrt(6.0) * cells.edge();
@@ -86,7 +86,7 @@ struct Level {
         });
     }
     std::vector<Vec3> middles;  // centres of the cells crossed by the surface
-    double bare = 0;            // area without points, in faces of the finest cells
+    double bare = 0;            // area without points, in units of a face of the finest cells
 };
 
 void turn(const Patch& patch, Orientation& orientation) {
@@ -117,8 +117,9 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
-        // If a false cavity vanishes, the bare area decreases by that of its far side, which is not much larger than
-        // the patch on its near side. If the hole of a ring closes, it decreases by much more.
+        // If the patch was the near side of a false cavity, which vanishes by the reversal, the area without points
+        // decreases by that of the far side, which is not much larger. If the hole of a ring closes, it decreases by
+        // much more.
         const double gain = (bare - level.bare) * cell * cell;
         if (!(gain > 0 && gain < kCommon.clear_ratio * area) ||
             double(away) > kCommon.minority * double(patch.size())) {

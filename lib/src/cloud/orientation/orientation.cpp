@@ -33,9 +33,9 @@ using cloud::Stage;
 /// Parameters of an attempt. No further attempt is made after one that is settled and has at least the cell size of the
 /// first attempt.
 struct Attempt {
-    double cell;         // cell size relative to the first attempt
+    double cell;         // cell size relative to first_cell()
     double enclosed;     // Stage::enclosed of the first stage
-    bool is_propagated;  // initial normals by propagation; false: by the density of the points
+    bool is_propagated;  // initial normals: propagated_normals(); false: from the density of the points
 };
 
 /// A spatially even subset of the points, with the area of the surface that each represents.

@@ -11,8 +11,9 @@ namespace covol::cloud {
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 
 /// For each point of a scan of one side, the direction from which it was seen: the common direction in which more
-/// points have a free view than in the opposite one, if there is such a direction, as for ground with roofs and trees
-/// above it. The mean free direction of the point itself is added with a small weight, for vertical surfaces.
+/// points have a free view than in the opposite one, as for ground with roofs and trees above it. The mean free
+/// direction of the point itself is added with a small weight, for vertical surfaces; without a common direction, it
+/// alone is returned.
 [[nodiscard]] std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale& scale);
 
 /// Fraction of the points with a free view in the given direction of each; points with direction 0 do not count.

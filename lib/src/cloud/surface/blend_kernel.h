@@ -23,7 +23,8 @@ struct BlendLeaf {
     alignas(32) std::array<float, 512> fraction;               ///< minimum of (distance from foot / reach)^2
     alignas(32) std::array<std::int32_t, 512> nearest;         ///< piece with that minimum; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< normal of that piece
-    /// Sums of weight * distance and of the weights, over the pieces whose normals are on the side of `normal`.
+    /// Sums of weight * distance and of the weights, over the pieces whose normals are less than 90 degrees from
+    /// `normal`.
     alignas(32) std::array<float, 512> sum, weight;
 };
 

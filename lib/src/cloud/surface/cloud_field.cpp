@@ -32,8 +32,8 @@ public:
     Pieces(std::vector<Quadric> quadrics, double h)
         : quadrics_(std::move(quadrics)), h_(h), cells_(feet(quadrics_), 4 * h) {
         std::vector<Quadric> sorted;
-        // A quadric applies at least up to beyond the next nodes, even if the voxels are wider than the neighbourhoods
-        // of the fits.
+        // A quadric applies at least up to kCloud.coarse edges of the finest cells, each of which has a node with a
+        // quadric, even if the voxels are wider than the neighbourhood of its fit.
         const double shortest = kCloud.coarse * kBlend.node_voxels * h;
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
@@ -148,7 +148,7 @@ void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, c
         WorldBox half = box;
         for (int a = 0; a < 3; ++a) ((part >> a & 1) != 0 ? half.min : half.max)[a] = 0.5 * (box.min[a] + box.max[a]);
         const Indicator::Sample at = indicator.at(times(0.5, plus(half.min, half.max)));
-        // The corners of the half are 0.43 sides of the box from its centre; 0.6 includes a margin.
+        // The corners of the part are 0.43 sides of the whole box from the part's centre; 0.6 includes a margin.
         if (std::abs(at.inside - 0.5) <= 0.6 * side * length(at.gradient)) add_crossed(indicator, half, edge, visit);
     }
 }
@@ -279,7 +279,7 @@ private:
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
-    /// Lateral distance of a position from the piece's foot, as a fraction of its maximum.
+    /// Lateral distance of a position from the piece's foot, as a fraction of the piece's own_radius().
     [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
         const Vec3 to = minus(world, pieces_.foot(piece));
         const double up = dot(to, pieces_[piece].axes[2]);

@@ -183,7 +183,7 @@ void combine(const Parts& parts, Crease& crease) {
     crease.first_is_convex = convex >= 2;
     crease.others_are_convex = convex == 3 || convex == 1;
     // If one of the three pairs is convex and the other two are not, or the reverse, the sheet that does not belong to
-    // this pair must come first.
+    // this pair must come first, because Crease first combines the second sheet with the third.
     for (std::size_t n = 0; n < 3; ++n)
         if (convex % 3 != 0 && with[n] == (convex == 1)) std::swap(sheets[0], sheets[n]);
 }
@@ -198,7 +198,8 @@ double misfit_of(const std::vector<CreasePoint>& points, const auto& shape) {
     return std::sqrt(squares / weight);
 }
 
-/// Fits a crease of `count` sheets.
+/// Fits a crease of `count` sheets; none if the normals of the points or of two sheets differ too little, if a sheet
+/// has too few points, or if the misfit is too large.
 /// @param misfit  misfit of the best fit so far: planes with a larger misfit are rejected
 std::optional<Crease> fit_sheets(const std::vector<CreasePoint>& points, double radius, std::size_t count,
                                  double misfit) {

@@ -68,7 +68,7 @@ void FitPoints::clear(std::size_t room) {
 
 void FitPoints::fill_up() {
     for (std::size_t n = size; n % kFitLanes != 0; ++n) {
-        u[n] = 1;  // then 1 - u^2, and with it the weight, is 0
+        u[n] = 1;  // so that 1 - u^2 - v^2 - t^2, and with it the weight of the padding, is 0
         v[n] = t[n] = count[n] = 0;
     }
 }

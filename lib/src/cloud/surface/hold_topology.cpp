@@ -17,8 +17,8 @@ namespace {
 using openvdb::Coord;
 
 constexpr std::size_t kCheckEvery = 10'000;  // voxels between two checks for cancellation
-// [voxels] Absolute value of voxels that keep rough's sign: far less than a voxel, so that they hardly displace the
-// surface, but not 0, so that triangles do not degenerate.
+// [voxels] Absolute value of target's voxels that keep the sign of rough, whose topology is imposed: far less than a
+// voxel, so that they hardly displace the surface, but not 0, so that triangles do not degenerate.
 constexpr double kHeld = 0.1;
 
 /// The 26 neighbours of a voxel, one bit each. For each neighbour, `beside6` and `beside18` are the other neighbours
@@ -70,8 +70,8 @@ std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& n
     return all;
 }
 
-/// Whether the set contains voxels adjacent to the centre (`next`), and these are connected by voxels of the set that
-/// are less than `steps` from them.
+/// Whether the set contains voxels adjacent to the centre, which are those in `next`, and these are connected to each
+/// other by voxels of the set that are at most steps - 1 neighbours away from them.
 bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::uint32_t, 26>& neighbours, int steps) {
     const std::uint32_t touching = set & next;
     if (touching == 0) return false;

@@ -135,7 +135,7 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         const Gap gap = next->gap;
         if (!(gap.length < max_gap)) break;
         if (!has_points_along(gap)) {
-            next->gap = {};  // the piece may still be joined to another small piece after that has been joined
+            next->gap = {};  // remains separate, unless a small piece near it is joined later
             continue;
         }
         std::vector<double> around;

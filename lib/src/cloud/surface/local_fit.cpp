@@ -49,8 +49,8 @@ struct Level {
     }
     double radius;
     PointCells cells;
-    FitCloud sorted;                 // in the order of the cells
-    std::vector<float> squares_off;  // in the same order; empty: unknown
+    FitCloud sorted;                 // points in the order of the cells
+    std::vector<float> squares_off;  // OrientedCloud::squares_off in the same order
 };
 
 struct Scratch {
@@ -125,7 +125,7 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
 }
 
 /// Root mean square distance from the indicator's surface of the neighbourhood's points whose normals are on the side
-/// of `normal`.
+/// of `normal`; infinite if the distances are unknown.
 double off_indicator(const Level& level, const Vec3& origin, const Vec3& normal,
                      const std::vector<PointCells::Range>& ranges) {
     if (level.squares_off.empty()) return std::numeric_limits<double>::infinity();
@@ -188,7 +188,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             return best;
         if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
-        if (seen.empty()) best.noise = now.noise;  // in wider ones, the surface's shape adds to the noise
+        if (seen.empty()) best.noise = now.noise;  // in wider neighbourhoods, the quadric's error adds to the noise
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;

@@ -18,16 +18,21 @@ namespace covol {
 namespace cloud {
 namespace {
 
-// All lengths are in voxels.
-constexpr double kOnSurface = 1;  // maximum distance of a vertex from the surface that a crease's sheets form
-// Maximum difference between the distances of a vertex to two sheets:
-constexpr double kBeside = 2;         // for it to be moved at all
-constexpr double kOnCrease = 0.3;     // for it to be moved onto the crease of the two sheets
-constexpr double kSame = 0.02;        // for it to count as lying on both sheets
-constexpr double kLongestMove = 1.5;  // maximum distance of a new position from the old or the estimated one
+// [voxels] Maximum distance of a vertex from the surface that a crease's sheets form, for it to be moved to the crease
+// or for its edges to be divided there.
+constexpr double kOnSurface = 1;
+// [voxels] Maximum difference between the distances of a vertex to two sheets, for it to be moved to one or both.
+constexpr double kBeside = 2;
+// [voxels] Maximum difference between the distances of a vertex to two sheets, for it to be moved onto their crease.
+// Also the distance from a vertex at a corner below which vertices are merged with it.
+constexpr double kOnCrease = 0.3;
+// [voxels] Maximum difference between the distances of a vertex to two sheets, for it to count as lying on both.
+constexpr double kSame = 0.02;
+// [voxels] Maximum distance of a vertex's new position on a crease from its old one or from an estimate of the new one.
+constexpr double kLongestMove = 1.5;
 
-constexpr double kNeedle = 0.2;       // maximum length of a degenerate triangle's shortest edge that is collapsed
-constexpr double kLineHeight = 0.02;  // height below which a triangle counts as degenerate
+constexpr double kNeedle = 0.2;       // [voxels] maximum length of a degenerate triangle's edge that is collapsed
+constexpr double kLineHeight = 0.02;  // [voxels] height below which a triangle counts as degenerate
 constexpr int kMendings = 10;         // maximum number of passes until no triangle is folded or flat
 
 std::vector<Vec3> feet_of(const std::vector<Quadric>& quadrics) {

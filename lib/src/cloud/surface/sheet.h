@@ -35,7 +35,7 @@ struct Crease {
     [[nodiscard]] double distance(const Vec3& world) const;
     /// The sheet that determines the distance.
     [[nodiscard]] std::size_t nearest(const Vec3& world) const;
-    /// The sheets that could determine the distance if their own distances changed by at most `within`, one bit each:
+    /// One bit for each sheet that determines the distance, or would if its own distance changed by at most `within`:
     /// one sheet on a face, two on an edge. The continuation of a sheet beyond a crease does not count.
     [[nodiscard]] unsigned sheets_at(const Vec3& world, double within) const;
     [[nodiscard]] Vec3 mean_normal() const;

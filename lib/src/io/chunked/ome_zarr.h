@@ -42,7 +42,7 @@ struct OmePlace {
 };
 std::optional<OmePlace> find_ome_image(const std::string& array_folder);
 
-/// The contents of a group that is not an image itself. They are listed in messages.
+/// The contents of a group of a Zarr store that is not an image itself. Messages list them.
 struct OmeGroup {
     std::vector<std::string> images;  ///< names of the folders in the group that are images or arrays
     bool is_series = false;           ///< whether the images are named 0, 1, ... as bioformats2raw names them

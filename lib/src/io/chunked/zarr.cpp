@@ -145,7 +145,8 @@ private:
         info_.spacing_known = {false, false, false};
     }
 
-    /// Converts a level's numbers, one for each dimension, to lengths along x, y, z in the unit of x.
+    /// Converts a level's scale or translation, which has one number for each dimension, to lengths along x, y, z in
+    /// the unit of x.
     [[nodiscard]] Vec3 along_axes(const std::vector<double>& numbers) const {
         Vec3 along{};
         for (int a = 0; a < 3; ++a) along[a] = numbers[axes_.space[a]] * in_unit_[a];

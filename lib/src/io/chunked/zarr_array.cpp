@@ -143,8 +143,8 @@ void ArrayReader::set_fill(const Json& value) {
         throw wrong("its fill_value " + std::to_string(array_.fill) + " is not a valid " + to_string(array_.type));
 }
 
-/// Limits the size of a chunk, because a chunk is unpacked into memory as a whole, including all of its channels and
-/// frames.
+/// Rejects chunks without elements, and chunks of more than kMaxChunkBytes, because a chunk is unpacked into memory as
+/// a whole, including all of its channels and frames.
 void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
@@ -238,7 +238,8 @@ void ArrayReader::read_keys() {
     if (name == "default") array_.key_begin = std::string("c") + array_.separator;
 }
 
-/// The dimensions of a chunk in the order in which they are stored, slowest first.
+/// The dimensions of a chunk in the order in which the codec "transpose" stores them, slowest first. @throws Error
+/// InvalidInput if its `order` is not a permutation of the dimensions.
 std::vector<std::size_t> ArrayReader::transposed(const Json& codec) const {
     const Json& order = member(member(codec, "configuration"), "order");
     const std::size_t count = array_.shape.size();

@@ -12,13 +12,14 @@
 namespace covol::detail {
 namespace {
 
-/// Position and size of a chunk in its shard.
+/// Position and size of a chunk in the file of its shard, in bytes. Both are 2^64 - 1 if the shard lacks the chunk.
 struct ShardEntry {
     std::uint64_t begin = 0, bytes = 0;
 };
 using ShardIndex = std::vector<ShardEntry>;
 
-/// The indices of the most recently read shards.
+/// Keeps the index (one ShardEntry for each chunk) of each shard that was read. If the indices would exceed
+/// kMaxEntries, all of them are removed.
 class ShardIndices {
 public:
     explicit ShardIndices(const ZarrArray& array) : shards_(array.shards), count_(1) {
@@ -38,7 +39,7 @@ public:
     }
 
 private:
-    /// Maximum number of index entries that are kept: 64 MiB.
+    /// Maximum number of objects ShardEntry that are kept; so many occupy 64 MiB.
     static constexpr std::uint64_t kMaxEntries = std::uint64_t(1) << 22;
 
     [[nodiscard]] std::shared_ptr<const ShardIndex> read(const std::string& path, const StoreFile& file) const {
@@ -116,7 +117,8 @@ private:
                                  std::to_string(bytes) + (array_.codecs.empty() ? "" : " compressed ones"));
     }
 
-    /// A missing file means that the chunk has the fill value, unless the array itself no longer exists.
+    /// Checks that the voxels of a missing chunk can be set to the fill value. @throws Error Io if the array itself no
+    /// longer exists, InvalidInput if the fill value is not finite.
     void check_missing(const std::string& path) const {
         std::error_code status;
         if (!std::filesystem::exists(array_.metadata, status))

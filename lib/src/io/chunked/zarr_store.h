@@ -56,7 +56,7 @@ private:
 /// more deeply nested than metadata can be), Io.
 std::optional<Json> read_json(const std::string& path);
 
-/// Parses an object. @param path  of the text, for messages @throws Error InvalidInput.
+/// Parses a JSON object. @param path  of the text, for messages @throws Error InvalidInput.
 Json parse_json(const std::string& path, std::string_view text);
 
 /// The value of a key; null if there is none, or if `object` is not an object.

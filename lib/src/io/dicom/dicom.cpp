@@ -126,7 +126,7 @@ private:
     void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
         constexpr std::uint64_t kMaxAtOnce = std::uint64_t(256) << 20;
         std::optional<DecodedPixels> packed;
-        std::map<std::string, std::size_t> numbers;  // index in `packed` of each compressed file, by path
+        std::map<std::string, std::size_t> numbers;  // by path: index of the file's decoded pixels in `packed`
         for (std::size_t n = begin; n < end; ++n) {
             run.check();
             run.report("image", double(n - begin) / double(end - begin));

@@ -14,7 +14,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // the length 2^32 - 1 means "undefined"
+constexpr std::uint64_t kMaxBytes = 0xFFFFFFFE;  // maximum length of a value; 2^32 - 1 means "undefined length"
 
 template <typename T>
 std::string little_endian(T value) {
@@ -143,7 +143,7 @@ std::string dicom_uid(const std::string& text) {
     }
     bytes[6] = (bytes[6] & 0x0FU) | 0x80U;  // sets the version of the UUID to 8
     bytes[8] = (bytes[8] & 0x3FU) | 0x80U;  // sets the variant of the UUID to that of RFC 9562
-    // Converts the 128 bits to one decimal number.
+    // A UID contains the 128 bits of the UUID as one decimal number.
     std::string decimal = "0";
     for (const unsigned byte : bytes) {
         unsigned carry = byte;

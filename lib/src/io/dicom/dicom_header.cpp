@@ -58,7 +58,8 @@ constexpr Representation kRepresentations[] = {
     {0x00281102, "US"}, {0x00281103, "US"}, {0x00282110, "CS"}, {0x00282112, "DS"}, {0x00282114, "CS"},
     {0x00409224, "FD"}, {0x00409225, "FD"}, {0x3004000C, "DS"}, {0x3004000E, "DS"}};
 
-/// Whether an element may have this VR. "UN" (unknown) is accepted for all tags.
+/// Whether an element may have this VR: the VR that kRepresentations states for its tag, or any VR if the tag is not in
+/// that list. "UN" (unknown) is accepted for all tags.
 bool has_expected_vr(std::uint32_t tag, std::string_view vr) {
     if (vr == "UN") return true;
     // The descriptors of palettes (tags 0028,1101 to 1103) are signed (SS) if the pixels are signed.
@@ -316,7 +317,7 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 std::string dicom_class(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a named pipe would wait for a writer
-    // [bytes] Size of the part that is searched; the SOP class is near the beginning.
+    // [bytes] Size of the part of the file that is searched for the SOP class, which is near the beginning.
     constexpr std::size_t kMeta = 1024;
     std::string begin(kMeta, '\0');
     std::ifstream file(path, std::ios::binary);

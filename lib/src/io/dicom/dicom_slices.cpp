@@ -136,8 +136,9 @@ void fill_step(const DicomHeader& header, DicomSlice& slice) {
         slice.step = {10 * std::abs(x[0]), 10 * std::abs(y[0])};
 }
 
-/// Sets the position of the plane: the position that the file states; otherwise it is derived from offsets or distances
-/// between planes, in the order of the file, or from the slice location.
+/// Sets the position of the plane: the position that the file states; otherwise a position that is derived from the
+/// offsets of the frames or, for the only plane of a file, from the slice location. If none of them is stated,
+/// has_origin is false, and the position is the index of the frame times the stated distance between planes.
 void fill_place(const DicomHeader& header, std::size_t frames, DicomSlice& slice) {
     fill_direction(header, slice);
     fill_step(header, slice);

@@ -30,7 +30,7 @@ struct DicomSlice {
     unsigned components = 1;
     PixelType type = PixelType::UInt8;  ///< type of the pixels after rescaling
     PixelType decoded_type = PixelType::UInt8;
-    /// Uncompressed, read with `place` and `unused_bits`; otherwise the file is read by GDCM.
+    /// Whether the pixels are uncompressed, and are read with `place` and `unused_bits`; otherwise GDCM reads the file.
     bool plain = false;
     PixelPlace place;                 ///< position of the pixels, with the slope and intercept of the rescaling
     int unused_bits = 0;              ///< number of unused upper bits in each stored value

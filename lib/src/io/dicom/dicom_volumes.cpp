@@ -53,8 +53,8 @@ bool has_planes_at_one_place(const Slices& slices) {
 }
 
 /// Splits each volume by the value of `key` in its planes. A volume is not split if all its planes have the same value.
-/// With `only_at_one_place`, it is also not split if no two planes have the same position; otherwise, also not if every
-/// plane has a value of its own.
+/// With `only_at_one_place`, a volume without two planes at the same position is not split either. Without it, a volume
+/// is not split if every plane has a value of its own, which would yield volumes of a single plane.
 std::vector<DicomVolume> split_by(const std::vector<DicomVolume>& volumes, const char* what,
                                   std::string DicomSlice::*key, bool only_at_one_place) {
     std::vector<DicomVolume> parts;

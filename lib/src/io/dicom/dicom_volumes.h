@@ -21,8 +21,9 @@ std::vector<DicomSlice> read_dicom_series(const std::string& path, const RunCont
 /// is a file).
 std::vector<DicomVolume> dicom_volumes(const std::string& path, std::vector<DicomSlice> slices);
 
-/// Sorts a volume's planes by position, and derives geometry, spacing_known and fields from them. @throws Error
-/// InvalidInput (gaps; only some of the planes have a position), Unsupported.
+/// Sorts a volume's planes by position or, if they have none, by their order in the file or by InstanceNumber. Sets
+/// geometry, spacing_known and fields of `info`. @throws Error InvalidInput (gaps; only some of the planes have a
+/// position), Unsupported.
 void place_dicom_volume(const std::string& path, DicomVolume& volume, ImageInfo& info);
 
 }  // namespace covol::detail

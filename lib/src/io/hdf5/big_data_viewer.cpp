@@ -39,7 +39,8 @@ std::vector<std::string> named(std::vector<std::string> names, char letter) {
     return names;
 }
 
-/// @returns nothing if the path does not lead to an image's data.
+/// Parses a path TIME/SETUP/LEVEL/cells, of which parts at the end may be missing. @returns nothing if LEVEL is not a
+/// number, or if there are other parts
 std::optional<BdvChoice> parse_bdv(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
     BdvChoice choice;

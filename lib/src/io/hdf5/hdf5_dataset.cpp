@@ -200,8 +200,8 @@ std::string Hdf5Dataset::filter_names() const {
     return names;
 }
 
-/// Limits the size of a chunk, because a chunk is unpacked into memory as a whole, including all of its channels and
-/// frames.
+/// Rejects chunks without elements, and chunks of more than kMaxChunkBytes, because a chunk is unpacked into memory as
+/// a whole, including all of its channels and frames.
 void Hdf5Dataset::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {

@@ -73,7 +73,8 @@ public:
     [[nodiscard]] std::string text(const std::string& object, const char* attribute) const;
     /// The texts of an attribute that is a list of texts; empty if there is no such attribute.
     [[nodiscard]] std::vector<std::string> texts(const std::string& object, const char* attribute) const;
-    /// A small dataset of numbers, the last dimension fastest; empty if there is no such dataset.
+    /// The numbers of a dataset, the last dimension fastest; empty if there is no such dataset, or if it is not numeric
+    /// or has more than 4096 elements.
     [[nodiscard]] std::vector<double> table(const std::string& name) const;
 
 private:

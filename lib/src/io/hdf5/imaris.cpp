@@ -20,7 +20,8 @@ struct ImarisChoice {
     std::optional<int> time, channel;
 };
 
-/// @returns nothing if the path does not lead to an image's data.
+/// Parses a path "DataSet/ResolutionLevel L/TimePoint T/Channel C/Data", of which parts at the end may be missing.
+/// @returns nothing if the path has another form
 std::optional<ImarisChoice> parse_imaris(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
     ImarisChoice choice;
@@ -55,7 +56,8 @@ public:
         }
     }
     [[nodiscard]] bool is_known() const { return known_; }
-    /// The spacing of the finest level, if that level has `size` voxels.
+    /// The spacing of the finest level, which has `size` voxels; 1 along all axes if the file does not state the
+    /// extent.
     [[nodiscard]] Vec3 spacing(const Index3& size) const {
         Vec3 spacing{1, 1, 1};
         for (int a = 0; known_ && a < 3; ++a) spacing[a] = side_[a] / size[a];
@@ -85,7 +87,8 @@ Shape padded_size(const Hdf5File& file, int level, int time, int channel) {
     return {shape[2], shape[1], shape[0]};
 }
 
-/// Reads a positive count from an attribute of a group.
+/// Reads a count from an attribute of a group; nothing if there is no such attribute, or if it is not a positive
+/// integer.
 std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& group, const std::string& name) {
     const auto count = to_number<std::uint64_t>(trim(file.text(group, name.c_str())));
     return count && *count > 0 ? count : std::nullopt;
@@ -95,7 +98,8 @@ std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& g
 /// do not state it, derived from the size of the finest level in /DataSetInfo/Image.
 struct ImarisSize {
     Index3 size{};
-    /// The attributes that state the size; if there are none, it is empty, and `size` is the size of the array.
+    /// Names of the attributes that state the size. Empty if an attribute is missing or exceeds the size of the array:
+    /// along that axis, `size` is then the size of the array.
     std::string field;
     bool is_known = true;
 };
@@ -182,7 +186,8 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     // ExtMin is the outer corner of the first voxel, whereas the origin is the centre of this voxel.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
-    // If the stated size of the image exceeds its array, it is unknown how many voxels the extent covers.
+    // If the stated size of the image exceeds its array, it is unknown how many voxels the extent covers, and therefore
+    // how large a voxel is.
     const bool is_known = extent.is_known() && whole.is_known;
     info.spacing_known = {is_known, is_known, is_known};
     info.geometry.unit = normal_unit(file.text("/DataSetInfo/Image", "Unit"));

@@ -55,7 +55,7 @@ public:
     [[nodiscard]] const std::string& letters() const { return letters_; }
     /// How the axes were determined, such as "axistags: zyxc".
     [[nodiscard]] const std::string& source() const { return source_; }
-    /// Resolution along x, y, z from axistags; 0 if axistags do not state the resolution.
+    /// Distance between voxels along x, y, z, which axistags call "resolution"; 0 along axes for which they state none.
     [[nodiscard]] const Vec3& resolution() const { return resolution_; }
 
 private:
@@ -96,7 +96,7 @@ private:
     }
 
     /// Assumes the order z, y, x. If there are more than three dimensions, dimensions with a single element are not
-    /// counted.
+    /// counted. @throws Error Unsupported unless three dimensions remain.
     void by_order() {
         std::vector<std::size_t> wide;
         for (std::size_t d = 0; d < shape_.shape.size(); ++d)
@@ -126,7 +126,7 @@ void describe_spacing(const Hdf5File& file, const std::string& name, const Axes&
     for (const char* attribute : {"element_size_um", "spacing", "resolution", "voxel_size"}) {
         const std::vector<double> numbers = file.numbers(name, attribute);
         const std::string& letters = axes.letters();
-        std::string order;  // the axis to which each of `numbers` belongs
+        std::string order;  // for each of `numbers`, the letter of the axis to which it belongs
         for (const char letter : letters)
             if (numbers.size() == letters.size() || letter == 'x' || letter == 'y' || letter == 'z') order += letter;
         const bool good = numbers.size() == order.size() &&

@@ -261,8 +261,8 @@ void set_geometry(const IcsHeader& header, ImageInfo& info) {
 /// A file whose channels and frames are whole volumes, stored one after another.
 class IcsFile : public ImageFile {
 public:
-    /// @param volumes  the same voxels, as an image with a single channel whose frames are all channels and frames of
-    /// `info`
+    /// @param volumes  the voxels of the file as an image with a single channel, whose frames are all channels and
+    /// frames of `info`
     IcsFile(std::unique_ptr<ImageFile> volumes, const ImageInfo& info, bool channels_first)
         : volumes_(std::move(volumes)), channels_first_(channels_first) {
         info_ = info;

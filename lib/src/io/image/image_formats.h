@@ -20,7 +20,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
 /// used and pixdim states another spacing.
 std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
-/// The function that opens files with this extension with ITK's reader.
+/// ITK's reader for the extension of `path`: of NRRD, of HDF5 or, for any other extension, of MetaImage.
 OpenWithItk* itk_reader_of(const std::string& path);
 
 /// Opens an HDF5 file in ITK's layout or in any other supported layout.

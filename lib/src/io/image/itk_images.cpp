@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Sets the unit, spacing_known, and `fields`, the header fields that were used.
+/// Sets the unit, spacing_known, and the list of used header fields in `info`.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
     std::string unit = header.value_of({"distanceunits", "unit"});
     if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
@@ -111,8 +111,8 @@ void require_meta_header(const TextHeader& header, const std::string& unusable) 
         throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
-/// Images whose pixels ITK reads. They are read as a whole in the separate program, because ITK's readers of text and
-/// of lists of files crash on damaged files. HDF5 images of three dimensions are read in boxes, by `reader`.
+/// Images whose pixels ITK reads. They are read as a whole in the program covol-reader, because ITK's readers of text
+/// and of lists of files crash on damaged files. HDF5 images of three dimensions are read in boxes, by `reader`.
 class ItkFile : public ImageFile {
 public:
     ItkFile(std::string path, std::string unusable, ImageInfo info, std::vector<std::uint64_t> size,
@@ -128,7 +128,7 @@ public:
     ~ItkFile() override {
         std::optional<Hdf5Lock> lock;
         if (reader_) lock.emplace();
-        reader_ = nullptr;  // closes the file while the lock is held
+        reader_ = nullptr;  // closes an HDF5 file, for which the lock has to be held
     }
     ItkFile(const ItkFile&) = delete;
     ItkFile& operator=(const ItkFile&) = delete;

@@ -87,7 +87,7 @@ public:
         return sizes;
     }
     [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-    /// Index into kNiftiUnits; 0 if not stated.
+    /// Index into kNiftiUnits of the unit of length; 0 if the header states none or an unknown one.
     [[nodiscard]] std::size_t unit() const {
         const auto code = std::size_t(bytes_[123] & 7);
         return code < kNiftiUnits.size() ? code : 0;

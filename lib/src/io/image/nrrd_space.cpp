@@ -117,7 +117,8 @@ void restore_nrrd_space(const std::string& path, const TextHeader& header, Image
     }
     if (!of_space.empty() || !of_axes.empty()) g.unit = units[0];
     const Vec3 factors = unit_factors(units);
-    // Whether the factor is unknown, for each world axis if there are "space units", otherwise for each image axis.
+    // Whether an axis's unit cannot be converted to the unit of the first axis: for each world axis if there are "space
+    // units", otherwise for each image axis.
     std::array<bool, 3> unknown{};
     for (std::size_t a = 0; a < 3; ++a) {
         unknown[a] = factors[a] == 0;

@@ -14,7 +14,7 @@ struct TextHeader {
     explicit TextHeader(const std::string& path);
     /// The text after "key:", "key:=" or "key =" and blanks; empty if there is no such line. `key` is in lower case.
     [[nodiscard]] std::string value(const std::string& key) const;
-    /// The value of the first key in the list for which there is a line.
+    /// The value of the first key in the list that has a value; empty if none of the keys has one.
     [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const;
     [[nodiscard]] bool has_value(const std::string& key, const std::string& wanted) const;
     /// The name of the file with the pixels, as written; empty if the pixels follow the header.

@@ -67,7 +67,8 @@ private:
                want;
     }
 
-    /// Copies the part of the block at (x, y) that lies in the box.
+    /// Copies the part of the current block (a strip or a tile) that lies in the box. The first pixel of the block is
+    /// at (x, y) in the page.
     void copy(std::uint64_t x, std::uint64_t y, char* out) const {
         const std::uint64_t x0 = std::max<std::uint64_t>(x, std::uint64_t(box_.min[0]));
         const std::uint64_t x1 = std::min<std::uint64_t>(x + width_, std::uint64_t(box_.max[0]) + 1);

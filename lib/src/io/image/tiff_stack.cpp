@@ -31,7 +31,7 @@ double to_number(const std::string& text) {
 /// descending.
 double to_length(const std::string& text) { return std::abs(to_number(text)); }
 
-/// Rounds to 13 digits, which removes rounding errors of unit conversions.
+/// Rounds a length to 13 significant digits, which removes rounding errors of unit conversions.
 double rounded(double length) {
     std::array<char, 32> text{};
     const auto end =
@@ -47,7 +47,8 @@ std::uint64_t to_count(const std::string& text, std::uint64_t otherwise = 1) {
 
 std::uint64_t at_least_one(const std::string& text) { return std::max<std::uint64_t>(1, to_count(text)); }
 
-/// Converts the lengths along j and k to the unit of i if both units are known.
+/// Converts the spacings along y and z to the unit of x; spacings without a unit are not changed. If one of the units
+/// is not a known unit of length, the spacing becomes 0 (unknown), and a warning is added.
 void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
     stack.unit = units[0];
     const double first = unit_in_metres(units[0]);
@@ -63,7 +64,7 @@ void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
     }
 }
 
-/// Reads the spacing along x and y from the resolution, without its unit.
+/// Sets the spacing along x and y to 1 / resolution. The unit of the resolution is ignored.
 void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     for (std::size_t a = 0; a < 2; ++a) {
         const float spacing = 1.0F / facts.resolution[a];
@@ -80,7 +81,7 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
 
 // ---- ImageJ -------------------------------------------------------------------------------------------------------
 
-/// The value of `key=` in ImageJ's description, which has one key per line.
+/// The value of `key=` in ImageJ's description, which has one key per line; empty if there is no such line.
 std::string imagej_value(const std::string& description, const std::string& key) {
     for (std::size_t begin = 0; begin < description.size();) {
         const std::size_t end = std::min(description.find('\n', begin), description.size());

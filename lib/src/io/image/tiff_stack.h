@@ -33,7 +33,7 @@ struct TiffStack {
     std::vector<std::pair<std::string, std::string>> fields;  ///< the header fields that were used
     std::vector<std::string> warnings;
 
-    /// The index of the plane according to `order`.
+    /// The index of a plane if the planes are counted along the axes in `order`, the fastest axis first.
     [[nodiscard]] std::uint64_t number(std::uint64_t z, std::uint64_t c, std::uint64_t t) const;
     [[nodiscard]] Plane plane(std::uint64_t z, std::uint64_t c, std::uint64_t t) const;
 };

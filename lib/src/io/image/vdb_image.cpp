@@ -8,8 +8,8 @@
 namespace covol::detail {
 namespace {
 
-// Maximum ratio of the requested voxels to the active voxels of the grid. A grid with a few distant active voxels
-// exceeds this ratio, because its bounding box is huge.
+// Maximum ratio of the requested voxels to the active voxels of the grid; read() rejects larger requests. A grid with a
+// few distant active voxels exceeds this ratio, because its bounding box is huge.
 constexpr std::uint64_t kSparsest = 10000;
 
 class VdbImage : public ImageFile {

@@ -86,8 +86,9 @@ private:
             source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
         return all[number.get<std::uint64_t>()];
     }
-    /// An integer of a JSON object: a length, a position or a code. It is limited to the size of the binary chunk or to
-    /// 65536, whichever is larger, so that sums of a few of these numbers cannot overflow.
+    /// An integer of a JSON object: a length, a position or a code; `otherwise` if the object does not have the key.
+    /// Integers above both the size of the binary chunk and 65536 are refused, so that sums of a few of these numbers
+    /// cannot overflow.
     std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
         const Json value = member(object, key, otherwise);
         if (!value.is_number_unsigned() ||
@@ -97,8 +98,9 @@ private:
         return value.get<std::uint64_t>();
     }
 
-    /// The translation of each mesh by its nodes. Files with coordinates far from 0 use translations, because glTF
-    /// stores positions in single precision.
+    /// The translation of each mesh by its node; 0 for meshes without a node. Files with coordinates far from 0 use
+    /// translations, because glTF stores positions in single precision. @throws Error Unsupported if two nodes
+    /// translate a mesh differently, or if a node rotates or scales.
     [[nodiscard]] std::vector<Vec3> read_nodes() const {
         std::vector<Vec3> translations(list("meshes").size(), Vec3{0, 0, 0});
         std::vector<bool> is_placed(translations.size(), false);

@@ -39,8 +39,8 @@ std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOpt
     return p;
 }
 
-/// Warns that the origin of a mesh is not 0 if the format (binary STL) cannot store it, because it has only single
-/// precision.
+/// Warns that the coordinates in a binary STL file are relative to the origin of the mesh, unless the origin is 0. STL
+/// has only single precision, so the origin cannot be added. There is no warning for other formats.
 void report_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
 /// The numbers of vertices and triangles that write_ply_header() writes. This function writes a PLY file up to its
@@ -66,7 +66,7 @@ struct GlbPart {
     const NamedMesh* named;
 };
 
-/// @throws Error Unsupported (more than 4 GB).
+/// Writes the meshes to one .glb file. @throws Error Unsupported (more than 4 GB).
 void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments);
 
 }  // namespace covol::mesh_io

@@ -58,7 +58,7 @@ public:
         return *value;
     }
 
-    /// The first three numbers of `line`.
+    /// The first three numbers of `line`. @throws Error InvalidInput if there are fewer.
     Vec3 three_numbers(std::string_view line) {
         Vec3 p{};
         for (std::size_t a = 0; a < 3; ++a) {

@@ -159,7 +159,7 @@ private:
         std::uint64_t minimum = 0, room = source_.bytes_left();
         if (format_ == PlyFormat::Ascii) {
             minimum = 2 * std::max<std::uint64_t>(wanted, 1);
-            ++room;  // the last line may lack its line end
+            ++room;  // one byte more, because the last line may lack its line end
         } else {
             for (const PlyProperty& property : element.properties)
                 minimum += size_of(property.count.value_or(property.type));

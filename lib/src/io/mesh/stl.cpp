@@ -19,7 +19,7 @@ class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
     void corner(const Vec3& p) {
-        // Adding 0 turns -0 into 0, whose bits differ.
+        // Coordinates are compared by their bits. Adding 0 turns -0 into 0, which is equal but has other bits.
         const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };
         const std::array<float, 3> held = mesh_.held(p);
         const auto [at, is_new] =

@@ -213,7 +213,8 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
         if (!joins) groups.emplace_back();
         groups.back().push_back(number);
     }
-    // Groups are decoded in batches, so that the calling thread can report the progress after each batch.
+    // Groups (single chunks, or chunks of one layer) are decoded in batches, so that the calling thread can report the
+    // progress after each batch.
     const auto batch = std::size_t(tbb::this_task_arena::max_concurrency()) * (source_->in_layers() ? 2 : 32);
     for (std::size_t first = 0; first < groups.size(); first += batch) {
         run.check();

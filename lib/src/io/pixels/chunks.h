@@ -18,9 +18,9 @@ public:
     ChunkSource& operator=(const ChunkSource&) = delete;
     virtual ~ChunkSource() = default;
 
-    /// Decodes chunk c, counted along i, j, k from 0, into chunk_size() voxels, i fastest; the values beyond the end of
-    /// the image are undefined. Thread-safe. @returns false if the file has no such chunk: its voxels are fill_value(),
-    /// and `out` is unchanged. @throws Error InvalidInput (damaged), Io, Unsupported.
+    /// Decodes the chunk with these indices along i, j, k, counted from 0, into chunk_size() voxels, i fastest; the
+    /// values beyond the end of the image are undefined. Thread-safe. @returns false if the file has no such chunk: its
+    /// voxels are fill_value(), and `out` is unchanged. @throws Error InvalidInput (damaged), Io, Unsupported.
     [[nodiscard]] virtual bool read(const Index3& chunk, void* out) const = 0;
     /// The value of all voxels in chunks that the file does not have.
     [[nodiscard]] virtual double fill_value() const noexcept { return 0; }
@@ -54,8 +54,9 @@ private:
 [[nodiscard]] VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size);
 /// The range of chunks that intersect the box.
 [[nodiscard]] VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size);
-/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite; `chunk` is the chunk that contains
-/// it.
+/// @param box  the part of the image that a chunk covers
+/// @param chunk  the decoded voxels of this chunk
+/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite.
 void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk);
 
 /// Maximum size of an unpacked chunk. The usual size is below 16 MiB; the codecs of Zarr cannot unpack more than 2 GiB.
@@ -98,7 +99,7 @@ private:
     [[nodiscard]] bool is_there(std::uint64_t number) const;
     void keep(std::uint64_t number, std::unique_ptr<char[]> voxels) const;
     [[nodiscard]] std::unique_ptr<char[]> chunk_memory() const;
-    /// Decodes several chunks in one call.
+    /// Decodes several chunks of one layer in one call of ChunkSource::read_layer().
     void load_together(const std::vector<std::uint64_t>& numbers) const;
 
     std::shared_ptr<const ChunkSource> source_;
@@ -108,8 +109,8 @@ private:
     mutable std::atomic<std::uint64_t> reads_{0};
 };
 
-/// The voxels of `box`. The chunks of a small box are decoded immediately; the chunks of a large box are decoded on
-/// demand.
+/// The voxels of `box`. If is_worth_mapping() returns true for the size of the box, its chunks are decoded on demand;
+/// the chunks of a smaller box are decoded immediately.
 [[nodiscard]] Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run);
 
 /// An image file in a format that always stores images in chunks.

@@ -104,7 +104,7 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
         } else if (status != Z_OK && status != Z_BUF_ERROR) {
             throw damaged();
         }
-        // The stream continues after the requested bytes, so no checksum follows them.
+        // The stream has more bytes than were requested, so its checksum does not follow the requested bytes.
         if (all_there && done > unpacked) return;
         const bool at_block = (stream.data_type & 128) != 0 && (stream.data_type & 64) == 0 && status == Z_OK;
         if (at_block && done >= places_.back().unpacked + gap) {

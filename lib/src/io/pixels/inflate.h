@@ -89,7 +89,8 @@ private:
     std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
     std::vector<char> skipped_;
     z_stream stream_{};
-    /// Decompression began within the stream, without its header, so zlib does not skip the checksum at its end.
+    /// Whether decompression began within the stream, without its header. zlib then does not skip the checksum at the
+    /// end of the stream, so drop_trailer() has to.
     bool raw_ = false;
     bool good_ = true;
 };

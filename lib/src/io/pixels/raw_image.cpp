@@ -140,8 +140,8 @@ private:
         return place_.skip + request.frame * frame_bytes_;
     }
 
-    /// Whether the box is mapped into memory: the pixels must be stored as they are needed, uncompressed and aligned,
-    /// and the slices of the box must be large enough.
+    /// Whether the box is mapped into memory: the pixels must be uncompressed, aligned, and stored with the image's
+    /// type and this machine's byte order without rescaling, and is_worth_mapping() must accept the size of its slices.
     [[nodiscard]] bool is_mapped(const PixelRequest& request) const {
         const std::uint64_t slices = std::uint64_t(request.box.size()[2]);
         const bool aligned = (place_.file_offset + frame_begin(request)) % place_.stored_bytes() == 0;

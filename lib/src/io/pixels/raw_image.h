@@ -100,7 +100,8 @@ Error read_error(Errc code, const std::string& path, const std::string& what, co
 /// The error for a voxel that is NaN or infinite.
 Error not_finite(const std::string& path, const Index3& voxel);
 
-/// @throws Error InvalidInput unless the image has at least two voxels along each axis.
+/// Converts the size of an image. @throws Error InvalidInput if it has fewer than two voxels along an axis, or so many
+/// voxels that only a damaged header can claim them.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
 /// Allocates memory for the pixels, after checking that a file of `file_bytes` bytes can contain them (0: no check,

@@ -23,7 +23,8 @@ struct Line {
     std::string name;
     std::string shape;
     std::vector<Vec3> points;
-    /// The number in the column vertex-index for each point; empty if the file has no such column.
+    /// The number in the column vertex-index for each point, which is its place in the line; empty if the file has no
+    /// such column.
     std::vector<double> places;
     std::string structure;  ///< name of the structure; empty if no column states it
 };

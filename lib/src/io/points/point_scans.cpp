@@ -98,7 +98,8 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
     fail(path, "expected the line DATA, got the end; the file is truncated");
 }
 
-/// The indices of the fields x, y, z, and of the three fields of the normal if all of them exist.
+/// The indices of the fields x, y, z, and of the three fields of the normal if all of them exist. @throws Error
+/// InvalidInput if x, y or z is missing.
 std::vector<std::size_t> pcd_columns(const std::string& path, const PcdHeader& header) {
     std::vector<std::size_t> at;
     for (const char* name : {"x", "y", "z", "normal_x", "normal_y", "normal_z"}) {
@@ -246,7 +247,7 @@ struct PtxHeader {
     }
 };
 
-/// How many numbers each of the ten lines of a header has.
+/// How many numbers each of the ten lines of the header of a PTX scan has.
 constexpr std::array<std::size_t, 10> kPtxNumbers{1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
 
 PtxHeader read_ptx_header(const std::string& path, Lines& lines) {

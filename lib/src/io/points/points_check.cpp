@@ -41,7 +41,7 @@ const char* advice_of(PointSpace space) {
     }
 }
 
-/// Describes for messages how the reading differs from the current reading.
+/// Describes for messages how `reading` differs from `now`, the current interpretation of the coordinates.
 std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
     std::string text;
     const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -78,8 +78,9 @@ public:
         return "points from " + text_of(bounding_box(world_)) + ", image from " + text_of(geometry_.world_box());
     }
 
-    /// The readings with the fewest changes that put every point inside the image. Readings with other units have the
-    /// lowest priority, because they are weak evidence: if points are scaled down enough, all of them are inside.
+    /// The interpretations of the coordinates, with the fewest changes, that put every point inside the image.
+    /// Interpretations with other units have the lowest priority, because they are weak evidence: if points are scaled
+    /// down enough, all of them are inside.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
         const auto rank = [&](const Reading& r) {
@@ -107,9 +108,9 @@ public:
 
     [[nodiscard]] std::string name(const Reading& reading) const { return name_of(reading, now_); }
 
-    /// The most plausible reading, if it is more plausible than the current reading; otherwise empty. A reading is more
-    /// plausible if it puts all points on voxel centres along more axes, because marks that were set with the mouse lie
-    /// on slices and often on voxel centres.
+    /// The most plausible interpretation of the coordinates, if it is more plausible than the current one; otherwise
+    /// empty. It is more plausible if it puts all points on voxel centres along more axes, because marks that were set
+    /// with the mouse lie on slices and often on voxel centres.
     [[nodiscard]] std::vector<Reading> more_plausible() const {
         constexpr std::size_t kMinPoints = 8;  // fewer points may lie on voxel centres by chance
         if (world_.size() < kMinPoints || cloud_.stated || now_.scale != 1) return {};
@@ -117,8 +118,8 @@ public:
         std::vector<Reading> best;
         int maximum = axes;
         for (const Reading& reading : others()) {
-            // Readings with another number of channels are excluded: they round slice numbers to integers, so that all
-            // points lie on centres along z.
+            // Interpretations with another number of channels are excluded: they round slice numbers to integers, so
+            // that all points lie on voxel centres along z.
             if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
                 reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
@@ -140,7 +141,7 @@ private:
         return true;
     }
 
-    /// The position of a cloud's point under another reading.
+    /// The position of a point of the cloud if the coordinates in its file are interpreted as `reading` states.
     [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
         const PointSpace space = detail::space_after(reading.space);
         // A scale that differs from the current one replaces the file's unit.
@@ -161,8 +162,8 @@ private:
         return bounding_box(index);
     }
 
-    /// Whether the points are scaled down so much that being inside the image is no evidence for the reading. The limit
-    /// `minimum` is stricter for unusual factors.
+    /// Whether the points are scaled down so much that being inside the image is no evidence for this interpretation of
+    /// the coordinates. The limit `minimum` is stricter for unusual factors.
     [[nodiscard]] bool is_too_small(const Reading& reading, int rank) const {
         constexpr std::size_t kMinPoints = 8;
         const bool is_odd = rank > 2;
@@ -204,7 +205,8 @@ private:
         return reading.space == PointSpace::Index || reading.space == PointSpace::IndexOne;
     }
 
-    /// The readings that differ from the current reading in one or two options, those with one change first.
+    /// The interpretations of the coordinates that differ from the current one in one or two options, those with one
+    /// change first. Empty if the slice numbers of the current one count channels.
     [[nodiscard]] std::vector<Reading> others() const {
         std::vector<Reading> list;
         // undo() cannot be used: a slice number that counts channels does not determine the position.

@@ -71,7 +71,8 @@ private:
     std::map<std::string, std::string> units_;
 };
 
-/// Recognizes tables of napari's points and shapes: the last three axes are z, y, x in voxels.
+/// Recognizes tables of napari's points and shapes, whose columns are named axis-0, axis-1, ...: the last three axes
+/// are z, y, x in voxels. @returns nothing if there are fewer than three such columns
 std::optional<Columns> find_napari(const Header& header) {
     std::vector<std::size_t> axes;
     while (const auto axis = header.find("axis-" + std::to_string(axes.size()))) axes.push_back(*axis);

@@ -40,7 +40,7 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
 }
 
 /// Splits "stack.tif:ZYX" into {"stack.tif", "ZYX"}. The letters replace the order of the planes that a TIFF's
-/// description states.
+/// description states; they are empty if the text has none, or is itself the name of a file.
 std::pair<std::string, std::string> split_axes(const std::string& given) {
     const std::size_t colon = given.rfind(':');
     std::error_code status;
@@ -125,7 +125,8 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
     return info;
 }
 
-/// The index of the channel or frame that the caller has chosen; 0 if there is only one.
+/// The index of the channel or frame that the caller has chosen; 0 if nothing is chosen and there is only one. @throws
+/// Error Unsupported if nothing is chosen from several, InvalidOptions if the chosen one does not exist.
 std::uint64_t choose(const std::string& path, const std::string& what, const std::optional<int>& wanted, int count,
                      const std::vector<std::string>& names, const std::string& advice = {}) {
     if (!wanted && count == 1) return 0;
@@ -222,7 +223,8 @@ ImageInfo read_image_info(const std::string& path, const ReadImageOptions& optio
 }
 
 std::vector<std::string> list_image_files(const std::string& path, const RunContext& run) {
-    // An HDF5 file is not opened. Its list contains the XML file of BigDataViewer, which exists only for that layout.
+    // An HDF5 file is not opened to find its layout. Its only additional file can be BigDataViewer's XML file, which is
+    // listed even if it does not exist.
     if (const auto hdf5 = detail::split_hdf5_name(path))
         return {fs::path(hdf5->path).replace_extension(".xml").string()};
     return open_image(path, {}, run)->files();

@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Reads the guesses of a study, and keeps the most recent ones in memory. read() locks a mutex, because solvers call
-/// it from several threads.
+/// Reads the guesses of a study, which are results of other programs that marks correct, and keeps the most recent ones
+/// in memory. read() locks a mutex, because solvers call it from several threads.
 class GuessReader {
 public:
     GuessReader(std::string folder, const ImageGeometry& image) : folder_(std::move(folder)), image_(image) {}

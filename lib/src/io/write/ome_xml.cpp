@@ -6,7 +6,8 @@
 namespace covol::detail {
 namespace {
 
-/// The name of a unit in the OME schema. Letters outside of ASCII are XML entities, because texts in TIFF are ASCII.
+/// The name of a unit in the OME schema; "reference frame" for unknown units. Letters outside of ASCII are XML
+/// entities, because texts in TIFF are ASCII.
 std::string ome_unit(const std::string& unit) {
     if (unit == "um") return "&#181;m";
     if (unit == "angstrom") return "&#197;";

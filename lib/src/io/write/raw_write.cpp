@@ -57,7 +57,8 @@ std::string escaped(const std::string& text) {
     return out;
 }
 
-/// Escapes the text between the quotes of a NRRD field.
+/// Prepares a text to stand between the quotes of a NRRD field: escapes quotes and backslashes, and removes line
+/// breaks.
 std::string quoted(const std::string& text) {
     std::string out;
     for (const char c : text)

@@ -19,7 +19,7 @@ struct PyramidLevel {
 /// @param chunk  voxels of a chunk, the same in all levels
 [[nodiscard]] std::vector<PyramidLevel> pyramid_levels(const ImageGeometry& geometry, const Index3& chunk);
 
-/// The box of the finest level that corresponds to a box of this level.
+/// The box of the finest level that corresponds to a box of this level. @param finest  size of the finest level
 [[nodiscard]] VoxelBox finest_box(const PyramidLevel& level, const VoxelBox& box, const Index3& finest);
 
 /// Combines boxes of `factor` fine voxels into one voxel each: the most frequent value (if several are equally

@@ -100,7 +100,7 @@ public:
     }
 
 private:
-    /// The voxels of a chunk that lie in the image.
+    /// The voxels of a chunk that lie in the image; if all have the same value, `uniform` is this value.
     struct Voxels {
         std::optional<double> uniform;
         std::string values;  ///< empty if uniform

@@ -90,7 +90,8 @@ struct Maker {
     /// A surface that is defined by points alone may have holes between them.
     [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
 
-    /// The mesh trimmed where points are missing, or with these parts replaced; none if the mesh is kept unchanged.
+    /// The mesh with the parts that are farther than `distance` from all points removed, or replaced by flat ones; none
+    /// if the mesh is kept unchanged.
     std::optional<TreatedHoles> treated_holes(double distance, double slack) const {
         const auto trimmed = [&] { return trim_holes(made.mesh, made.distance_to_points, distance, slack, run()); };
         switch (options().holes.policy) {
@@ -122,7 +123,8 @@ struct Maker {
         HolesReport& holes = made.holes;
         const double automatic = choose_hole_distance(points, choices.h),
                      distance = requested.distance.value_or(automatic);
-        const double slack = 0.5 / kHoles.far * std::min(automatic, distance);  // at most half of the points' spacing
+        // Width kept beyond the last points: at most half of the points' spacing, or half a voxel if that is more.
+        const double slack = 0.5 / kHoles.far * std::min(automatic, distance);
         made.distance_to_points = measure_distances(made.mesh, points, run());
         made.fraction_without_points = measure_fraction_beyond(made.mesh, made.distance_to_points, distance);
         holes.distance = distance;

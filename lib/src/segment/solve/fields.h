@@ -15,9 +15,9 @@ inline constexpr double kTubeSlackVoxels = 2.0;  // the upwind scheme reads one 
 [[nodiscard]] FloatGridPtr find_distance(const std::vector<Vec3>& points, const Domain& domain, double radius,
                                          double reach, StepReport& report, const RunContext& run);
 
-/// The distance to the points as far as the flow from `start` needs it; null if no points attract. With an attraction
-/// range, that is the range. Without one, it is the maximum of d on the start: the surface moves down the gradient of
-/// d, so that it meets no larger values.
+/// The distance to the points as far as the flow from `start` needs it; null if no points attract. That is up to the
+/// attraction range; without one, up to the maximum of d on the start: the surface moves down the gradient of d, so
+/// that it meets no larger values.
 [[nodiscard]] FloatGridPtr find_distance_for_flow(const StartFacts& start, const FloatGrid& u, StepReport& report,
                                                   const RunContext& run);
 

@@ -26,7 +26,7 @@ CorrectionOptions correction_options(const Problem& problem, double h) {
     return options;
 }
 
-/// Corrects start.u by the marks and seeds, and, if the image is used, redraws it by the image before.
+/// Redraws start.u by the image, if the image is used, and then corrects it by the marks and seeds.
 GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     const RunContext& run = problem.run;
     const Timed timed(start.facts.report.seconds.tag);

@@ -15,7 +15,8 @@
 namespace covol::pipeline {
 namespace {
 
-/// Precision of the marks along the image's axes; without an image it follows from the voxel size.
+/// Standard deviations of a mark's position as vectors along three axes: the option mark_precision, else for positions
+/// rounded to the image's voxels, or without an image to voxels of size h.
 std::array<Vec3, 3> deviation(const Problem& problem, double h) {
     std::array<Vec3, 3> axes{};
     for (int a = 0; a < 3; ++a) {
@@ -64,7 +65,8 @@ std::size_t count_wrong(const Problem& problem, const FloatGrid& u) {
     return wrong;
 }
 
-/// Replaces the guess by the interpolation between the sections if this reduces the number of seeds on the wrong side:
+/// Replaces the guess by the interpolation between the sections of a network of contours, if that has fewer seeds on
+/// the wrong side:
 /// the surface of minimum bending energy may diverge between thin parts, the interpolation does not.
 void take_sections(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
     StartFacts& facts = start.facts;

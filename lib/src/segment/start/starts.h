@@ -19,7 +19,7 @@ namespace covol::pipeline {
 /// The domain of a cloud.
 [[nodiscard]] Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<Vec3>& points);
 
-/// The guess of the options, corrected by the marks and seeds.
+/// The caller's guess (SegmentOptions::guess), corrected by the marks and seeds.
 [[nodiscard]] StartSurface start_from_corrected_guess(const Problem& problem, const Choices& choices, MarkSets marks);
 
 /// Corrects a start that passes most of the trusted marks so that it passes all of them.
@@ -28,7 +28,8 @@ void correct_start(const Problem& problem, StartSurface& start);
 /// The sphere, box, mesh, mask or level set that the caller specifies. The band follows the surface.
 [[nodiscard]] StartSurface start_as_named(const Problem& problem, const Choices& choices, MarkSets marks);
 
-/// The grid of a start that the caller specifies. @throws Error
+/// The grid of a start that the caller specifies. @throws Error InvalidOptions if the start does not define a grid by
+/// itself; the errors of start.h.
 [[nodiscard]] FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunContext& run);
 
 /// The surface halfway between the seeds, for input without marks.

@@ -69,12 +69,12 @@ TEST_CASE("Consistency: what another orientation has right is taken from it, pat
     std::size_t right = 0, part = 0;
     for (std::size_t n = 0; n < own.size(); ++n) {
         const Vec3& p = c.sample.points[n];
-        if (p[1] < -0.7) continue;  // wrong in both orientations, including the rim of this region
+        if (p[1] < -0.7) continue;  // both orientations are wrong where y < -0.9; the rest is a margin
         ++part;
         right += test::dot(own[n], c.sample.normals[n]) > 0;
     }
     CHECK(double(right) > 0.97 * double(part));
-    // take_better() does not make correct normals worse, and finds nothing to take in the orientation itself.
+    // take_better() leaves correct normals as they are, and changes nothing if it compares an orientation with itself.
     std::vector<Vec3> best = c.sample.normals;
     std::vector<double> best_off = c.consistency.off(best);
     c.consistency.take_better(other, best, best_off);

@@ -175,7 +175,8 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
         const auto left = std::count_if(within.begin(), within.end(), [&](const Vec3& p) { return kept.count(p) > 0; });
         INFO("shift " << shift << ": " << left << " of " << within.size() << " within are left, " << cloud.enclosed
                       << " left out");
-        // Where two walls touch, some points remain if one of the walls is sampled more densely than the other.
+        // Where walls of the two boxes touch, some points within the joint solid are kept if one of the walls is
+        // sampled more densely than the other.
         CHECK(double(left) < 0.3 * double(within.size()));
         CHECK(double(cloud.enclosed) < 1.6 * double(within.size()));
     }

@@ -56,7 +56,8 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
         CHECK(m.closed);
         CHECK(m.components == 1);
         CHECK(m.genus == 0);
-        // The volume is that of half a ball, within 40 %, because the lid may sag or bulge.
+        // The surface closes the bowl with a lid. Its volume is that of half a ball, within 40 %, because the lid may
+        // sag or bulge.
         CHECK(m.volume < 2.0 / 3 * kPi * 1.4);
         CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
         // A flat lid would have a third of the whole area. The part of the lid near the rim is close to the points, so

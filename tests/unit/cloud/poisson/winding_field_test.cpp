@@ -88,7 +88,7 @@ TEST_CASE("each level has all nodes around its points, and around the level that
                     at[a] = int(std::floor((u.points[n][int(a)] - u.stack->origin()[int(a)]) / levels[l].cell) +
                                 ((corner >> a & 1) != 0 ? 2 : -1)) >>
                             3;
-                // There are no blocks beyond the coarsest block.
+                // The coarsest level is one block, so that level l has blocks from 0 to `end` - 1 along each axis.
                 const int end = 1 << (levels.size() - 1 - l);
                 if (std::all_of(at.begin(), at.end(), [&](int x) { return x >= 0 && x < end; }))
                     REQUIRE(levels[l].find(at) != kNoBlock);
@@ -121,7 +121,7 @@ TEST_CASE("splines are exact on linear functions across levels, and their gradie
         const Vec3 slope{2, -1, 0.5};
         const double step = 0.05 * s.cell;
         for (int a = 0; a < 3; ++a) {
-            // Rounding errors of floats, divided by a cell of 0.01.
+            // The margin allows for the rounding errors of float values, divided by a cell of 0.01.
             REQUIRE(s.gradient[a] == Approx(slope[a]).margin(1e-3));
             Vec3 low = x, high = x;
             low[a] -= step;

@@ -109,8 +109,8 @@ TEST_CASE("hold_topology: where a surface is cut off, what lies beyond is left a
     const FloatGridPtr rough = level_set([](int, int, int k) { return k < 8; });
     FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && away(i, j, k) > 4; });
     const std::size_t all = target->activeVoxelCount();
-    // A solid that the domain cuts off extends without end after a flood fill. Here this is the case for `target`
-    // alone.
+    // A flood fill continues a solid that the domain cuts off beyond the domain, without end. Here only `target` is
+    // continued, by a tile; hold_topology() must not add voxels there.
     target->tree().root().addTile(openvdb::Coord(0, 0, -4096), -3.0F, false);
     static_cast<void>(cloud::hold_topology(*rough, *target, {}));
     CHECK(target->activeVoxelCount() == all);

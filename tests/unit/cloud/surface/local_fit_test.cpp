@@ -35,7 +35,8 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-/// How well quadrics fit a shape if they are computed from sample points of the shape that are moved by noise.
+/// How well quadrics fit a shape if they are computed from sample points of the shape that are moved by noise. The foot
+/// of a quadric is its point above or below its origin.
 struct FitErrors {
     double fraction = 0;                          // fraction of the nodes that have a quadric
     double off = 0;                               // root mean square distance of the quadrics' feet from the shape
@@ -177,7 +178,8 @@ TEST_CASE("two sheets back to back do not mix") {
                      << widest / spacing << ", mean cosine " << cosines / double(fitted));
         CHECK(cosines / double(fitted) > 0.96);
         CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
-        // The neighbourhoods reached the other sheet, so its points were left out because of their normals.
+        // Some neighbourhoods reached the other sheet. The quadrics fit nevertheless, because that sheet's points were
+        // left out for their opposite normals.
         CHECK(widest > 2 * apart);
     }
 }
@@ -314,7 +316,8 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
         CHECK(q.radius > (times > 1 ? 7 * q.apart : 0));
     }
     // `farthest` is the maximum distance of a position from the nearest quadric's foot, `farthest_beyond` the same less
-    // the spacing of that quadric's nodes. It may exceed 0, because the nodes are means of the points in a cell.
+    // the spacing of that quadric's nodes. `farthest_beyond` may exceed 0, because nodes are means of the points in a
+    // cell.
     double farthest = 0, farthest_beyond = 0;
     for (std::size_t n = 0; n < places.size(); n += 10) {
         double nearest = 1, beyond = 1;
@@ -331,7 +334,8 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     INFO("farthest " << farthest / edge << ", beyond " << farthest_beyond / edge << " cells");
     CHECK(farthest < 3 * edge);
     CHECK(farthest_beyond < 2 * edge);
-    // Without noise no neighbourhood on a ball is so wide that nodes farther apart than `edge` would suffice.
+    // Without noise no neighbourhood on a ball is so wide that nodes farther apart than `edge` would suffice for the
+    // quadrics.
     for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 

@@ -223,7 +223,7 @@ TEST_CASE("Of an image in chunks no more is kept than is allowed") {
         for (int at = 0; at < pyramid.size[std::size_t(axis)]; ++at)
             static_cast<void>(make_page_slice(levels, {axis, at, 1, {}}, {0, 1000}));
     CHECK(levels.cache().bytes <= 20 * kChunkBytes);
-    CHECK(levels.cache().decoded > 75);  // all of its chunks, some of them more than once
+    CHECK(levels.cache().decoded > 75);  // the finest level has 75 chunks; some were decoded again
     const auto [low, high] = levels.percentiles(0, 1);
     CHECK(low == 0);
     CHECK(high == 4 * (9 + 3 * 5 + 7 * 17));  // the maximum of the coarsest level, from which percentiles are computed

@@ -126,7 +126,8 @@ std::string zip(const std::vector<std::pair<std::string, std::string>>& files, b
             .put(std::uint32_t(0))
             .put(std::uint32_t(w.size()))
             .put(name);
-        // As Java writes them (bit 3), sizes are 0 here and follow the data. Only the archive's directory has them.
+        // As in archives that Java writes (bit 3 of the flags), the sizes here are 0; the true ones follow the data and
+        // are in the archive's directory.
         w.put(std::uint32_t(0x04034b50))
             .put(std::uint16_t(20))
             .put(std::uint16_t(8))

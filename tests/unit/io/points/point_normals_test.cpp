@@ -109,7 +109,7 @@ TEST_CASE("OBJ: one normal for each vertex, of the same number") {
     check_normal(cloud.normals[1], {0, 1, 0});
     CHECK(read("b.obj", vertices + "f 1//1 2//3 3//2\n").normals.empty());
     CHECK(read("c.obj", vertices + "vn 0 0 1\n").normals.empty());
-    // The second numbers are of texture coordinates, not of normals.
+    // The second number in "1/4" is that of a texture coordinate, not of a normal.
     CHECK(read("d.obj", vertices + "f 1/4 2/5 3/6\n").normals.size() == 3);
 }
 

@@ -84,7 +84,7 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
              "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
     contains(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
     contains(advice({{100, 80, 20}}, PointSpace::Index), "; `points_space = index1` would bring");
-    // positions of a multi-point in a hyperstack of two channels
+    // In a hyperstack of two channels, Fiji counts the slice of a multi-point's position over all channels.
     contains(advice({{15, 70, 39}}, PointSpace::Index),
              "`points_channels = 2` would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};

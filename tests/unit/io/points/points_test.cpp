@@ -141,8 +141,8 @@ TEST_CASE("a column of kinds says which marks lie inside and outside") {
     CHECK(marks.cloud.rule.find("with kinds") != std::string::npos);
     CHECK(marks.of(MarkKind::Surface).points == std::vector<Vec3>{{1, 2, 3}});
     CHECK(marks.of(MarkKind::Outside).points == std::vector<Vec3>{{7, 8, 9}});
-    // If a column of this name contains another word, in whichever row, or if a row lacks it, it is from another
-    // program. All points then are surface marks.
+    // If the column `kind` contains another word in any row, or if a row lacks it, it is from another program. All
+    // points then are surface marks.
     for (const char* rows : {"x,y,z,kind\n1,2,3,soma\n-4.5,.25,.001,inside\n7,8,9,axon\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001,5\n7,8,9,inside\n",
                              "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001\n7,8,9,inside\n"}) {
@@ -407,7 +407,7 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
         };
         const double before = double(std::count_if(all.begin(), all.end(), is_in)),
                      after = double(std::count_if(some.begin(), some.end(), is_in));
-        // If points were selected at random, the deviation would be 0.006.
+        // If points were selected at random, the standard deviation of this fraction would be at least 0.005.
         CHECK(after / before == Approx(0.15).margin(0.003));
     }
     std::sort(order.begin(), order.end());

@@ -109,7 +109,8 @@ std::map<std::string, std::string> files_of(const std::string& folder) {
 
 TEST_CASE("streamed images come back voxel by voxel, and each voxel is told of once") {
     const Scratch scratch;
-    // The first image has several blocks of 256 KB, the second one. Sizes are not multiples of a tile, chunk or block.
+    // The first image has several blocks of 256 KB, the second image has only one. Their sizes are not multiples of a
+    // tile, chunk or block.
     for (const Index3& size : {Index3{301, 290, 31}, Index3{23, 5, 9}}) {
         const ImageGeometry g = lattice(size);
         const Balls<std::uint8_t> bytes(g, PixelType::UInt8, true);

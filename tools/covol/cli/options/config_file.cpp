@@ -130,7 +130,8 @@ private:
         return list;
     }
 
-    /// The values up to the end of the line, separated by blanks or commas; one empty value if there is none.
+    /// The values up to the end of the line, separated by blanks or commas. If there are none, as in
+    /// "name =", the list contains one empty value.
     std::vector<std::string> values() {
         std::vector<std::string> list;
         for (; peek() != '\n' && peek() != '#'; skip_blanks()) {

@@ -61,7 +61,7 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
         }
     }
     if (!best.empty()) return best;
-    // Otherwise, a known name that begins with the word.
+    // If no known name is close, the first one that begins with the word is returned, for words of at least 4 letters.
     for (const std::string& name : known)
         if (name.size() > word.size() && word.size() > 3 && name.starts_with(word)) return name;
     return {};

@@ -233,7 +233,7 @@ void write_stream(int stream, const std::string& text, const std::string& name, 
     for (std::size_t done = 0; done < text.size();) {
         pollfd ready{stream, POLLOUT, 0};
         constexpr int kPause = 50;                          // milliseconds
-        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // not ready yet, or a signal arrived
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // the stream is not ready yet, or a signal arrived
         run.check();
         if (waits) continue;
         // At most PIPE_BUF bytes are written, which a pipe that is ready accepts without blocking.

@@ -8,7 +8,7 @@ namespace fs = std::filesystem;
 
 std::pair<std::size_t, std::size_t> path_within(const std::string& text) {
     const std::size_t equals = text.find('=');
-    std::size_t begin = text.find('/') > equals ? equals + 1 : 0;  // not a '=' in a folder's name
+    std::size_t begin = text.find('/') > equals ? equals + 1 : 0;  // a '=' after the first '/' belongs to the path
     for (const char* kind : {"mesh:", "mask:", "vdb:"})
         if (text.compare(begin, std::string(kind).size(), kind) == 0) begin += std::string(kind).size();
     return {begin, std::min(text.find(":/", begin), text.size())};

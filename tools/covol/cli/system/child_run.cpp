@@ -29,7 +29,8 @@ namespace {
     char nothing = 0;
     while (::read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
     }
-    constexpr int kMaxTries = 500, kPause = 10000;  // kPause in microseconds; a child run may still write files
+    // A child run may still write files into the folder, so that it may have to be removed several times.
+    constexpr int kMaxTries = 500, kPause = 10000;  // kPause in microseconds
     std::error_code status;
     for (int n = 0; n < kMaxTries; ++n) {
         fs::remove_all(folder, status);

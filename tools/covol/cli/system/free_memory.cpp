@@ -11,7 +11,8 @@
 #include <sstream>
 #include <vector>
 
-// Formats: proc(5), cgroups(7), and the kernel's Documentation/admin-guide/cgroup-v1/memory.rst and cgroup-v2.rst.
+// The formats of the files that are read are described in proc(5), cgroups(7), and the kernel's
+// Documentation/admin-guide/cgroup-v1/memory.rst and cgroup-v2.rst.
 namespace covol::tool {
 namespace {
 
@@ -24,7 +25,7 @@ std::optional<std::uint64_t> number_in(const fs::path& path) {
     return std::nullopt;
 }
 
-/// The number after the name `wanted` in a file with lines of the form "name number".
+/// The number after the name `wanted` in a file with lines of the form "name number"; nullopt if there is none.
 std::optional<std::uint64_t> named_number(const fs::path& path, const std::string& wanted) {
     std::ifstream file(path);
     std::string line;
@@ -72,7 +73,7 @@ std::vector<Hierarchy> hierarchies(const std::string& root) {
     std::ifstream file(root + "/proc/self/mountinfo");
     std::string line;
     while (std::getline(file, line)) {
-        // fields of a line: id parent device top mount options... - type source options
+        // fields of a line of mountinfo: id parent device top mount options... - type source options
         std::istringstream words(line);
         std::string id, parent, device, top, mount, word, type, source, options;
         words >> id >> parent >> device >> top >> mount;
@@ -113,7 +114,7 @@ std::vector<fs::path> group_folders(const Hierarchy& hierarchy, const std::strin
 /// Memory of the group's processes, bytes, without file caches, which the kernel reclaims on demand.
 std::uint64_t used_by(const fs::path& folder, bool is_v2) {
     const std::uint64_t all = number_in(folder / (is_v2 ? "memory.current" : "memory.usage_in_bytes")).value_or(0);
-    const std::string prefix = is_v2 ? "" : "total_";  // in v1, these values include the groups below
+    const std::string prefix = is_v2 ? "" : "total_";  // in v1, the values named total_... include the groups below
     std::uint64_t caches = 0;
     for (const char* name : {"inactive_file", "active_file"})
         caches += named_number(folder / "memory.stat", prefix + name).value_or(0);

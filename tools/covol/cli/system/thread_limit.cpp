@@ -29,7 +29,7 @@ int count_possible(int wanted) {
     try {
         while (int(threads.size()) < wanted) threads.emplace_back([end] { end.wait(); });
     } catch (const std::system_error&) {
-        // The limit of the system has been reached.
+        // The system allows no more threads.
     }
     all_there.set_value();
     for (std::thread& thread : threads) thread.join();

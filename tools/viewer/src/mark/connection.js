@@ -60,7 +60,7 @@ export class Connection {
     this.count();
     this.timer = setTimeout(() => this.open(), WAITS[Math.min(this.tries++, WAITS.length - 1)]);
     if (this.tries < 2) return;
-    try {  // a server that was restarted does not accept the cookie of its earlier run
+    try {  // status 403: the server was restarted, and does not accept the cookie of its earlier run
       const answer = await fetch('/image', {method: 'HEAD'});
       if (answer.status === 403 && !this.isOpen) this.state.set({link: 'refused'});
     } catch { /* no server is running */ }

@@ -3,7 +3,7 @@ import {el} from '../dom.js';
 
 const MARKS = /\.(csv|tsv|txt|xyz|pts|asc|roi|zip|json|fcsv|annot)$/i;
 const MAX_BYTES = 256 * 2 ** 20;  // kMaxFileBytes of the program
-const ANSWER_TIMEOUT = 5000;  // maximum time in ms until a structure has its number
+const ANSWER_TIMEOUT = 5000;  // maximum time in ms until the server has assigned the ID of a new structure
 
 export class Files {
   constructor({study, tools, toast, queue}) {

@@ -3,7 +3,7 @@ import {decodeCorners, decodePositions} from '../mesh_codec.js';
 import {indexCoordinates} from '../outline.js';
 
 const HEAD = 40;  // bytes before the positions in the answer for a mesh
-export const PREVIOUS_OUTLINE_MS = 1000;  // ms for which the previous surface is still outlined
+export const PREVIOUS_OUTLINE_MS = 1000;  // ms for which the previous surface is outlined, too, after a new one
 
 function decode(buffer, space) {
   const view = new DataView(buffer), float3 = (at) => [0, 4, 8].map((n) => view.getFloat32(at + n, true));

@@ -25,7 +25,7 @@ std::string text_after(const XmlTags& tags) {
     return std::string(trim(text));
 }
 
-/// The markers of a file, one tag after another.
+/// Reads the markers of a file from its XML tags, one after another.
 class CellMarkers {
 public:
     CellMarkers(const std::string& path, const std::string& structures_by)
@@ -50,7 +50,8 @@ public:
                 open(tag.name, tags);
             if (tag.empty) close(tag.name);
         }
-        // After a syntax error, `tag` is the tag with the error.
+        // After a syntax error, `tag` is the tag with the error. If that tag directly follows the start tag of a name,
+        // the name contains '<'.
         if (in_name_ && !tag.closing && tag.name != "Name") refuse_name();
         if (!is_complete) fail(path_, "damaged or truncated: " + quote(kRoot) + " has no end");
     }

@@ -240,7 +240,7 @@ private:
     std::uint64_t second_ = 0;  ///< position of the second header; 0 if there is none
 };
 
-/// Collects the points of several ROIs in a table, and the types of the ROIs for its rule.
+/// Collects the points of several ROIs in a table. PointTable::rule lists the types of the ROIs with their numbers.
 class RoiCollector {
 public:
     RoiCollector(const std::string& path, const std::string& structures_by)
