@@ -7,9 +7,11 @@ import shutil
 import subprocess
 import unittest
 
+import numpy as np
 import pyopenvdb as vdb
 
 from cli_test import COVOL, Case, sphere_points, write_xyz
+from image_formats_test import ORIGIN, SPACING, write_dicom_series
 
 
 class Rerun(Case):
@@ -60,6 +62,22 @@ class Rerun(Case):
         vdb.write(str(self.out / "s.vdb"), grid, facts)
         done = self.run_covol("rerun", "s.vdb", code=3)
         self.assertRegex(done.stdout, "surface: 1 voxels differ, by up to 0.0010")
+
+    def test_a_dicom_series_that_changed(self):
+        """The digest of a folder covers the files of the series, but no results in the same folder."""
+        data = (40 + 60 * (np.hypot(*np.mgrid[-10:10, -12:12]) < 7))[None].repeat(9, axis=0)
+        series = write_dicom_series(self.out / "series", data)
+        (self.out / "marks.csv").write_text("x,y,z,kind\n" + "".join(
+            f"{ORIGIN[0] + SPACING[0] * (12 + 7 * c)},{ORIGIN[1] + SPACING[1] * (10 + 7 * s)},{ORIGIN[2] + SPACING[2] * k},surface\n"
+            for k in (2, 4, 6) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1), (0.7, 0.7), (-0.7, -0.7))))
+        self.run_covol("segment", "series", "--points", "marks.csv", "-o", "series/s.vdb", "--max-steps", 3)
+        shutil.copy(self.out / "series/s.vdb", self.out / "s.vdb")
+        self.assertIn("bit-identical", self.run_covol("rerun", "s.vdb").stdout)
+        one = sorted(series.glob("*.dcm"))[4]
+        content = bytearray(one.read_bytes())
+        content[-1000] ^= 1
+        one.write_bytes(content)
+        self.assertIn("not the file that the run read: expected xxh128-of-files:", self.run_covol("rerun", "s.vdb", code=3).stderr)
 
     def test_points_alone_and_a_label_image(self):
         write_xyz(self.out / "p.xyz", sphere_points(6000))

@@ -37,8 +37,8 @@ struct EvolveOptions {
     bool follow = false;
     int max_steps = 500;  ///< upper bound on time steps, >= 0
     /// the flow is steady if the zero crossings move by less than tolerance * τ per step on average. It is also steady
-    /// if their net motion, which oscillations do not affect, is that small over 10 steps, or, with `follow`, over 3
-    /// steps.
+    /// if their net motion over 10 steps (3 with `follow`), which oscillations do not affect, is below that limit per
+    /// step.
     double tolerance = 2e-3;
     /// Residual at which a step's linear solve ends, relative to that of the previous u; automatic: 1e-3 if `tau` is
     /// given, else 1e-2: then only the steady state matters, which the solver's error does not change.

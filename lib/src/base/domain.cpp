@@ -25,20 +25,19 @@ std::string to_text(const WorldBox& b) {
     return s.str();
 }
 
-void require_extent(const char* where, const WorldBox& box) {
+void require_extent(const WorldBox& box) {
     for (int a = 0; a < 3; ++a)
         if (!(box.max[a] > box.min[a]) || !std::isfinite(box.max[a] - box.min[a]))
-            throw Error(Errc::InvalidInput,
-                        std::string(where) + ": expected a box with a positive extent, got " + to_text(box));
+            throw Error(Errc::InvalidInput, "domain: expected a box with a positive extent, got " + to_text(box));
 }
 
-void require_voxel_size(const char* where, double voxel_size) {
+void require_voxel_size(double voxel_size) {
     // OpenVDB treats transforms whose determinant is below 3e-15 as singular; the determinant is the cube of the voxel
     // size.
     constexpr double kMin = 1.5e-5;
     if (voxel_size >= kMin && std::isfinite(voxel_size)) return;
     std::ostringstream text;
-    text << where << ": `voxel_size`: expected >= " << kMin << ", got " << voxel_size;
+    text << "`voxel_size`: expected >= " << kMin << ", got " << voxel_size;
     if (voxel_size > 0 && voxel_size < kMin)
         text << ", less than OpenVDB supports; use a smaller unit of length (`spacing` of the image, `points_scale` of "
                 "points)";
@@ -79,8 +78,8 @@ std::int64_t Domain::voxel_count() const {
 }
 
 Domain make_domain(const WorldBox& box, double voxel_size) {
-    require_voxel_size("make_domain", voxel_size);
-    require_extent("make_domain", box);
+    require_voxel_size(voxel_size);
+    require_extent(box);
     Domain domain;
     domain.voxel_size = voxel_size;
     for (int a = 0; a < 3; ++a) {
@@ -97,8 +96,8 @@ Domain make_domain(const WorldBox& box, double voxel_size) {
 }
 
 Domain covering(const Domain& lattice, const WorldBox& box) {
-    require_voxel_size("covering", lattice.voxel_size);
-    require_extent("covering", box);
+    require_voxel_size(lattice.voxel_size);
+    require_extent(box);
     Domain domain = lattice;
     for (int a = 0; a < 3; ++a) {
         // A face of the box that coincides with a face between voxels may differ from it by rounding errors. Without
@@ -119,7 +118,7 @@ Domain covering(const Domain& lattice, const WorldBox& box) {
 
 Domain choose_domain(const WorldBox& box, double voxel_size, const std::optional<WorldBox>& image,
                      const std::optional<Vec3>& origin) {
-    require_voxel_size("choose_domain", voxel_size);
+    require_voxel_size(voxel_size);
     if (image && !origin) return covering(make_domain(*image, voxel_size), box);
     Domain lattice;
     lattice.voxel_size = voxel_size;

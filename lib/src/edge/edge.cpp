@@ -187,8 +187,9 @@ std::vector<double> heat_series(double t, int steps) {
     return series;
 }
 
-// Solves I_t = ΔI over the time σ²/2. The implicit steps are not performed one by one: Clenshaw's recurrence (Math.
-// Comp. 9, 1955) evaluates the series of all of them.
+// Solves I_t = ΔI over the time σ²/2. The implicit steps are not performed one by one: their product is a function of
+// the operator that averages six neighbours, which heat_series() expands in Chebyshev polynomials, and Clenshaw's
+// recurrence (Math. Comp. 9, 1955) evaluates this series.
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
     const int steps = int(std::ceil(time / kLargestHeatStep - 1e-9));

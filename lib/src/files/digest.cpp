@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "covol/error.h"
@@ -56,7 +57,8 @@ void add_file(const fs::path& path, Digest& hash) {
     if (status || !file) throw Error(Errc::Io, path.string() + ": cannot read");
 }
 
-void add_metadata(const fs::path& folder, Digest& hash) {
+/// @return whether the folder has such files
+bool add_metadata(const fs::path& folder, Digest& hash) {
     const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json",
                                       "journal.jsonl"};  // files of a Zarr store, or of a study
     std::set<fs::path> found;
@@ -84,6 +86,50 @@ void add_metadata(const fs::path& folder, Digest& hash) {
         hash.add(name.c_str(), name.size() + 1);
         add_file(path, hash);
     }
+    return !found.empty();
+}
+
+/// Whether a file begins as DICOM files do: with 128 arbitrary bytes and "DICM".
+bool is_dicom(const fs::path& path) {
+    std::ifstream file = open_regular_file(path.string());
+    char bytes[4] = {};
+    file.seekg(128);
+    return file.read(bytes, 4) && std::string(bytes, 4) == "DICM";
+}
+
+/// Adds the names, sizes and contents of the DICOM files directly in a folder, or of all its files if none of them is
+/// one. If together they are larger than a file that is read as a whole, the middle of each file is left out.
+void add_files(const fs::path& folder, Digest& hash) {
+    std::set<fs::path> all, dicom;  // other files are not a part of the image: results may be in the same folder
+    std::error_code status;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+        std::error_code is_gone;
+        if (!entry.is_regular_file(is_gone)) continue;
+        all.insert(entry.path());
+        if (is_dicom(entry.path())) dicom.insert(entry.path());
+    }
+    if (status) throw Error(Errc::Io, folder.string() + ": cannot read");
+    const std::set<fs::path>& found = dicom.empty() ? all : dicom;
+    std::uint64_t sum = 0;
+    for (const fs::path& path : found) sum += fs::file_size(path, status);
+    const std::uint64_t maximum = sum <= kPieces * kPiece ? sum : kPieces * kPiece / found.size();
+    std::vector<char> bytes;
+    for (const fs::path& path : found) {
+        std::ifstream file = open_regular_file(path.string());
+        const std::uint64_t size = fs::file_size(path, status), half = std::min(size, maximum) / 2;
+        if (status) throw Error(Errc::Io, path.string() + ": cannot read");
+        const std::string name = path.filename().string();
+        hash.add(name.c_str(), name.size() + 1);
+        hash.add(&size, sizeof size);
+        const std::uint64_t rest = size <= maximum ? half : size - half;
+        for (const auto& [begin, end] : {std::pair{std::uint64_t(0), half}, std::pair{rest, size}}) {
+            bytes.resize(end - begin);
+            file.seekg(std::streamoff(begin));
+            file.read(bytes.data(), std::streamsize(bytes.size()));
+            hash.add(bytes.data(), std::size_t(file.gcount()));
+        }
+        if (!file) throw Error(Errc::Io, path.string() + ": cannot read");
+    }
 }
 
 }  // namespace
@@ -98,8 +144,9 @@ std::string digest_of(const std::string& path) {
     Digest hash;
     std::error_code status;
     if (fs::is_directory(path, status)) {
-        add_metadata(path, hash);
-        return "xxh128-of-metadata:" + hash.hex();
+        if (add_metadata(path, hash)) return "xxh128-of-metadata:" + hash.hex();
+        add_files(path, hash);
+        return "xxh128-of-files:" + hash.hex();
     }
     add_file(path, hash);
     return (fs::file_size(path, status) > kPieces * kPiece ? "xxh128-of-pieces:" : "xxh128:") + hash.hex();

@@ -39,8 +39,8 @@ struct Manifest {
     std::string set;                      ///< a random number
     std::vector<ScratchPlace> scratches;  ///< the first contains the commit
     struct File {
-        /// The new file, and the one that it replaces. If the file of this name in the parent folder is `made`, the new
-        /// file is in place; if it is neither of the two, another process has put it there since.
+        /// The new file, and the one that it replaces. If the file `name` in the folder of the outputs is `made`, the
+        /// new file is in place; if it is neither of the two, another process has put it there since.
         Stamp made, replaced;
         std::string name;
     };

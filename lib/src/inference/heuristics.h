@@ -38,8 +38,8 @@ struct InferenceHeuristics {
     /// [bits] Minimum information that the image gives about the two sides of a guess; with less it is not redrawn.
     double redraw_bits = heuristic("inference.redraw_bits", 0.3);
     /// [1 - Dice] Expected value for a result whose mean error at held-out marks times its area equals its volume. It
-    /// was fitted to 118 runs of 20 structures with 20, 60 and 300 marks; of 66 runs of 11 other structures, which were
-    /// not used for the fit, 92 % lie in the interval that follows from expected_factor.
+    /// was fitted to 118 runs of 20 structures with 20, 60 and 300 marks; of 330 runs of 11 other structures, which
+    /// were not used for the fit, 92 % lie in the interval that follows from expected_factor.
     double expected_scale = heuristic("inference.expected_scale", 0.47);
     /// [power] Exponent of the ratio error * area / volume in the expected value of 1 - Dice.
     double expected_power = heuristic("inference.expected_power", 1.15);

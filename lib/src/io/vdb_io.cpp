@@ -196,17 +196,15 @@ private:
     std::vector<Entry> entries_;
 };
 
-void require_readable(const std::string& where, const std::string& path) {
+void require_readable(const std::string& path) {
     std::error_code status;
-    if (!fs::exists(path, status)) throw Error(Errc::Io, where + ": " + path + ": no such file");
+    if (!fs::exists(path, status)) throw Error(Errc::Io, path + ": no such file");
     if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
-        throw Error(Errc::Io, where + ": " + path + ": cannot be opened");
+        throw Error(Errc::Io, path + ": cannot be opened");
     vdb::initialize();
 }
 
-std::string unusable(const std::string& where, const std::string& path) {
-    return where + ": " + path + ": damaged, truncated, or not a .vdb file";
-}
+std::string unusable(const std::string& path) { return path + ": damaged, truncated, or not a .vdb file"; }
 
 bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 
@@ -384,8 +382,8 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
     const VdbGridName file = split_grid_name(given);
     const std::string& path = file.path;
     const std::string& name = wanted_name.empty() ? file.grid : wanted_name;
-    require_readable("read_vdb", path);
-    return with_openvdb(Errc::InvalidInput, unusable("read_vdb", path), [&] {
+    require_readable(path);
+    return with_openvdb(Errc::InvalidInput, unusable(path), [&] {
         Reader reader(path);
         for (std::size_t n = 0; n < reader.size(); ++n) {
             const bool usable = is_float(reader.type(n));
@@ -394,7 +392,7 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
                 throw Error(Errc::InvalidInput, path + ": expected float values in grid '" + name + "', got " +
                                                     reader.type(n) + "; the file has " + list_grids(reader));
             FloatGridPtr grid = vdb::gridPtrCast<FloatGrid>(reader.read_whole(n));
-            if (!grid) throw Error(Errc::InvalidInput, unusable("read_vdb", path));
+            if (!grid) throw Error(Errc::InvalidInput, unusable(path));
             check_place(path, *grid);
             return grid;
         }
@@ -406,8 +404,8 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
 std::vector<VdbGridInfo> list_vdb(const std::string& given) {
     const VdbGridName file = split_grid_name(given);
     const std::string &path = file.path, &name = file.grid;
-    require_readable("list_vdb", path);
-    return with_openvdb(Errc::InvalidInput, unusable("list_vdb", path), [&] {
+    require_readable(path);
+    return with_openvdb(Errc::InvalidInput, unusable(path), [&] {
         Reader reader(path);
         std::vector<VdbGridInfo> list;
         for (std::size_t n = 0; n < reader.size(); ++n)

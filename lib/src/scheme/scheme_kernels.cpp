@@ -227,7 +227,8 @@ RowFacts assemble(const float* u, const float* phi, const float* g, const float*
     return {largest(largest_sum), sum(residual)};
 }
 
-/// The equations of eight voxels along k: u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old).
+/// The equations of eight voxels along k: u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old), where `old` is
+/// u_p before the time step, and `known` contains the terms of the four other neighbours.
 struct RowEquation {
     Lanes known, minus, plus, old;
     [[nodiscard]] Lanes value(Lanes before, Lanes after) const {

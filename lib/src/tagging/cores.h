@@ -33,7 +33,8 @@ struct Cores {
 
 /// 0-dimensional persistence of the superlevel sets {d > D} (Edelsbrunner and Harer, "Computational Topology", 2010,
 /// chapter VII). As D decreases, components are born at peaks of d and merge at saddles. One of them, the exterior,
-/// exists from the start; each other one is a core until it merges with the exterior, when its last gap opens.
+/// exists from the start; each other one is a core until it merges with the exterior, when D falls
+/// below d at the saddle in its widest gap.
 ///
 /// Each voxel belongs to the peak found by steepest ascent, computed for all voxels in parallel; only the saddles
 /// between the regions of peaks are processed in order of d.

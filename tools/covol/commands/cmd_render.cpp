@@ -174,12 +174,7 @@ void add_render(Session& session) {
     const auto [job, command] = session.add_job<RenderJob>(
         "render",
         "Draw a figure: shaded surfaces with marks and a scale bar, and slices of the image with their outlines");
-    in_group(*command, Group::Input);
-    command
-        ->add_option("level_set", job->input,
-                     "level sets; if a file has several, all are shown, or the one that :NAME selects")
-        ->required()
-        ->type_name("IN.vdb[:NAME]");
+    bind_level_sets(*command, job->input);
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
     in_group(*command, Group::Input);

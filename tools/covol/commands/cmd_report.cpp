@@ -185,12 +185,7 @@ void add_report(Session& session) {
     const auto [job, command] = session.add_job<ReportPageJob>(
         "report",
         "Write a page for the browser: surfaces in 3D, slices with outlines and marks, measurements, options");
-    in_group(*command, Group::Input);
-    command
-        ->add_option("level_set", job->input,
-                     "level sets; if a file has several, all are shown, or the one that :NAME selects")
-        ->required()
-        ->type_name("IN.vdb[:NAME]");
+    bind_level_sets(*command, job->input);
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the page, which needs no network")
         ->required()

@@ -6,6 +6,15 @@
 
 namespace covol::tool {
 
+void bind_level_sets(CLI::App& command, std::string& input) {
+    in_group(command, Group::Input);
+    command
+        .add_option("level_set", input,
+                    "level sets; if a file has several, all are shown, or the one that :NAME selects")
+        ->required()
+        ->type_name("IN.vdb[:NAME]");
+}
+
 std::vector<NamedLevelSet> read_level_sets(const std::string& input, const RunContext& run) {
     std::vector<NamedLevelSet> all;
     const VdbGridName name = split_grid_name(input);

@@ -13,6 +13,9 @@ struct NamedLevelSet {
     FloatGridPtr surface;
 };
 
+/// Adds the positional argument whose text read_level_sets() expects.
+void bind_level_sets(CLI::App& command, std::string& input);
+
 /// All level sets of "FILE.vdb", or the one named by "FILE.vdb:name". @throws Error as read_vdb_level_set.
 [[nodiscard]] std::vector<NamedLevelSet> read_level_sets(const std::string& input, const RunContext& run);
 

@@ -44,7 +44,7 @@ void write_page(const std::string& path, const ReportPage& page, Session& sessio
     }
     const Stopwatch watch;
     const ReportPageSummary made = write_report_page(path, page, {}, session.run());
-    session.report()["page"] = {{"path", path},
+    session.report()["page"] = {{"path", session.outputs().shown(path)},
                                 {"bytes", made.bytes},
                                 {"triangles", made.triangles},
                                 {"seconds", watch.seconds()},

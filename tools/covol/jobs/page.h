@@ -17,6 +17,7 @@ namespace covol::tool {
 [[nodiscard]] Json page_facts(const Session& session);
 
 /// Writes the page, adds its size and other facts to the report, and prints a remark.
+/// @param path  temporary path of an output; the report contains the final one
 void write_page(const std::string& path, const ReportPage& page, Session& session);
 
 /// Writes the results of a run; `page` has a title and, for a time-lapse, its frames.

@@ -16,6 +16,7 @@
 #include "covol/structures.h"
 #include "covol/vdb_io.h"
 #include "jobs/structure_outputs.h"
+#include "mark/mark_json.h"
 
 namespace covol::tool {
 namespace {
@@ -44,7 +45,7 @@ std::string marks_table(const StudyState& wanted) {
     for (const auto& structure : wanted)
         for (const StudyMark& mark : structure->marks) {
             Table& row = table.row() << structure->name << kWords<MarkKind>[std::size_t(mark.kind)];
-            for (const double x : mark.world) row << x;
+            for (const double x : mark.world) row << text_of(Json(x));  // exact
         }
     return table.text();
 }

@@ -20,7 +20,8 @@ COVOL_INLINE Float8 square_root(Float8 x) {
     return x;
 }
 
-/// Calls visit(i, j, squared distance from the foot in x and y) for each row that the piece reaches.
+/// Calls visit(i, j, squared distances of the row's voxels from the foot, divided by the squared reach) for each row
+/// that the piece reaches.
 template <typename Visit>
 COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
     int first[3], last[3];
@@ -29,10 +30,12 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         last[a] = std::min(7, int(std::floor((piece.foot[a] + piece.reach) / h)));
     }
     if (first[2] > last[2]) return;
+    const Float8 z = Float8{0, 1, 2, 3, 4, 5, 6, 7} * h - piece.foot[2], z2 = z * z;
+    const float scale = 1 / (piece.reach * piece.reach);
     for (int i = first[0]; i <= last[0]; ++i)
         for (int j = first[1]; j <= last[1]; ++j) {
             const float x = h * float(i) - piece.foot[0], y = h * float(j) - piece.foot[1], beside = x * x + y * y;
-            if (beside < piece.reach * piece.reach) visit(i, j, beside);
+            if (beside < piece.reach * piece.reach) visit(i, j, (z2 + beside) * scale);
         }
 }
 
@@ -71,12 +74,9 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
     leaf.weight.fill(0);
     for (std::size_t n = 0; n < count; ++n) {
         const BlendPiece& p = pieces[n];
-        const Float8 up = z - p.foot[2], up2 = up * up;
-        const float scale = 1 / (p.reach * p.reach);
         for_rows(
-            p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
+            p, h, [&](int i, int j, const Float8& fraction) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
-                const Float8 fraction = (up2 + beside) * scale;
                 Float8& minimum = at(leaf.fraction.data(), row);
                 Int8& nearest = reinterpret_cast<Int8*>(leaf.nearest.data())[row];
                 const Int8 nearer = (fraction < minimum) & (fraction < 1.0F);
@@ -104,13 +104,10 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, fl
     }
     for (std::size_t n = 0; n < count; ++n) {
         const BlendPiece& p = pieces[n];
-        const Float8 up = z - p.foot[2], up2 = up * up;
-        const float scale = 1 / (p.reach * p.reach);
         for_rows(
-            p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
+            p, h, [&](int i, int j, const Float8& fraction) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
                 if (!is_near[row]) return;
-                const Float8 fraction = (up2 + beside) * scale;
                 const Float8 same = at(leaf.normal[0].data(), row) * p.normal[0] +
                                     at(leaf.normal[1].data(), row) * p.normal[1] +
                                     at(leaf.normal[2].data(), row) * p.normal[2];

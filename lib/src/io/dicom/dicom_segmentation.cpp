@@ -11,6 +11,7 @@
 
 #include "covol/error.h"
 #include "covol/version.h"
+#include "files/atomic.h"
 #include "io/dicom/dicom_header.h"
 #include "io/dicom/dicom_source.h"
 
@@ -281,7 +282,8 @@ void write_dicom_segmentation(const std::string& path, const PixelSource& source
     file.put(0x00080033, "TM", time);
     from.refer(file, used);
     file.put(0x7FE00010, "OB", stream.take());
-    write_dicom_instance(path, file, true, kSegmentationStorage);
+    write_atomically(
+        path, [&](const std::string& temporary) { write_dicom_instance(temporary, file, true, kSegmentationStorage); });
 }
 
 }  // namespace covol::detail

@@ -134,12 +134,12 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
             detail::write_folder_atomically(path, is_zarr_store(path), [&](const std::string& temporary) {
                 detail::write_ome_zarr(temporary, std::filesystem::path(path).filename().string(), source, run);
             });
+        else if (extension == ".dcm")
+            detail::write_dicom_segmentation(path, source, options, run);
         else
             detail::write_atomically(path, [&](const std::string& temporary) {
                 if (extension == ".tif" || extension == ".tiff")
                     detail::write_tiff(temporary, source, is_ome_tiff(path), run);
-                else if (extension == ".dcm")
-                    detail::write_dicom_segmentation(temporary, source, options, run);
                 else
                     detail::write_raw(temporary, extension, source, options, run);
             });
