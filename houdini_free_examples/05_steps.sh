@@ -8,7 +8,7 @@ source houdini_free_examples/build.sh
 out=$results/steps
 mkdir -p "$out"
 
-echo "== image and points: two balls that overlap, noise"
+echo "== image and points: two balls, noise"
 "$covol" phantom two-spheres --size 96 --count 3000 --noise 0.1 -o "$out/image.nrrd" --points "$out/points.xyz" \
   --labels "$out/truth.nrrd"
 

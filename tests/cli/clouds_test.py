@@ -95,7 +95,7 @@ class Few(Clouds):
             self.assertAlmostEqual(surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3), 1, delta=0.15)
 
     def test_so_few_that_the_tag_distance_has_to_be_given(self):
-        # These clouds need a larger tag distance than the automatic one; those of other seeds do not.
+        # With the automatic tag distance, the gaps between these points stay open; with other seeds they are closed.
         for seed in (3, 5, 6):
             points = random_sphere(24, seed)
             advice = re.search(r"try (--tag-distance) ([0-9.]+)",

@@ -65,7 +65,7 @@ class Rerun(Case):
 
     def test_a_dicom_series_that_changed(self):
         """The digest of a folder covers the files of the series, but no results in the same folder."""
-        data = (40 + 60 * (np.hypot(*np.mgrid[-10:10, -12:12]) < 7))[None].repeat(9, axis=0)
+        data = (40 + 60 * (np.hypot(*np.mgrid[-10:10, -12:12]) < 7))[None].repeat(10, axis=0)
         series = write_dicom_series(self.out / "series", data)
         (self.out / "marks.csv").write_text("x,y,z,kind\n" + "".join(
             f"{ORIGIN[0] + SPACING[0] * (12 + 7 * c)},{ORIGIN[1] + SPACING[1] * (10 + 7 * s)},{ORIGIN[2] + SPACING[2] * k},surface\n"

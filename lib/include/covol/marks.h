@@ -52,7 +52,7 @@ struct MarkFiles {
     std::string guess;  ///< mask, mesh or level set of another tool; empty: none
 };
 
-/// The structure to which marks belong, and the origin of the marks.
+/// The structure to which marks belong, and the files from which the marks come.
 struct MarksOrigin {
     std::string name;  ///< of the structure; empty: it is the only one
     int label = 0;     ///< value of the structure in a mask of all structures; 0: number_labels() chooses it

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::size_t kFewJumps = 8;
 
-// Minimum divisor of a leaf's mean motion, because a mean over fewer edges is unreliable: half as many crossings as a
-// leaf's face has voxels.
+// Minimum divisor of a leaf's mean motion, because a mean over fewer crossings (pairs of neighbouring voxels with the
+// front between them) is unreliable: half the number of voxels of a leaf's face.
 constexpr int kFewCrossings = kLeafDim * kLeafDim / 2;
 
 // [voxels] Distance from the front, when the band was built, from which on a voxel counts as deep: it is at most a

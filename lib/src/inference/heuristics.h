@@ -13,8 +13,8 @@ struct InferenceHeuristics {
     double coarse_nodes = heuristic("inference.coarse_nodes", 60000);
     /// [voxels] Maximum of the image's box around the marks; a larger box takes too long to read.
     double max_voxels = limit("inference.max_voxels", 6.4e7);
-    /// [marks] Maximum number from which a guess is computed, and maximum number of positions known to be inside, or
-    /// outside, that are used. If there are more, those are chosen that are as far apart as possible.
+    /// [marks] Maximum number of marks from which the guess of a body is computed; also the maximum number of positions
+    /// inside, and of positions outside, that are used. If there are more, those that are farthest apart are chosen.
     std::size_t guess_marks = heuristic("inference.guess_marks", 150);
     /// [spacings] Height above the marks' convex hull from which on a body is improbable.
     double above_hull = heuristic("inference.above_hull", 0.5);

@@ -114,7 +114,8 @@ std::vector<int> depths(const Slice& slice) {
     return depth;
 }
 
-/// Classifies a patch by the depths of its voxels. @param deepest  the largest depth; @param sum  of all depths
+/// The width of a patch, and whether it is a stroke (thin and long), from the depths of its voxels: their distances
+/// from the patch's border. @param deepest  the largest depth; @param sum  of all depths
 Patch classified(std::size_t area, int deepest, double sum) {
     Patch patch;
     patch.area = area;

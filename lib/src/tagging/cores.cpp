@@ -32,7 +32,8 @@ struct Saddle {
 };
 constexpr std::int32_t kSeed = -1;  ///< component `first` contains a seed, and is exterior below `d`
 
-/// Components that are merged as d decreases, beginning at their peaks.
+/// The components of {d > D}, where d is the distance to the nearest point: each begins at its maximum of d, its peak,
+/// and components merge as the threshold D decreases.
 class Merging {
 public:
     static constexpr std::int32_t kNone = -1;
@@ -115,7 +116,8 @@ public:
     }
 
 private:
-    // Labels: the next voxel uphill, ~component, or kOutside for voxels outside the domain.
+    // The label of a voxel is the neighbour with the largest d, ~component at a peak (where no neighbour has a larger
+    // d), or kOutside for voxels outside the domain.
     static constexpr std::int32_t kOutside = std::numeric_limits<std::int32_t>::max();
     static constexpr std::int32_t kNothing = std::numeric_limits<std::int32_t>::max();  // in beyond_
     static constexpr int kShift[3] = {6, 3, 0};

@@ -10,6 +10,8 @@ using namespace covol::cloud;
 
 namespace {
 
+constexpr double kEdge = 0.13;  // twice the spacing of 3,000 points on a ball of radius 1
+
 std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& more) {
     points.insert(points.end(), more.begin(), more.end());
     return points;
@@ -19,8 +21,8 @@ std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& more
 
 TEST_CASE("A cloud in one piece is one part") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 1);
-    CHECK(largest_part_side(ball, 192, 0.01) == longest_side(bounding_box(ball)));
-    CHECK(largest_part_side({{1, 2, 3}}, 192, 0.01) == 0);
+    CHECK(largest_part_side(ball, 10, kEdge) == longest_side(bounding_box(ball)));
+    CHECK(largest_part_side({{1, 2, 3}}, 10, kEdge) == 0);
 }
 
 TEST_CASE("Parts that are far apart are measured one by one, by repeated division") {
@@ -30,17 +32,16 @@ TEST_CASE("Parts that are far apart are measured one by one, by repeated divisio
     std::vector<Vec3> cloud = joined(ball, test::sphere_cloud(3000, 0.9, 3, {500, 0, 0}));
     cloud = joined(cloud, test::sphere_cloud(3000, 0.8, 4, {1e5, 2e5, 0}));
     cloud = joined(cloud, test::sphere_cloud(3000, 0.7, 5, {1e5, 2e5, 300}));
-    CHECK(largest_part_side(cloud, 192, 0.01) == side);
+    CHECK(largest_part_side(cloud, 192, kEdge) == side);
 }
 
 TEST_CASE("Parts whose gaps are narrower than a cell, or that are hardly smaller than the whole, are one") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 2);
     const std::vector<Vec3> beside = joined(ball, test::sphere_cloud(3000, 1, 3, {3, 0, 0}));
-    CHECK(largest_part_side(beside, 192, 0.5) == longest_side(bounding_box(beside)));
+    CHECK(largest_part_side(beside, 192, kEdge) == longest_side(bounding_box(beside)));
     const std::vector<Vec3> close = joined(ball, test::sphere_cloud(3000, 1, 3, {2.5, 0, 0}));
-    // The small ball is not separated, because the large ball alone, with a side of 4, would be hardly smaller than
-    // the whole, whose longest side is about 5.
-    CHECK(largest_part_side(joined(test::sphere_cloud(9000, 2, 5), test::sphere_cloud(300, 0.1, 6, {3, 0, 0})), 192,
-                            0.01) > 4.9);
-    CHECK(largest_part_side(close, 8, 0.01) == longest_side(bounding_box(close)));
+    CHECK(largest_part_side(close, 8, kEdge) == longest_side(bounding_box(close)));
+    // The smaller ball is a part of its own, but the larger one is more than half as long as both together.
+    const std::vector<Vec3> both = joined(test::sphere_cloud(9000, 2, 5), test::sphere_cloud(300, 0.1, 6, {3, 0, 0}));
+    CHECK(largest_part_side(both, 20, kEdge) == longest_side(bounding_box(both)));
 }

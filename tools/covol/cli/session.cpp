@@ -136,7 +136,6 @@ int Session::run_command_line(int argc, char** argv) {
         app_.parse(std::move(words));
         expect_values(app_);
         expect_values(*app_.get_subcommands().front());
-        forget_groups(*app_.get_subcommands().front());
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
         if (const std::string unknown = unknown_name(app_, given); !unknown.empty()) return fail(kUsage, unknown);

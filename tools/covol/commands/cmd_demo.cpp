@@ -32,7 +32,7 @@ struct DemoJob {
         const std::string image = (fs::path(folder) / kImage).string(), marks = (fs::path(folder) / kMarks).string();
         session.note("wrote " + image + ", a C. elegans embryo with stained membranes, and " + marks +
                      ", marks on its envelope");
-        session.note("the same from the command line: covol segment " + shell_quoted(image) + " --points " +
+        session.note("from the command line: covol segment " + shell_quoted(image) + " --points " +
                      shell_quoted(marks) + " --voxel-size 3 -o embryo.vdb --report embryo.html");
         run_mark(session, {image, {"embryo=" + marks}, without_browser, port});
     }

@@ -64,10 +64,9 @@ Solution start_instead(const Problem& problem, const Solution& lost, const Float
     EdgeOptions edge = lost.edges.options;
     edge.feature = EdgeFeature::Slope;
     StepReport report;
-    report.remarks.choose(
-        "edge_feature", to_string(edge.feature),
-        "with lines as edges the surface moved away from the marks: the body between the contours is kept instead",
-        problem.run);
+    report.remarks.choose("edge_feature", to_string(edge.feature),
+                          "with lines as edges the surface was lost: the body between the contours is kept instead",
+                          problem.run);
     Solution rested = flow(problem, {lost.start, u, lost.distance, nullptr, nullptr}, edge, reached);
     report.add(rested.report);
     rested.report = report;

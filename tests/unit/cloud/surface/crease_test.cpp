@@ -32,8 +32,8 @@ Vec3 gradient(const Solid& f, const Vec3& p, double step) {
     return unit(g);
 }
 
-/// Random points on the border of a solid. Their normals are averaged over a fifth of the neighbourhood's radius, which
-/// is 1, as the normals of an indicator are blurred.
+/// Random points on the border of a solid, within the neighbourhood of radius 1 in which fit_crease() seeks a crease.
+/// Their normals are averaged over a radius of 0.2, because the normals of an indicator are blurred, too.
 std::vector<CreasePoint> border(const Solid& f, double noise, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> place(-1, 1);

@@ -96,10 +96,6 @@ nlohmann::ordered_json to_json(const CLI::Option& option, bool first) {
 
 void in_group(CLI::App& command, Group group) { command.option_defaults()->group(kGroupNames[std::size_t(group)]); }
 
-void forget_groups(CLI::App& command) {
-    for (CLI::Option* option : command.get_options()) option->group("Options");
-}
-
 OptionHelp help_of(const CLI::Option& option) {
     OptionHelp help;
     if (!option.get_positional()) {

@@ -13,9 +13,6 @@ namespace covol::tool {
 /// Options that are added to `command` after this call belong to this group.
 void in_group(CLI::App& command, Group group);
 
-/// Puts all options of `command` into the same group, "Options". Only the help needs different groups.
-void forget_groups(CLI::App& command);
-
 /// An option as shown in the help.
 struct OptionHelp {
     std::string names;          ///< "-o, --output"; empty for a positional argument
