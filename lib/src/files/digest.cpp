@@ -89,9 +89,9 @@ bool add_metadata(const fs::path& folder, Digest& hash) {
     return !found.empty();
 }
 
-/// Whether a file begins as DICOM files do: with 128 arbitrary bytes and "DICM".
+/// Whether a file can be read and begins as DICOM files do: with 128 arbitrary bytes and "DICM".
 bool is_dicom(const fs::path& path) {
-    std::ifstream file = open_regular_file(path.string());
+    std::ifstream file(path, std::ios::binary);
     char bytes[4] = {};
     file.seekg(128);
     return file.read(bytes, 4) && std::string(bytes, 4) == "DICM";
