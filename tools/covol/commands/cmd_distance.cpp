@@ -69,8 +69,6 @@ void add_distance(Session& session) {
     command->add_option("--like", job->like, "image whose box is the domain [the bounding box of the points]")
         ->type_name("IMAGE");
     bind_options(*command, job->domain, Offered::SingleStep, {}, Group::Domain);
-    command->get_option("--margin")
-        ->description("distance between the points and the boundary of the domain [max distance + 1vx]");
     job->image.bind(*command, {"roi"});
     job->vdb.bind(*command);
     session.help().show_first(*command, {"--max-distance", "--like", "--voxel-size", "--roi"});

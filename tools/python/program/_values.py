@@ -348,10 +348,9 @@ class Mesh:
 
 
 def file_and_grid(source):
-    """Splits FILE.vdb[:GRID], in which folders may contain colons."""
-    folder, name = os.path.split(source)
-    name, _, grid = name.partition(":")
-    return os.path.join(folder, name), grid
+    """Splits FILE.vdb[:GRID] as the program does, so that names of files and folders may contain colons."""
+    file, colon, grid = source.partition(".vdb:")
+    return (file + ".vdb", grid) if colon and not os.path.exists(source) else (source, "")
 
 
 class LevelSet:
