@@ -12,7 +12,7 @@ import unittest
 
 import numpy as np
 
-from cli_test import COVOL, Case
+from covol_case import COVOL, Case
 
 SIZE = 128  # voxels along each axis of the image
 

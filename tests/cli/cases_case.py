@@ -2,8 +2,8 @@
 import subprocess
 import unittest
 
-import cli_test
-from cli_test import COVOL
+import covol_case
+from covol_case import COVOL
 
 try:
     import numpy as np
@@ -31,7 +31,7 @@ def on_body(count=150):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(cli_test.Case):
+class Case(covol_case.Case):
     def setUp(self):
         super().setUp()
         self.folder = self.out

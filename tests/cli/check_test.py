@@ -6,7 +6,7 @@ import json
 import subprocess
 import unittest
 
-from cli_test import COVOL
+from covol_case import COVOL
 from interchange_test import MISSING, Folder, ball, np, sphere, tifffile
 
 

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import unittest
 
-from cli_test import COVOL, Case, sphere_points, write_xyz
+from covol_case import COVOL, Case, sphere_points, write_xyz
 
 
 class Checkpoints(Case):

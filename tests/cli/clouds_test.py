@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import unittest
 
-from cli_test import COVOL, write_nrrd, write_xyz
+from covol_case import COVOL, write_nrrd, write_xyz
 
 RADIUS = 10.0
 

@@ -19,7 +19,7 @@ import unittest
 import numpy as np
 import tifffile
 
-from cli_test import COVOL, Case, write_xyz
+from covol_case import COVOL, Case, write_xyz
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples"
 WORKFLOW = EXAMPLES / "bricks"

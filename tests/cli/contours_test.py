@@ -15,7 +15,7 @@ import zipfile
 import numpy as np
 import tifffile
 
-from cli_test import COVOL, Case
+from covol_case import COVOL, Case
 from points_test import roi
 from structures_test import rows_of
 

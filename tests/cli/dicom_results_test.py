@@ -9,7 +9,7 @@ import unittest
 
 from cases_case import Case
 from cases_dicom_test import CT, dicom, item
-from cli_test import COVOL
+from covol_case import COVOL
 
 try:
     import nibabel

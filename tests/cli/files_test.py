@@ -17,7 +17,7 @@ import unittest
 import numpy as np
 
 import image_formats_test as formats
-from cli_test import COVOL, ORIGIN, H, SIZE, Case, ball_bytes
+from covol_case import COVOL, ORIGIN, H, SIZE, Case, ball_bytes
 
 PROGRAM = str(pathlib.Path(COVOL).resolve())
 PHANTOM = ["phantom", "sphere", "--size", "16"]

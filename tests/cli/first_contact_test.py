@@ -11,7 +11,7 @@ import signal
 import subprocess
 import unittest
 
-from cli_test import COMMANDS, COVOL, Case
+from covol_case import COMMANDS, COVOL, Case
 from live_client import Live
 from mark_test import PageCase
 

@@ -9,7 +9,7 @@ import subprocess
 import unittest
 
 import zarr_test
-from cli_test import COVOL
+from covol_case import COVOL
 from zarr_test import CHUNKS, SHAPE, ball, pixels, write_marks
 
 try:

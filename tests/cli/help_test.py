@@ -6,7 +6,7 @@ import json
 import re
 import unittest
 
-from cli_test import COMMANDS, Case
+from covol_case import COMMANDS, Case
 
 # Commands of which --help lists a selection of the options.
 LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]

@@ -16,8 +16,8 @@ import subprocess
 import unittest
 import zlib
 
-import cli_test
-from cli_test import COVOL
+import covol_case
+from covol_case import COVOL
 
 try:
     import nibabel
@@ -145,7 +145,7 @@ def ome_xml(files=None, order="XYZCT", channels=1, pages=None):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(cli_test.Case):
+class Case(covol_case.Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()

@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 import unittest
 
-from cli_test import COVOL
+from covol_case import COVOL
 
 try:
     import nibabel

@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 import tifffile
 
-from cli_test import Case, write_nrrd
+from covol_case import Case, write_nrrd
 from structures_test import H, ORIGIN, SIZE, ball_image, fibonacci, lattice, nrrd_keys, write_points
 
 MIDDLE = (0.0, 0.0, 0.0)

@@ -15,7 +15,7 @@ import zipfile
 
 import numpy as np
 
-from cli_test import COVOL, Case, write_nrrd
+from covol_case import COVOL, Case, write_nrrd
 
 MIB = 1 << 20
 

@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from cli_test import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
+from covol_case import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
 
 DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 

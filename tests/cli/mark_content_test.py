@@ -7,7 +7,7 @@ import math
 import signal
 import zlib
 
-from cli_test import CENTER, H, RADIUS, SIZE, ball_bytes, radius_of, write_nrrd
+from covol_case import CENTER, H, RADIUS, SIZE, ball_bytes, radius_of, write_nrrd
 from mark_test import MARKS, MarkCase
 
 MIDDLE = (SIZE - 1) / 2

@@ -5,7 +5,7 @@
 import json
 import signal
 
-from cli_test import SIZE
+from covol_case import SIZE
 from mark_test import MARKS, MarkCase
 
 

@@ -11,7 +11,7 @@ import zlib
 
 import numpy as np
 
-from cli_test import COVOL, Case, sphere_points
+from covol_case import COVOL, Case, sphere_points
 from live_client import Live, Page
 
 SIZE, CHUNK, LEVELS, SPACING = (256, 1024, 1024), 64, 3, 0.5  # size z, y, x; large enough to be read chunk by chunk

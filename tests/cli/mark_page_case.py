@@ -10,7 +10,7 @@ import unittest
 
 import numpy as np
 
-from cli_test import COVOL
+from covol_case import COVOL
 
 try:
     from selenium import webdriver

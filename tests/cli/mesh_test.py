@@ -5,7 +5,7 @@
 import math
 import random
 
-from cli_test import Case
+from covol_case import Case
 
 
 def random_cloud(seed, count=3000):

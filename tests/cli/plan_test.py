@@ -5,7 +5,7 @@
 import json
 import unittest
 
-from cli_test import Case
+from covol_case import Case
 
 
 class Plan(Case):

@@ -15,7 +15,7 @@ import zipfile
 import nibabel
 import numpy as np
 
-from cli_test import Case
+from covol_case import Case
 
 # Sizes, spacings and coordinates of the origin differ between the axes, so that exchanged axes change the results.
 SIZES = (60, 50, 16)

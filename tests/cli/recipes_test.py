@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from cli_test import COVOL
+from covol_case import COVOL
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import unittest
 
-from cli_test import H, Case, sphere_points, write_xyz
+from covol_case import H, Case, sphere_points, write_xyz
 
 try:
     from selenium import webdriver

@@ -11,7 +11,7 @@ import re
 import unittest
 import zlib
 
-from cli_test import CENTER, H, ORIGIN, RADIUS, SIZE, ball_bytes, sphere_points, write_nrrd, write_xyz
+from covol_case import CENTER, H, ORIGIN, RADIUS, SIZE, ball_bytes, sphere_points, write_nrrd, write_xyz
 from report_page_case import COARSE, EVIL, MB, BrowserCase, By, Keys, PageCase, WebDriverWait, data_of, marks_file
 
 

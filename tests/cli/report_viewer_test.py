@@ -8,7 +8,7 @@ import re
 import unittest
 
 import axe
-from cli_test import H, ORIGIN
+from covol_case import H, ORIGIN
 from report_page_case import COARSE, BrowserCase, By, Keys, WebDriverWait, data_of
 
 

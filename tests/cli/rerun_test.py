@@ -10,7 +10,7 @@ import unittest
 import numpy as np
 import pyopenvdb as vdb
 
-from cli_test import COVOL, Case, sphere_points, write_xyz
+from covol_case import COVOL, Case, sphere_points, write_xyz
 from image_formats_test import ORIGIN, SPACING, write_dicom_series
 
 

@@ -10,7 +10,7 @@ import unittest
 
 import numpy as np
 
-from cli_test import Case
+from covol_case import Case
 from tilted_test import rotation
 
 RADII, CENTRE = np.array([6.0, 4.5, 3.5]), np.array([3.0, -2.0, 1.0])

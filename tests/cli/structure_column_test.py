@@ -8,7 +8,7 @@ import math
 import struct
 import unittest
 
-from cli_test import H, ORIGIN, SIZE, Case, sphere_points, write_nrrd, write_xyz
+from covol_case import H, ORIGIN, SIZE, Case, sphere_points, write_nrrd, write_xyz
 
 RADIUS, LEFT, RIGHT = 3.5, (9.5, 19.5, 19.5), (29.5, 19.5, 19.5)  # radius and centres of two balls, in voxels
 

@@ -15,7 +15,7 @@ import unittest
 import numpy as np
 import tifffile
 
-from cli_test import COVOL, Case, write_nrrd
+from covol_case import COVOL, Case, write_nrrd
 
 SIZE = 48
 H = 0.5

@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import unittest
 
-from cli_test import COVOL, Case
+from covol_case import COVOL, Case
 
 OUTPUTS = {"-o": "s.vdb", "--mesh": "s.ply", "--mask": "s.nrrd"}
 

@@ -12,7 +12,7 @@ import zlib
 
 import numpy as np
 
-from cli_test import Case
+from covol_case import Case
 
 SIZES = np.array([40, 36, 26])          # number of voxels along i, j, k
 SPACING = np.array([0.5, 0.5, 0.75])

@@ -18,7 +18,7 @@ import unittest
 
 import pyopenvdb as vdb
 
-from cli_test import CENTER, COVOL, Case, sphere_points, write_xyz
+from covol_case import CENTER, COVOL, Case, sphere_points, write_xyz
 
 ESC = "\x1b]0;title\x07\x1b[31m"
 # Characters that steer a terminal: controls (C0 without line ends, C1), and those that change the direction of writing.

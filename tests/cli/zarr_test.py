@@ -9,7 +9,7 @@ import shutil
 import struct
 import unittest
 
-import cli_test
+import covol_case
 
 try:
     import numcodecs
@@ -150,7 +150,7 @@ def write_marks(path, centre, radius, count=100):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Case(cli_test.Case):
+class Case(covol_case.Case):
     def setUp(self):
         super().setUp()
         self.folder = self.out

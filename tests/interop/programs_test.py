@@ -15,7 +15,7 @@ import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / "cli"), str(HERE.parent / "property")]
-import cli_test  # noqa: E402
+import covol_case  # noqa: E402
 
 try:
     import numpy as np
@@ -36,7 +36,7 @@ def needs(program, package):
 
 
 @unittest.skipIf(MISSING, MISSING)
-class Programs(cli_test.Case):
+class Programs(covol_case.Case):
     """A rotated ellipsoid as a level set, on the lattice of an image."""
 
     @classmethod
