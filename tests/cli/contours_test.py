@@ -17,7 +17,7 @@ import tifffile
 
 from covol_case import COVOL, Case
 from points_test import roi
-from structures_test import rows_of
+from structures_case import rows_of
 
 # Sizes, spacings and coordinates of the origin differ between the axes, so that exchanged axes change the results.
 SIZES = (80, 70, 24)

@@ -9,7 +9,7 @@ import numpy as np
 import tifffile
 
 from covol_case import Case, write_nrrd
-from structures_test import H, ORIGIN, SIZE, ball_image, fibonacci, lattice, nrrd_keys, write_points
+from structures_case import H, ORIGIN, SIZE, ball_image, fibonacci, lattice, nrrd_keys, write_points
 
 MIDDLE = (0.0, 0.0, 0.0)
 RADIUS = 7.0  # in units of length; 14 voxels

@@ -9,7 +9,7 @@ import pyopenvdb as vdb
 from PIL import Image
 
 from covol_case import Case, write_nrrd
-from structures_test import H, ORIGIN, ball_image, ball_points, write_points
+from structures_case import H, ORIGIN, ball_image, ball_points, write_points
 
 BLUE, RED = (68, 119, 170), (238, 102, 119)  # colours of the first and the second structure, 0 to 255
 

@@ -11,7 +11,7 @@ import numpy as np
 import pyopenvdb as vdb
 
 from covol_case import COVOL, Case, sphere_points, write_xyz
-from image_formats_test import ORIGIN, SPACING, write_dicom_series
+from image_formats_case import ORIGIN, SPACING, write_dicom_series
 
 
 class Rerun(Case):
