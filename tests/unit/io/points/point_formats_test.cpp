@@ -1,114 +1,18 @@
-
-#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
-#include "covol/point_structures.h"
 #include "covol/points.h"
 #include "support/deflated.h"
 #include "support/scratch.h"
+#include "unit/io/points/program_files.h"
 
 // Each format, byte by byte according to its specification.
 
 using namespace covol;
+using namespace covol::test;
 
 namespace {
-
-// ---- bytes
-
-class Writer {
-public:
-    explicit Writer(bool big) : big_(big) {}
-    template <typename T>
-    Writer& put(T value) {
-        std::array<char, sizeof(T)> bytes;
-        std::memcpy(bytes.data(), &value, sizeof(T));
-        if (big_) std::reverse(bytes.begin(), bytes.end());
-        text_.append(bytes.data(), sizeof(T));
-        return *this;
-    }
-    template <typename T>
-    Writer& put_at(std::size_t at, T value) {
-        const std::string tail = text_.size() > at + sizeof(T) ? text_.substr(at + sizeof(T)) : "";
-        text_.resize(at, '\0');
-        put(value);
-        text_ += tail;
-        return *this;
-    }
-    Writer& put(const std::string& text) {
-        text_ += text;
-        return *this;
-    }
-    Writer& pad(std::size_t size) {
-        text_.resize(size, '\0');
-        return *this;
-    }
-    [[nodiscard]] std::size_t size() const { return text_.size(); }
-    [[nodiscard]] const std::string& text() const { return text_; }
-
-private:
-    bool big_;
-    std::string text_;
-};
-
-// ---- Fiji
-
-enum RoiType : std::uint8_t {
-    kPolygon = 0,
-    kRectangle = 1,
-    kOval = 2,
-    kLine = 3,
-    kFreeLine = 4,
-    kPolyline = 5,
-    kFreehand = 7,
-    kTraced = 8,
-    kPoint = 10
-};
-
-struct RoiSpec {
-    RoiType type = kPolygon;
-    std::vector<std::array<float, 2>> xy;
-    bool sub_pixel = true;
-    std::vector<int> positions;  ///< slice of each point, from 1
-    int position = 0, z = 0, channel = 0;
-    std::string name;
-    std::array<float, 4> box{};  ///< x, y, width and height, or the two ends of a line
-    std::vector<float> path;     ///< the path of a composite ROI
-};
-
-std::string roi(const RoiSpec& spec) {
-    const std::size_t n = spec.xy.size();
-    const bool has_box = spec.type == kRectangle || spec.type == kOval || spec.type == kLine;
-    const float left = has_box ? spec.box[0] : 5, top = has_box ? spec.box[1] : 6;
-    Writer w(true);
-    w.put(std::string("Iout")).put(std::int16_t(228)).put(std::uint8_t(spec.type)).put(std::uint8_t(0));
-    w.put(std::int16_t(top))
-        .put(std::int16_t(left))
-        .put(std::int16_t(top + spec.box[3]))
-        .put(std::int16_t(left + spec.box[2]));
-    w.put(std::uint16_t(n));
-    if (has_box && spec.sub_pixel)
-        for (const float v : spec.box) w.put(v);
-    w.pad(36).put(std::int32_t(spec.path.size())).pad(50);
-    w.put(std::int16_t(spec.sub_pixel ? 128 : 0)).pad(56).put(std::int32_t(spec.position));
-    const std::size_t second = 64 + 4 * spec.path.size() + (spec.sub_pixel ? 12 : 4) * n;
-    w.put(std::int32_t(second));
-    for (const float v : spec.path) w.put(v);
-    for (int a = 0; a < 2; ++a)
-        for (const auto& p : spec.xy) w.put(std::int16_t(p[std::size_t(a)] - (a == 0 ? left : top)));
-    if (spec.sub_pixel)
-        for (int a = 0; a < 2; ++a)
-            for (const auto& p : spec.xy) w.put(p[std::size_t(a)]);
-    w.pad(second + 4).put(std::int32_t(spec.channel)).put(std::int32_t(spec.z)).put(std::int32_t(0));
-    w.put(std::int32_t(spec.name.empty() ? 0 : second + 64)).put(std::int32_t(spec.name.size()));
-    const std::size_t counters = second + 64 + 2 * spec.name.size();
-    w.pad(second + 48).put(std::int32_t(spec.positions.empty() ? 0 : counters)).pad(second + 64);
-    for (const char c : spec.name) w.put(std::int16_t(c));
-    for (const int position : spec.positions) w.put(std::int32_t(position << 8 | 3));
-    return w.text();
-}
 
 std::string zip(const std::vector<std::pair<std::string, std::string>>& files, bool deflate = true) {
     Writer w(false), directory(false);
@@ -229,8 +133,6 @@ std::string las(const std::vector<Vec3>& points, int minor, std::uint8_t format 
 
 // ---- the same marks in every format
 
-const std::vector<Vec3> kIndex{{10, 20, 3}, {12.5, 20.25, 3}, {12.5, 31, 3}, {10.25, 31.75, 4}};
-
 ImageGeometry image() {
     ImageGeometry geometry;
     geometry.size = {64, 48, 20};
@@ -264,25 +166,6 @@ std::vector<Vec3> moved(std::vector<Vec3> points, const Vec3& scale, const Vec3&
     return points;
 }
 
-/// Markers of Fiji's Cell Counter, in types of two markers, followed by an empty type.
-std::string cell_counter(const std::vector<Vec3>& points, bool named = false) {
-    std::string text =
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\r\n<CellCounter_Marker_File>\r\n <Image_Properties>\r\n"
-        "     <Image_Filename>a.tif</Image_Filename>\r\n </Image_Properties>\r\n <Marker_Data>\r\n"
-        "     <Current_Type>0</Current_Type>\r\n";
-    for (std::size_t type = 0; 2 * type <= points.size(); ++type) {
-        text += "     <Marker_Type>\r\n         <Type>" + std::to_string(type + 1) + "</Type>\r\n";
-        if (named) text += "         <Name>cell &lt;" + std::to_string(type + 1) + "&gt;</Name>\r\n";
-        for (std::size_t n = 2 * type; n < std::min(points.size(), 2 * type + 2); ++n)
-            text += "         <Marker>\r\n             <MarkerX>" + std::to_string(points[n][0]) +
-                    "</MarkerX>\r\n             <MarkerY>" + std::to_string(points[n][1]) +
-                    "</MarkerY>\r\n             <MarkerZ>" + std::to_string(int(points[n][2]) + 1) +
-                    "</MarkerZ>\r\n         </Marker>\r\n";
-        text += "     </Marker_Type>\r\n";
-    }
-    return text + " </Marker_Data>\r\n</CellCounter_Marker_File>\r\n";
-}
-
 RoiSpec multi_point() {
     RoiSpec spec;
     spec.type = kPoint;
@@ -290,17 +173,6 @@ RoiSpec multi_point() {
         spec.xy.push_back({float(p[0]), float(p[1])});
         spec.positions.push_back(int(p[2]) + 1);
     }
-    return spec;
-}
-
-/// The marks of one slice as the outline of an area, in coordinates of pixel corners.
-RoiSpec outline(RoiType type, int slice) {
-    RoiSpec spec;
-    spec.type = type;
-    for (const Vec3& p : kIndex)
-        if (p[2] == slice) spec.xy.push_back({float(p[0] + 0.5), float(p[1] + 0.5)});
-    spec.position = slice + 1;
-    spec.name = "outline";
     return spec;
 }
 
@@ -379,16 +251,6 @@ std::vector<File> all_formats() {
     };
 }
 
-std::string read_error(const Scratch& scratch, const std::string& name, const std::string& content) {
-    const std::string path = scratch.write(name, content);
-    return message_of([&] { (void)read_points(path); });
-}
-
-void contains(const std::string& message, const std::string& part) {
-    INFO(message);
-    CHECK(message.find(part) != std::string::npos);
-}
-
 }  // namespace
 
 TEST_CASE("the same marks are at the same place in the world in every format") {
@@ -430,176 +292,6 @@ TEST_CASE("the options go before what a format says") {
     CHECK_THROWS_AS(read_points(path, {PointSpace::World, PointOrder::XYZ, -1}), Error);
     two.channels = 0;
     CHECK_THROWS_AS(read_points(path, two), Error);
-}
-
-TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
-    const Scratch scratch;
-    const std::string head = "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n";
-    const std::string begin = "<entry key=\"Point1\" value=\"1.5 2.5 3.5\" />\n",
-                      end = "<entry key=\"Point2\" value=\"4.5 2.5 3.5\" />\n";
-    const PointCloud cloud = read_points(scratch.write("a.annot", head + begin + end));
-    REQUIRE(cloud.points.size() == 2);
-    CHECK(cloud.points[0][0] < cloud.points[1][0]);
-    REQUIRE(cloud.lines.size() == 1);
-    CHECK_FALSE(cloud.lines[0].closed);
-    contains(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
-}
-
-TEST_CASE("Fiji's areas, lines and points have their own lattice") {
-    const Scratch scratch;
-    const auto read = [&](const RoiSpec& spec) { return read_points(scratch.write("one.roi", roi(spec))); };
-    RoiSpec spec;
-    spec.position = 4;
-    spec.xy = {{10, 20}, {14, 20}, {14, 26}};
-    for (const RoiType type : {kPolygon, kFreehand, kTraced, kFreeLine, kPolyline}) {
-        INFO(int(type));
-        for (const bool sub_pixel : {false, true}) {
-            spec.type = type;
-            spec.sub_pixel = sub_pixel;
-            const PointCloud cloud = read(spec);
-            const bool area = type != kFreeLine && type != kPolyline;
-            const double shift = area ? -0.5 : 0;
-            REQUIRE(cloud.lines.size() == 1);
-            CHECK(cloud.lines[0].closed == area);
-            CHECK(cloud.points == std::vector<Vec3>{{10 + shift, 20 + shift, 3},
-                                                    {14 + shift, 20 + shift, 3},
-                                                    {14 + shift, 26 + shift, 3}});
-        }
-    }
-    spec.xy.clear();
-    for (const bool sub_pixel : {false, true}) {
-        spec.sub_pixel = sub_pixel;
-        spec.box = {10, 20, 6, 8};
-        spec.type = kRectangle;
-        CHECK(read(spec).points == std::vector<Vec3>{{9.5, 19.5, 3}, {15.5, 19.5, 3}, {15.5, 27.5, 3}, {9.5, 27.5, 3}});
-        spec.type = kOval;
-        const PointCloud oval = read(spec);
-        CHECK(oval.lines.at(0).closed);
-        CHECK(oval.points.size() >= 16);
-        for (const Vec3& p : oval.points)
-            CHECK(std::pow((p[0] - 12.5) / 3, 2) + std::pow((p[1] - 23.5) / 4, 2) == Approx(1));
-    }
-    spec.type = kLine;
-    // Both ends of the line, in coordinates of pixel centres.
-    CHECK(read(spec).points == std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});
-    CHECK_FALSE(read(spec).lines[0].closed);
-
-    // The path of a square with a square hole.
-    spec.type = kRectangle;
-    spec.path = {0, 10, 10, 1, 20, 10, 1, 20, 20, 1, 10, 20, 1, 10, 10, 4, 0, 12, 12, 1, 18, 12, 1, 18, 18, 4};
-    const PointCloud composite = read(spec);
-    REQUIRE(composite.lines.size() == 2);
-    CHECK(composite.lines[0].end == 4);
-    CHECK(composite.lines[1].end == 7);
-    CHECK(composite.points[4] == Vec3{11.5, 11.5, 3});
-}
-
-TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its name; none is an error") {
-    const Scratch scratch;
-    RoiSpec spec = outline(kPolygon, 3);
-    spec.position = 77;
-    spec.z = 6;
-    spec.channel = 2;
-    CHECK(read_points(scratch.write("a.roi", roi(spec))).points[0][2] == 5);
-    spec.z = spec.channel = 0;
-    CHECK(read_points(scratch.write("a.roi", roi(spec))).points[0][2] == 76);
-    spec.position = 0;
-    spec.name = "0012-0100-0200";
-    const PointCloud cloud = read_points(scratch.write("a.roi", roi(spec)));
-    CHECK(cloud.points[0][2] == 11);
-    CHECK(cloud.lines[0].name == "0012-0100-0200");
-    spec.name = "cell";
-    contains(read_error(scratch, "a.roi", roi(spec)), "ROI 'cell' (polygon): expected a slice");
-    spec.position = 3;
-    spec.channel = 1;  // the ROI belongs to all slices of channel 1
-    contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
-}
-
-TEST_CASE("the types of Cell Counter are structures, and its slices may count channels") {
-    const Scratch scratch;
-    const std::string path = scratch.write("a.xml", cell_counter(kIndex));
-    std::vector<StructurePoints> structures = read_structures_of_points(path, "type");
-    REQUIRE(structures.size() == 2);
-    CHECK(structures[0].name == "Type 1");
-    CHECK(structures[1].name == "Type 2");
-    CHECK(structures[1].points.cloud.points == std::vector<Vec3>{kIndex[2], kIndex[3]});
-    structures = read_structures_of_points(scratch.write("n.xml", cell_counter(kIndex, true)), "type");
-    REQUIRE(structures.size() == 2);
-    CHECK(structures[1].name == "cell <2>");
-    contains(message_of([&] { (void)read_structures_of_points(path, "group"); }), "its Cell Counter with type");
-    ReadPointsOptions two;
-    two.channels = 2;
-    CHECK(read_points(path, two).points[0][2] == 1);  // image 4 of a hyperstack with two channels is slice 1
-    CHECK(read_points(path, two).points[3][2] == 2);
-}
-
-TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
-    const Scratch scratch;
-    const std::string good = cell_counter(kIndex);
-    const auto with = [&](const std::string& old, const std::string& other) {
-        std::string text = good;
-        return text.replace(text.find(old), old.size(), other);
-    };
-    contains(read_error(scratch, "a.xml", "<TrackMate version=\"7\"/>"), "got 'TrackMate'");
-    contains(read_error(scratch, "a.xml", "no XML"), "expected a file of Fiji's Cell Counter");
-    contains(read_error(scratch, "a.xml", good.substr(0, good.size() - 5)), "has no end");
-    contains(read_error(scratch, "a.xml", with("<MarkerZ>4</MarkerZ>", "")),
-             "marker 1: expected MarkerX, MarkerY and MarkerZ");
-    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>0<")),
-             "marker 1: expected a slice from 1, got MarkerZ '0'; does the file count slices from 0?");
-    contains(read_error(scratch, "a.xml", with("</Type>", "</Type><Name><Unnamed></Name>")), "write it as &lt;");
-    contains(read_error(scratch, "a.xml", with("</Type>", "</Type><Name>a < 5 um</Name>")), "write it as &lt;");
-    contains(read_error(scratch, "a.xml", good.substr(0, good.find("</Type>")) + "</Type><Name>cell"), "has no end");
-    contains(read_error(scratch, "a.xml", with("<MarkerX>", "<Marker><MarkerX>")), "marker 1: expected its end");
-    contains(read_error(scratch, "a.xml", with("<Type>1</Type>", "")), "marker 1: expected the Type or Name");
-    contains(read_error(scratch, "a.xml", "<?xml version=\"1.0\"?><SpimData version=\"0.2\"/>"), "open the .h5 file");
-    contains(read_error(scratch, "a.xml", with("<MarkerZ>4<", "<MarkerZ>nan<")), "expected a number as MarkerZ");
-    contains(read_error(scratch, "a.xml", "<CellCounter_Marker_File></CellCounter_Marker_File>"),
-             "expected at least one point");
-}
-
-TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of cellfinder") {
-    const Scratch scratch;
-    std::string text = cell_counter(kIndex);
-    const auto set = [&](const std::string& old, const std::string& other) {
-        text.replace(text.find(old), old.size(), other);
-    };
-    set("<MarkerZ>4</MarkerZ>", "<MarkerZ>\r\n  4\r\n</MarkerZ>");
-    CHECK(read_points(scratch.write("a.xml", text)).points == kIndex);
-    set("</Type>", "</Type><Name />");  // a type without a name is called by its number
-    CHECK(read_structures_of_points(scratch.write("n.xml", text), "type")[0].name == "Type 1");
-    set("a.tif", "placeholder.tif");
-    const PointCloud cloud = read_points(scratch.write("b.xml", text));
-    CHECK(cloud.points[0] == Vec3{kIndex[0][0], kIndex[0][1], kIndex[0][2] + 1});
-    contains(cloud.rule, "cellfinder (2 types), slices from 0");
-}
-
-TEST_CASE("markups give lines, their own names and nothing that is not placed") {
-    const Scratch scratch;
-    const std::string text =
-        R"({"markups": [
-          {"type": "ClosedCurve", "name": "rim", "coordinateSystem": "RAS", "controlPoints": [{"position": [1, 2, 3]}, {"position": [4, 5, 6]}]},
-          {"type": "Line", "coordinateSystem": "LPS", "controlPoints": [{"position": [-7, -8, 9]}, {"position": [-1, -1, 1]}]},
-          {"type": "Plane", "coordinateSystem": "LPS", "controlPoints": [{"position": [0, 0, 0]}]},
-          {"type": "Curve", "controlPoints": []}]})";
-    const PointCloud cloud = read_points(scratch.write("a.mrk.json", text));
-    REQUIRE(cloud.lines.size() == 2);
-    CHECK(cloud.lines[0].closed);
-    CHECK(cloud.lines[0].name == "rim");
-    CHECK_FALSE(cloud.lines[1].closed);
-    CHECK(cloud.points == std::vector<Vec3>{{-1, -2, 3}, {-4, -5, 6}, {-7, -8, 9}, {-1, -1, 1}});
-    contains(
-        read_error(scratch, "a.json",
-                   "{\"markups\": [{\"coordinateSystem\": \"IJK\", \"controlPoints\": [{\"position\": [1,2,3]}]}]}"),
-        "expected the coordinate system RAS or LPS, got 'IJK'");
-    contains(read_error(scratch, "a.json", "{\"markups\": 3}"), "found no list 'markups'");
-    contains(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2]}]}]}"),
-             "expected a position of 3 numbers");
-    contains(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2,1e999]}]}]}"),
-             "a.json: not the JSON");
-    contains(read_error(scratch, "a.json", std::string(100000, '[')), "a.json: not the JSON");
-    contains(read_error(scratch, "a.json", "{\"markups\": [{\"type\": 5, \"controlPoints\": 7}]}"),
-             "a.json: not the JSON");
 }
 
 TEST_CASE("scans: invalid points are left out, compressed and newer files refused in words") {
