@@ -76,13 +76,13 @@ Solution start_instead(const Problem& problem, const Solution& lost, const Float
 }
 
 /// The guess through the marks; none if it cannot be computed, or if the flow's surface did not vanish and the guess
-/// also misses the marks.
-std::optional<StartSurface> find_better_guess(const Problem& problem, const Choices& choices,
-                                              const Solution& solution) {
+/// also misses the marks. The time that such a guess took is added to the report of the solution.
+std::optional<StartSurface> find_better_guess(const Problem& problem, const Choices& choices, Solution& solution) {
     try {
         StartSurface guess = start_from_guess(problem, choices, solution.start.marks);
-        if (!solution.has_vanished() && misses_marks(problem, guess.facts, *guess.u)) return {};
-        return guess;
+        if (solution.has_vanished() || !misses_marks(problem, guess.facts, *guess.u)) return guess;
+        solution.report.add({.remarks = {}, .seconds = guess.facts.report.seconds});
+        return {};
     } catch (const Error& error) {
         if (error.code() != Errc::InvalidInput) throw;
         problem.run.info(std::string("no guess as a replacement: ") + error.what());
