@@ -391,7 +391,7 @@ void contains(const std::string& message, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("the same marks are at the same place in the world in every format") {
+TEST_CASE("The same marks in every format have the same world positions") {
     const Scratch scratch;
     const ImageGeometry g = image();
     for (const File& file : all_formats()) {
@@ -409,7 +409,7 @@ TEST_CASE("the same marks are at the same place in the world in every format") {
     }
 }
 
-TEST_CASE("the options go before what a format says") {
+TEST_CASE("Reading options take precedence over the conventions of the format") {
     const Scratch scratch;
     const std::string path = scratch.write("a.mrk.json", markups({{1, 2, 3}}, "Fiducial", "RAS"));
     CHECK(read_points(path).points[0] == Vec3{-1, -2, 3});
@@ -432,7 +432,7 @@ TEST_CASE("the options go before what a format says") {
     CHECK_THROWS_AS(read_points(path, two), Error);
 }
 
-TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
+TEST_CASE("Line segments of ITK-SNAP are read as lines of two marks") {
     const Scratch scratch;
     const std::string head = "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n";
     const std::string begin = "<entry key=\"Point1\" value=\"1.5 2.5 3.5\" />\n",
@@ -445,7 +445,7 @@ TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
     contains(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
 }
 
-TEST_CASE("Fiji's areas, lines and points have their own lattice") {
+TEST_CASE("Fiji ROIs: areas are in pixel-corner coordinates, lines in pixel-centre coordinates") {
     const Scratch scratch;
     const auto read = [&](const RoiSpec& spec) { return read_points(scratch.write("one.roi", roi(spec))); };
     RoiSpec spec;
@@ -494,7 +494,7 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
     CHECK(composite.points[4] == Vec3{11.5, 11.5, 3});
 }
 
-TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its name; none is an error") {
+TEST_CASE("Fiji ROIs: the slice is the z of the hyperstack, else the position, else in the name, none is an error") {
     const Scratch scratch;
     RoiSpec spec = outline(kPolygon, 3);
     spec.position = 77;
@@ -515,7 +515,7 @@ TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its n
     contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
 }
 
-TEST_CASE("the types of Cell Counter are structures, and its slices may count channels") {
+TEST_CASE("Cell Counter: types are read as structures, and slices that count channels are converted") {
     const Scratch scratch;
     const std::string path = scratch.write("a.xml", cell_counter(kIndex));
     std::vector<StructurePoints> structures = read_structures_of_points(path, "type");
@@ -533,7 +533,7 @@ TEST_CASE("the types of Cell Counter are structures, and its slices may count ch
     CHECK(read_points(path, two).points[3][2] == 2);
 }
 
-TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
+TEST_CASE("Cell Counter: other XML files and incomplete ones are rejected with the reason") {
     const Scratch scratch;
     const std::string good = cell_counter(kIndex);
     const auto with = [&](const std::string& old, const std::string& other) {
@@ -558,7 +558,7 @@ TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
              "expected at least one point");
 }
 
-TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of cellfinder") {
+TEST_CASE("Cell Counter: line ends around numbers are accepted, and files of cellfinder count slices from 0") {
     const Scratch scratch;
     std::string text = cell_counter(kIndex);
     const auto set = [&](const std::string& old, const std::string& other) {
@@ -574,7 +574,7 @@ TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of
     contains(cloud.rule, "cellfinder (2 types), slices from 0");
 }
 
-TEST_CASE("markups give lines, their own names and nothing that is not placed") {
+TEST_CASE("3D Slicer markups: curves are read as named lines, planes are ignored, invalid files are rejected") {
     const Scratch scratch;
     const std::string text =
         R"({"markups": [
@@ -602,7 +602,7 @@ TEST_CASE("markups give lines, their own names and nothing that is not placed") 
              "a.json: not the JSON");
 }
 
-TEST_CASE("scans: invalid points are left out, compressed and newer files refused in words") {
+TEST_CASE("PCD and LAS: invalid points are omitted, compressed, newer and truncated files are rejected") {
     const Scratch scratch;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {
@@ -623,7 +623,7 @@ TEST_CASE("scans: invalid points are left out, compressed and newer files refuse
     contains(read_error(scratch, "a.pcd", "FIELDS x y z\nPOINTS 999999999999\nDATA binary\nabc"), "truncated");
 }
 
-TEST_CASE("archives that lie are refused before memory is taken") {
+TEST_CASE("ZIP archives of ROIs: false sizes, encryption and wrong checksums are rejected") {
     const Scratch scratch;
     contains(read_error(scratch, "a.zip", "PK nothing"), "expected a ZIP archive");
     contains(read_error(scratch, "a.zip", zip({{"a.txt", "text"}})), "expected Fiji ROIs in the archive, got none");
@@ -641,7 +641,7 @@ TEST_CASE("archives that lie are refused before memory is taken") {
     contains(read_error(scratch, "a.zip", broken), "does not match its checksum");
 }
 
-TEST_CASE("damaged files of every format end in an Error, never in a crash") {
+TEST_CASE("Damaged point files of every format never crash the reader") {
     const Scratch scratch;
     for (const File& file : all_formats()) {
         INFO(file.name);
