@@ -39,7 +39,7 @@ fi
 cmake --preset tsan --log-level=WARNING
 cmake --build --preset tsan --parallel "$jobs"
 # This test is left out because the sanitizer's pthread_once() waits forever after an exception in std::call_once().
-left_out='chunks: NaN is an error of who asks for its chunk'
+left_out='Chunks: NaN is an error at each access to its chunk'
 # Address randomization is switched off if possible: with many random bits, the sanitizer may find no free range of
 # addresses for its own memory.
 fixed=(setarch --addr-no-randomize)

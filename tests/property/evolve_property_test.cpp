@@ -61,7 +61,7 @@ TEST_CASE("min u0 <= u <= max u0 for every time step") {
 // Sums in another order may round a coefficient, which has 16 bits, to the next unit, which changes u by up to this.
 constexpr double kRounding = 4e-4;  // h
 
-TEST_CASE("evolve() is the dense reference on random fields") {
+TEST_CASE("evolve() equals the dense reference on random fields") {
     double worst = 0;
     for (std::uint32_t seed = 1; seed <= 8; ++seed) {
         Problem p = random_problem(seed, 15);
@@ -81,7 +81,7 @@ TEST_CASE("evolve() is the dense reference on random fields") {
     std::printf("evolve() and the dense reference on random fields: largest difference %.1e h\n", worst);
 }
 
-TEST_CASE("mirrored and axis-permuted fields give mirrored and permuted results") {
+TEST_CASE("Mirrored and axis-permuted fields give mirrored and permuted results") {
     const std::uint32_t seed = 7;
     const Problem p = random_problem(seed, 13);
     const DenseField expected = run_evolve(p, 3);
@@ -98,7 +98,7 @@ TEST_CASE("mirrored and axis-permuted fields give mirrored and permuted results"
     }
 }
 
-TEST_CASE("a shift by whole voxels shifts the result, wherever the leaves begin") {
+TEST_CASE("A shift by whole voxels shifts the result, wherever the leaves begin") {
     const std::uint32_t seed = 9;
     Problem p = random_problem(seed, 13);
     const DenseField expected = run_evolve(p, 3);
@@ -113,7 +113,7 @@ TEST_CASE("a shift by whole voxels shifts the result, wherever the leaves begin"
     }
 }
 
-TEST_CASE("evolve() in a band is the dense double-precision solver on the zero level set") {
+TEST_CASE("evolve() in a band has the zero level set of the dense double-precision solver") {
     // All options: points in part of a sphere, an edge elsewhere, a clamped start, frozen values outside the band.
     constexpr int n = 36;
     const Domain domain = cube_domain(n, kH, -7);

@@ -1,8 +1,8 @@
 """Any affine map from voxels to the world is a lattice: read from every format that can represent it, and written back.
 
     COVOL=build/bin/covol PYTHONPATH=build/python python3 -m pytest tests/property/lattice_test.py
-    COVOL_LATTICES=1000 ...            # so many instead of 30
-    COVOL_LATTICES=1000:250:500 ...    # of a thousand lattices those from 250 to 499
+    COVOL_LATTICES=1000 ...            # this many lattices instead of 30
+    COVOL_LATTICES=1000:250:500 ...    # lattices 250 to 499 of these
 
 Each lattice depends only on its number: spacings, rotation, order of axes, mirrors, shear, position, unit. Formats that store no
 shear, or no directions, get the nearest lattice that they can store. Files are written and read without covol by lattice_files.py.
@@ -76,7 +76,7 @@ MASKS = {
 }
 
 
-def held(lattice, hold):
+def stores_exactly(lattice, hold):
     """Whether a format that stores `hold` of a lattice stores all of it."""
     other = hold(lattice)
     return np.allclose(other.steps, lattice.steps, rtol=0, atol=1e-9 * lattice.spacing.max()) and \
@@ -162,12 +162,12 @@ class Trial:
         """A mask of the body on the lattice."""
         body = self.folder / "body.vdb"
         write_body(body, self.lattice)
-        able = [ending for ending, (_, hold) in MASKS.items() if held(lattice, hold) or self.rng.random() < 0.1]
-        ending = str(self.rng.choice(able))
+        endings = [ending for ending, (_, hold) in MASKS.items() if stores_exactly(lattice, hold) or self.rng.random() < 0.1]
+        ending = str(self.rng.choice(endings))
         read, hold = MASKS[ending]
         mask = self.folder / ("mask" + ending)
         done = subprocess.run([PROGRAM, "mask", body, "--like", self.path, "-o", mask], capture_output=True, text=True)
-        if not held(lattice, hold):
+        if not stores_exactly(lattice, hold):
             assert "covol: warning" in done.stderr or done.returncode == 3, done.stderr
             return "not held by " + ending
         if done.returncode == 3:
@@ -178,7 +178,7 @@ class Trial:
         moved = shift(written, lattice)
         if ending == ".nii.gz" and "single precision" in done.stderr:
             assert 0.005 < moved < 0.6, moved
-            return "told of as " + ending
+            return "warned of as " + ending
         assert moved < 0.01, (moved, done.stderr)
         levels = level(self.lattice.index(lattice.world(indices())))
         wrong = (data > 0) != (levels < 0)

@@ -15,7 +15,7 @@ namespace {
 
 constexpr unsigned kShapes = 200;
 
-void check_proper(const TriangleMesh& mesh, const MeshMeasures& expected) {
+void check_valid(const TriangleMesh& mesh, const MeshMeasures& expected) {
     const MeshMeasures m = measure(mesh);
     CHECK(m.closed);
     CHECK(m.manifold);
@@ -26,7 +26,7 @@ void check_proper(const TriangleMesh& mesh, const MeshMeasures& expected) {
 }
 
 /// The minimum of an angle, in degrees, for each kind of solid.
-class Worst {
+class MinimumAngles {
 public:
     void add(const std::string& kind, double value) {
         const auto [at, first] = minimum_.try_emplace(kind, value);
@@ -43,8 +43,8 @@ private:
 
 }  // namespace
 
-TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of the extraction and no slivers") {
-    Worst worst;
+TEST_CASE("200 random solids: relaxed meshes are valid, keep the topology, and have no slivers if resolved") {
+    MinimumAngles min_angles;
     double maximum = 0, mean = 0;
     for (unsigned seed = 0; seed < kShapes; ++seed) {
         const RandomSolid solid = random_solid(seed);
@@ -54,7 +54,7 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         REQUIRE(before.closed);
         const MeshDeviation deviation = measure_deviation(*solid.level_set, mesh);
         const RelaxReport report = relax_mesh(mesh, *solid.level_set);
-        check_proper(mesh, before);
+        check_valid(mesh, before);
         // Parts that are thinner than the lattice resolves have no space for triangles as large as voxels. The minimum
         // angle of such a solid may therefore be less than 20 degrees, but not less than before relaxation.
         if (solid.resolved)
@@ -62,17 +62,17 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         else
             CHECK(report.smallest_angle >= report.smallest_angle_before);
         CHECK(report.deviation.mean < deviation.mean + 0.02);
-        worst.add(solid.name, report.smallest_angle);
+        min_angles.add(solid.name, report.smallest_angle);
         maximum = std::max(maximum, report.deviation.max - deviation.max);
         mean = std::max(mean, report.deviation.mean);
     }
-    worst.print("relaxed, 1st percentile of the smallest angles");
+    min_angles.print("relaxed, 1st percentile of the smallest angles");
     std::printf("mean distance from the level set at most %.3f voxels; the largest grows by %.3f at most\n", mean,
                 maximum);
 }
 
-TEST_CASE("200 random solids: decimated meshes are proper and keep the topology") {
-    Worst worst;
+TEST_CASE("200 random solids: decimated meshes are valid and keep the topology") {
+    MinimumAngles min_angles;
     double change = 0;
     for (unsigned seed = 0; seed < kShapes; ++seed) {
         const RandomSolid solid = random_solid(seed);
@@ -86,19 +86,19 @@ TEST_CASE("200 random solids: decimated meshes are proper and keep the topology"
         options.target_edge = (seed % 2 == 0 ? 2 : 4) * h;
         options.repair = false;
         const CleanupReport report = clean_mesh(mesh, *solid.level_set, 0.0, options);
-        check_proper(mesh, before);
+        check_valid(mesh, before);
         CHECK(report.intersection_free);
         REQUIRE(report.decimation);
         CHECK(report.decimation->triangles < triangles);
-        if (solid.resolved) worst.add(solid.name, report.decimation->smallest_angle);
+        if (solid.resolved) min_angles.add(solid.name, report.decimation->smallest_angle);
         if (solid.resolved && seed % 2 == 0) change = std::max(change, report.decimation->change.mean / h);
     }
-    worst.print("decimated, 1st percentile of the smallest angles");
+    min_angles.print("decimated, 1st percentile of the smallest angles");
     std::printf("to two voxels: mean distance from the mesh before at most %.3f voxels\n", change);
 }
 
 TEST_CASE("40 random solids: adaptive triangles stay within the tolerance") {
-    Worst worst;
+    MinimumAngles min_angles;
     for (unsigned seed = 0; seed < 40; ++seed) {
         const RandomSolid solid = random_solid(seed);
         INFO("seed " << seed << ", " << solid.name);
@@ -110,14 +110,14 @@ TEST_CASE("40 random solids: adaptive triangles stay within the tolerance") {
         options.adaptive = 0.1 * h;
         options.repair = false;
         const CleanupReport report = clean_mesh(mesh, *solid.level_set, 0.0, options);
-        check_proper(mesh, before);
+        check_valid(mesh, before);
         CHECK(report.decimation->deviation.max < std::max(before_max, 0.1) + 1e-3);  // positions are rounded
-        if (solid.resolved) worst.add(solid.name, report.decimation->smallest_angle);
+        if (solid.resolved) min_angles.add(solid.name, report.decimation->smallest_angle);
     }
-    worst.print("adaptive, 1st percentile of the smallest angles");
+    min_angles.print("adaptive, 1st percentile of the smallest angles");
 }
 
-TEST_CASE("relaxed and decimated meshes do not depend on the number of threads") {
+TEST_CASE("Relaxed and decimated meshes do not depend on the number of threads") {
     for (const unsigned seed : {0U, 4U, 5U, 8U}) {
         const RandomSolid solid = random_solid(seed);
         std::vector<TriangleMesh> meshes;

@@ -22,7 +22,7 @@ struct RealCloud {
 
 }  // namespace
 
-TEST_CASE("D is chosen so that real scans are closed") {
+TEST_CASE("The tag distance of real scans lies in the expected range, and the tagged interior does not leak") {
     const char* data = std::getenv("COVOL_DATA");
     if (!data) {
         std::cout << "SKIPPED: COVOL_DATA does not name the folder of test data\n";
@@ -52,7 +52,7 @@ TEST_CASE("D is chosen so that real scans are closed") {
     }
 }
 
-TEST_CASE("a cloud without an inside says so") {
+TEST_CASE("The tag distance of an open cloud is chosen with the reason that there is no closed structure") {
     const char* data = std::getenv("COVOL_DATA");
     if (!data) {
         std::cout << "SKIPPED: COVOL_DATA does not name the folder of test data\n";

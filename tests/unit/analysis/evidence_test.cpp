@@ -61,7 +61,7 @@ const double kAngle = 2 * std::asin(kReach / (2 * kR));
 
 }  // namespace
 
-TEST_CASE("A half without marks is unsupported, but for the rim that the marks reach") {
+TEST_CASE("A hemisphere without marks is unsupported except for the rim within reach of the marks") {
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 0});
     CHECK(e.area == Approx(4 * M_PI * kR * kR).epsilon(0.01));
@@ -78,7 +78,7 @@ TEST_CASE("A half without marks is unsupported, but for the rim that the marks r
     }
 }
 
-TEST_CASE("Each slice tells of its own zone of the sphere") {
+TEST_CASE("Each slice reports area, marks and support of its own zone of the sphere") {
     const Evidence e = assess_evidence(extract_mesh(*sphere()), lower_half(0.5), slices(), {kReach, 0.25, 0});
     int last = -1;
     double area = 0;
@@ -110,7 +110,7 @@ TEST_CASE("Each slice tells of its own zone of the sphere") {
     CHECK(marks == int(lower_half().size()));
 }
 
-TEST_CASE("Strong edges support what marks do not") {
+TEST_CASE("Strong image edges support the surface that no marks reach") {
     const TriangleMesh mesh = extract_mesh(*sphere());
     const FloatGridPtr all = edges([](const openvdb::Vec3d&) { return true; });
     const Evidence supported = assess_evidence(mesh, lower_half(), *all, slices(), {kReach, 0.25, 5});
@@ -125,7 +125,7 @@ TEST_CASE("Strong edges support what marks do not") {
     CHECK(e.suggestions[0].world[0] < 0);
 }
 
-TEST_CASE("The suggested outline is the one that reaches the most bare surface") {
+TEST_CASE("The suggested outlines cover the largest unsupported area first and together all of it") {
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 20});
     REQUIRE(e.suggestions.size() >= 2);
@@ -149,7 +149,7 @@ TEST_CASE("The suggested outline is the one that reaches the most bare surface")
     CHECK(e.suggestions.size() < 10);
 }
 
-TEST_CASE("Without marks all is bare, and the same bits come from any number of threads") {
+TEST_CASE("Without marks the whole surface is unsupported, and threads do not change the suggestions") {
     const TriangleMesh mesh = extract_mesh(*sphere());
     const Evidence e = assess_evidence(mesh, {}, slices(), {kReach, 0.25, 3});
     CHECK(e.unsupported_area == e.area);
@@ -164,7 +164,7 @@ TEST_CASE("Without marks all is bare, and the same bits come from any number of 
     }
 }
 
-TEST_CASE("assess_evidence() says what is wrong with its input") {
+TEST_CASE("assess_evidence() rejects an empty mesh and names options that are out of range") {
     CHECK_THROWS_AS(assess_evidence({}, {}, slices(), {kReach, 0.25, 0}), Error);
     const TriangleMesh mesh = extract_mesh(*sphere());
     CHECK_THROWS_WITH(assess_evidence(mesh, {}, slices(), {0, 0.25, 0}), Catch::Contains("reach"));

@@ -32,7 +32,7 @@ FloatGridPtr sphere(double radius, const openvdb::Vec3f& center, double voxel) {
 
 }  // namespace
 
-TEST_CASE("Mean and standard deviation are those of the voxels inside") {
+TEST_CASE("Intensity mean and standard deviation are those of the voxels inside the surface") {
     openvdb::initialize();
     const Image image = ramp(0.5);
     const IntensityStatistics found = measure_intensity(image, *sphere(5, {10, 10, 10}, 0.25));
@@ -43,7 +43,7 @@ TEST_CASE("Mean and standard deviation are those of the voxels inside") {
     CHECK(count_voxels_around(image, *sphere(5, {10, 10, 10}, 0.25)) >= 20 * 20 * 20);
 }
 
-TEST_CASE("A surface that the image cuts has the voxels that there are, one beside it none") {
+TEST_CASE("Only voxels within the image are measured, none for a surface outside of the image") {
     openvdb::initialize();
     const Image image = ramp(1);
     const IntensityStatistics half = measure_intensity(image, *sphere(8, {-0.5, 20, 20}, 0.5));

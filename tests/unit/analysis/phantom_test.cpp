@@ -41,7 +41,7 @@ double norm(const Vec3& p) { return std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] *
 
 }  // namespace
 
-TEST_CASE("solids have the volume of their formula, in the labels and, with partial voxels, in the image") {
+TEST_CASE("Phantoms have the analytic volume, in the labels to 6 % and with partial voxels in the image to 1 %") {
     const auto [kind, volume] = GENERATE(table<std::string, double>({
         {"sphere", 4.0 / 3 * kPi * 0.8 * 0.8 * 0.8},
         {"torus", 2 * kPi * kPi * 0.75 * 0.3 * 0.3},
@@ -56,7 +56,7 @@ TEST_CASE("solids have the volume of their formula, in the labels and, with part
     CHECK(bright_volume(phantom) == Approx(volume).epsilon(0.01));
 }
 
-TEST_CASE("points lie on the surface that the labels bound") {
+TEST_CASE("Phantom points lie within two voxels of the boundary of the labels") {
     const std::string kind = GENERATE(from_range(list_phantom_kinds()));
     const Phantom phantom = make_phantom(options_of(kind));
     INFO(kind);
@@ -76,7 +76,7 @@ TEST_CASE("points lie on the surface that the labels bound") {
     }
 }
 
-TEST_CASE("points cover a solid's surface evenly") {
+TEST_CASE("Phantom points are distributed uniformly by area over sphere, torus and box") {
     // The mean of a function over points that are uniform by area equals its mean over the surface: |z| on a sphere has
     // the mean r/2, z^2 on a torus with a tube of radius r has the mean r^2/2. The mean of x^2 on the box is the
     // area-weighted mean over its faces.
@@ -99,7 +99,7 @@ TEST_CASE("points cover a solid's surface evenly") {
           Approx((x_faces * 0.81 + others * 0.27) / (x_faces + others)).margin(0.01));
 }
 
-TEST_CASE("the spheres with holes are a thin shell, and the points lie in its holes") {
+TEST_CASE("Spheres with holes: a shell with holes at the poles of all axes, and points on the sphere") {
     const double radius = std::sqrt(3.0) / 2;
     const std::string kind = GENERATE("sphere-round", "sphere-square", "sphere-slit");
     const Phantom phantom = make_phantom(options_of(kind, 104, 500));
@@ -130,7 +130,7 @@ TEST_CASE("the spheres with holes are a thin shell, and the points lie in its ho
     CHECK(value_at({0, 0, 0}) == 0);
 }
 
-TEST_CASE("the seed decides the points and the noise") {
+TEST_CASE("Phantoms: the seed determines the points and the noise, which has the given standard deviation") {
     PhantomOptions options = options_of("sphere", 32, 50);
     options.noise = 0.1;
     const Phantom a = make_phantom(options), b = make_phantom(options);
@@ -159,7 +159,7 @@ TEST_CASE("the seed decides the points and the noise") {
     CHECK(same < count / 20);
 }
 
-TEST_CASE("unusable phantom options are named") {
+TEST_CASE("Phantom options that are out of range are rejected") {
     PhantomOptions options;
     CHECK(why_invalid(options).empty());
     options.kind = "cube";
@@ -177,7 +177,7 @@ TEST_CASE("unusable phantom options are named") {
     CHECK_THROWS_AS(make_phantom(options), Error);
 }
 
-TEST_CASE("the spheres with holes equal the stored phantoms", "[data]") {
+TEST_CASE("The spheres with holes equal the stored phantoms", "[data]") {
     const char* folder = std::getenv("COVOL_DATA");
     if (folder == nullptr) {
         WARN("SKIPPED: COVOL_DATA is not set");

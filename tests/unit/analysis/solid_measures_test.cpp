@@ -37,7 +37,7 @@ FloatGridPtr ellipsoid(const openvdb::Vec3d& center, const openvdb::Vec3d& half,
 
 }  // namespace
 
-TEST_CASE("Centroid and extents are those of the body, far finer than a voxel") {
+TEST_CASE("Centroid and bounding box of an ellipsoid are accurate to 0.05 voxels") {
     openvdb::initialize();
     const openvdb::Vec3d center(1.23, -4.56, 7.89), half(2.1, 3.2, 4.3);
     const SolidMeasures found = measure_solid(*ellipsoid(center, half, 0.1));
@@ -51,7 +51,7 @@ TEST_CASE("Centroid and extents are those of the body, far finer than a voxel") 
     }
 }
 
-TEST_CASE("The inside counts where it is tiles, and far from 0") {
+TEST_CASE("Interior tiles count, and solids far from the origin are measured accurately") {
     openvdb::initialize();
     const openvdb::Vec3d center(1e5, 2e5, -3e5);
     const auto ball = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(40, openvdb::Vec3f(0, 0, 0), 1);
@@ -64,7 +64,7 @@ TEST_CASE("The inside counts where it is tiles, and far from 0") {
     CHECK(found.box.max[0] - found.box.min[0] == Approx(80).margin(0.02));
 }
 
-TEST_CASE("Measures of a solid are the same bits on any number of threads, and nothing has none") {
+TEST_CASE("The centroid is bit-identical on 1 and 8 threads, and an empty level set is rejected") {
     openvdb::initialize();
     const FloatGridPtr body = ellipsoid({1, 2, 3}, {2, 3, 4}, 0.2);
     RunContext one, eight;

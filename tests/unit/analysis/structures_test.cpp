@@ -71,7 +71,7 @@ void check_vertices(const FloatGrid& surface, const Ball& mine, const Ball& othe
 
 }  // namespace
 
-TEST_CASE("Overlapping balls of one size part at the plane between them") {
+TEST_CASE("Overlapping balls of equal size are separated at the plane midway between them") {
     const Ball a{{-3, 0, 0}, 5}, b{{3, 0, 0}, 5};
     const auto [surfaces, report] = separate({{"a", ball(a)}, {"b", ball(b)}});
     REQUIRE(report.overlaps.size() == 1);
@@ -84,7 +84,7 @@ TEST_CASE("Overlapping balls of one size part at the plane between them") {
     check_vertices(*surfaces[1], b, a);
 }
 
-TEST_CASE("A deep overlap parts in its middle too") {
+TEST_CASE("An overlap thicker than the narrow bands is separated midway, too") {
     // The overlap of the balls is 14 units (28 voxels) thick, far more than the width of the narrow bands.
     const Ball a{{-3, 0, 0}, 10}, b{{3, 0.4, 0}, 10};
     const auto [surfaces, report] = separate({{"a", ball(a)}, {"b", ball(b)}});
@@ -94,7 +94,7 @@ TEST_CASE("A deep overlap parts in its middle too") {
     CHECK(volume(*surfaces[0]) == Approx(volume(*ball(a)) - cap_volume(10, 10 - std::hypot(3, 0.2))).epsilon(0.005));
 }
 
-TEST_CASE("Balls of different sizes part at the hyperboloid between them") {
+TEST_CASE("Overlapping balls of different sizes are separated at the hyperboloid between them") {
     const Ball a{{-2, 0.3, 0}, 6}, b{{4, 0, 0.2}, 3};
     const auto [surfaces, report] = separate({{"a", ball(a)}, {"b", ball(b)}});
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
@@ -102,7 +102,7 @@ TEST_CASE("Balls of different sizes part at the hyperboloid between them") {
     check_vertices(*surfaces[1], b, a);
 }
 
-TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays") {
+TEST_CASE("A gap narrower than a voxel is closed midway, a gap of 1.5 voxels is kept") {
     const Ball a{{-5, 0, 0}, 5};
     for (const double gap : {0.0, 0.3 * kH, 0.9 * kH}) {
         CAPTURE(gap);
@@ -130,7 +130,7 @@ TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays")
     CHECK(surfaces[1] == sb);
 }
 
-TEST_CASE("Walls beside each other close no more than the gap between them") {
+TEST_CASE("Closing a narrow slit between two slabs fills the slit only") {
     // Two slabs with a slit of 0.6 voxel between them. Both end at z = 4, and the filling of the slit may not extend
     // above.
     const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-6, -6, -6}, {0, 6, 4}}));
@@ -148,7 +148,7 @@ TEST_CASE("Walls beside each other close no more than the gap between them") {
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
 }
 
-TEST_CASE("Three balls part along a triple line, in any order, with the same bits") {
+TEST_CASE("Three balls are separated along a triple line, bit-identically in any order and on any threads") {
     std::vector<Structure> structures;
     std::vector<Ball> balls;
     for (int n = 0; n < 3; ++n) {
@@ -190,7 +190,7 @@ TEST_CASE("Three balls part along a triple line, in any order, with the same bit
     }
 }
 
-TEST_CASE("A solid inside another is carved out of it, whatever the order") {
+TEST_CASE("An enclosed solid is subtracted from the enclosing one, whatever their order") {
     const Ball outer{{0, 0, 0}, 9}, inner{{2, 0, 0}, 4}, core{{2, 0, 0}, 1.6};
     const double whole = volume(*ball(outer)), middle = volume(*ball(inner)), minimum = volume(*ball(core));
     const auto [surfaces, report] = separate({{"outer", ball(outer)}, {"inner", ball(inner)}, {"core", ball(core)}});
@@ -206,7 +206,7 @@ TEST_CASE("A solid inside another is carved out of it, whatever the order") {
     CHECK(same_bits(*turned.surfaces[2], *surfaces[1]));
 }
 
-TEST_CASE("A solid in another's cavity stays, and the slit between them closes") {
+TEST_CASE("A solid in another's cavity is no overlap, and the slit between them is closed midway") {
     // A shell with a cavity of radius 5, and in it a ball whose radius is 0.4 voxel smaller than that of the cavity.
     FloatGridPtr shell = separate({{"shell", ball({{0, 0, 0}, 8})}, {"hole", ball({{0, 0, 0}, 5})}}).surfaces[0];
     const double r = 5 - 0.4 * kH;
@@ -218,7 +218,7 @@ TEST_CASE("A solid in another's cavity stays, and the slit between them closes")
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
 }
 
-TEST_CASE("separate() says what is wrong with its input") {
+TEST_CASE("separate() rejects missing, repeated or incompatible surfaces and options out of range") {
     const FloatGridPtr a = ball({{0, 0, 0}, 4});
     CHECK_THROWS_AS(separate({}), Error);
     CHECK_THROWS_WITH(separate({{"a", a}, {"a", a}}), Catch::Contains("unique names"));
@@ -232,7 +232,7 @@ TEST_CASE("separate() says what is wrong with its input") {
     CHECK(separate({{"a", a}}).surfaces[0] == a);
 }
 
-TEST_CASE("Labels leave no voxel to two structures, and none out where they touch") {
+TEST_CASE("Touching structures are labelled without gaps, and ties go to the alphabetically first name") {
     // The plane halfway between the overlapping ends of the two solids, x = 0.1, contains voxel centres. They have the
     // same distance to both solids, so all of them are ties.
     const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
@@ -257,7 +257,7 @@ TEST_CASE("Labels leave no voxel to two structures, and none out where they touc
             }
 }
 
-TEST_CASE("A label image in boxes is the one that is made at once") {
+TEST_CASE("A label image computed box by box equals the one computed at once") {
     const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
     const FloatGridPtr b = extract_surface(*start_from_box(space(), {{-0.4, -4, -4}, {6.1, 4, 4}}));
     const FloatGridPtr c = ball({{0, 7, 5}, 3.3});
@@ -314,13 +314,13 @@ TEST_CASE("A label image in boxes is the one that is made at once") {
     }
 }
 
-TEST_CASE("Names become identifiers") {
+TEST_CASE("Grid names are unique identifiers made from the structures' names") {
     CHECK(make_grid_names({"anything at all"}) == std::vector<std::string>{"surface"});
     CHECK(make_grid_names({"ve", "left lung", "left-lung", "2nd", "é"}) ==
           std::vector<std::string>{"ve", "left_lung", "left_lung_2", "_2nd", "__"});
 }
 
-TEST_CASE("Segment metadata names labels, colours and extents") {
+TEST_CASE("Segment metadata contain names, labels, colours and extents") {
     const auto fields = make_slicer_segments({"ve", "ex e"}, {{{1, 0, 0}, {2, 1, 1}}, {}});
     const auto at = [&](const std::string& key) {
         for (const auto& [name, value] : fields)

@@ -9,14 +9,14 @@
 
 using namespace covol;
 
-TEST_CASE("a box of whole voxels is matched exactly") {
+TEST_CASE("make_domain: a box of whole voxels is matched exactly") {
     const Domain d = make_domain({{-1.3, -1.3, -1.3}, {1.3, 1.3, 1.3}}, 0.01);
     CHECK(d.max == Index3{259, 259, 259});
     CHECK(d.origin[0] == Approx(-1.295));
     CHECK(d.world_box().max[2] == Approx(1.3));
 }
 
-TEST_CASE("any other box is covered and centred") {
+TEST_CASE("make_domain: any other box is covered by a domain with the same centre") {
     const Domain d = make_domain({{0, 0, 0}, {1.0, 2.05, 3.0}}, 0.5);
     CHECK(d.max == Index3{1, 4, 5});
     CHECK(d.world_box().min[1] == Approx(-0.225));
@@ -24,14 +24,14 @@ TEST_CASE("any other box is covered and centred") {
     CHECK(d.voxel_count() == 2 * 5 * 6);
 }
 
-TEST_CASE("a domain survives on a grid") {
+TEST_CASE("domain_of: a domain is recovered from the grid that was made for it") {
     const Domain d = make_domain({{5, -2, 1}, {9, 3, 4}}, 0.25);
     const FloatGridPtr grid = make_grid(d, 1.0F, "u");
     CHECK(domain_of(*grid) == d);
     CHECK(grid->transform().indexToWorld(openvdb::Vec3d(2, 0, 0))[0] == Approx(d.index_to_world({2, 0, 0})[0]));
 }
 
-TEST_CASE("unusable boxes and transforms are refused") {
+TEST_CASE("Empty boxes, unsuitable voxel sizes and anisotropic transforms are rejected") {
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 0}}, 0.1), Error);
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 1}}, 0.0), Error);
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e-11, 1e-11, 1e-11}}, 1e-12),
@@ -44,7 +44,7 @@ TEST_CASE("unusable boxes and transforms are refused") {
     CHECK_THROWS_AS(domain_of(*grid), Error);
 }
 
-TEST_CASE("parts of a domain lie on its lattice") {
+TEST_CASE("covering: a part of a domain lies on its lattice, and empty or distant boxes are rejected") {
     const Domain whole = make_domain({{0, 0, 0}, {10, 10.3, 11}}, 0.5);
     CHECK(covering(whole, whole.world_box()) == whole);
     CHECK(covering(whole, {{0, 0, 0}, {10, 10.3, 11}}) == whole);
@@ -60,7 +60,7 @@ TEST_CASE("parts of a domain lie on its lattice") {
     CHECK_THROWS_AS(covering(whole, {{1e7, 0, 0}, {1e7 + 1, 1, 1}}), Error);
 }
 
-TEST_CASE("the lattice does not depend on the part that is asked for") {
+TEST_CASE("choose_domain: the lattice does not depend on the requested part") {
     const WorldBox image{{0, 0, 0}, {10, 10.3, 11}}, part{{2, 3, 4}, {5, 6, 7}}, other{{1.7, 8, 0}, {9, 9.1, 3}};
     CHECK(choose_domain(image, 0.5, image, {}) == make_domain(image, 0.5));
     CHECK(choose_domain(part, 0.5, image, {}).origin == make_domain(image, 0.5).origin);
@@ -76,7 +76,7 @@ TEST_CASE("the lattice does not depend on the part that is asked for") {
     CHECK(a.world_box().min[0] <= 4e6);
 }
 
-TEST_CASE("a grid whose voxels no band can hold is refused") {
+TEST_CASE("domain_of: grids with indices or transforms out of range are rejected") {
     const Domain good = make_domain({{0, 0, 0}, {4, 4, 4}}, 1.0);
     const auto with = [&](openvdb::Vec3i min, openvdb::Vec3i max) {
         FloatGridPtr grid = make_grid(good, 1.0F, "u");

@@ -67,7 +67,7 @@ fs::path scratch_in(const fs::path& folder) {
 
 }  // namespace
 
-TEST_CASE("file_set: files come together, and nothing else stays") {
+TEST_CASE("file_set: publish() puts all files in place together and leaves no scratch files") {
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old a");
@@ -88,7 +88,7 @@ TEST_CASE("file_set: files come together, and nothing else stays") {
     CHECK(std::distance(fs::directory_iterator(root / "other"), fs::directory_iterator()) == 1);
 }
 
-TEST_CASE("file_set: without publish() all is as before") {
+TEST_CASE("file_set: without publish() existing files stay and nothing else is left") {
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old a");
@@ -111,19 +111,19 @@ TEST_CASE("file_set: without publish() all is as before") {
     CHECK(folder.file_count() == 1);
 }
 
-TEST_CASE("file_set: people see the paths that they gave") {
+TEST_CASE("file_set: messages show the requested paths instead of scratch paths") {
     const Scratch folder;
     FileSet set;
-    std::string cleaned;
+    std::string shown;
     set.write(folder.path("a"), [&](const std::string& to) {
-        cleaned = set.shown(to + ": odd, " + to);
+        shown = set.shown(to + ": odd, " + to);
         std::ofstream(to) << "a";
     });
-    CHECK(cleaned == folder.path("a") + ": odd, " + folder.path("a"));
+    CHECK(shown == folder.path("a") + ": odd, " + folder.path("a"));
     CHECK(set.shown("nothing of it") == "nothing of it");
 }
 
-TEST_CASE("file_set: where publish() fails half way, what was there is put back") {
+TEST_CASE("file_set: if publish() fails midway, the previous files are restored") {
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old a");
@@ -138,7 +138,7 @@ TEST_CASE("file_set: where publish() fails half way, what was there is put back"
     CHECK_FALSE(fs::exists(folder.path("b")));
 }
 
-TEST_CASE("file_set: folders are replaced, and never by files") {
+TEST_CASE("file_set: a folder is replaced by a folder, and never by a file") {
     const Scratch folder;
     const fs::path root = folder.path("");
     fs::create_directory(root / "s.zarr");
@@ -155,7 +155,7 @@ TEST_CASE("file_set: folders are replaced, and never by files") {
     CHECK_FALSE(fs::exists(folder.path("s.zarr/old")));
 }
 
-TEST_CASE("file_set: the next run clears after one that was killed, and leaves those that live") {
+TEST_CASE("file_set: the next run removes scratch folders of killed runs and keeps those of running ones") {
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old a");
@@ -172,7 +172,7 @@ TEST_CASE("file_set: the next run clears after one that was killed, and leaves t
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 
-TEST_CASE("file_set: a process that ends without unwinding can remove its folders") {
+TEST_CASE("file_set: remove_all() removes the scratch folders of a process that ends without unwinding") {
     const Scratch folder;
     folder.write("a", "old a");
     FileSet set;
@@ -183,14 +183,14 @@ TEST_CASE("file_set: a process that ends without unwinding can remove its folder
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 
-TEST_CASE("file_set: a set in two folders that is killed at any call is old or new in both, whichever is met next") {
+TEST_CASE("file_set: if publish() is killed at any call, recovery leaves both folders either old or new") {
     const Scratch folder;
     const std::vector<std::string> names{"one/a", "two/b", "one/c", "two/fresh"};
-    int news = 0, olds = 0;
-    for (const std::string met : {"one", "two"}) {
+    int new_count = 0, old_count = 0;
+    for (const std::string recovered : {"one", "two"}) {
         bool killed = true;
         for (long call = 1; killed; ++call) {
-            INFO("killed before call " << call << ", then a run in " << met);
+            INFO("killed before call " << call << ", then a run in " << recovered);
             REQUIRE(call < 500);
             for (const char* name : {"one", "two"}) {
                 fs::remove_all(folder.path(name));
@@ -207,7 +207,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                 set.publish();
                 kill_before(0);
             });
-            { const ScratchFolder next(folder.path(met)); }
+            { const ScratchFolder next(folder.path(recovered)); }
             const std::string state = bytes_of(folder.path(names[0]));
             CHECK((state == "old" || state == "new"));
             for (const std::string& name : names) {
@@ -217,7 +217,7 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                 else
                     CHECK(bytes_of(folder.path(name)) == state);
             }
-            (state == "new" ? news : olds) += 1;
+            (state == "new" ? new_count : old_count) += 1;
             // The next run in each folder removes the scratch folder that is left there, and changes no other file.
             for (const char* name : {"one", "two"}) {
                 { const ScratchFolder clears(folder.path(name)); }
@@ -227,13 +227,13 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
                 CHECK((bytes_of(folder.path(name)) == state) == fs::exists(folder.path(name)));
         }
     }
-    // The set was killed at several calls before it was committed (`olds`), and at several calls during the renames and
-    // while clearing up (`news`).
-    CHECK(olds > 2 * 5);
-    CHECK(news > 2 * 5);
+    // The set was killed at several calls before it was committed (`old_count`), and at several calls during the
+    // renames and while clearing up (`new_count`).
+    CHECK(old_count > 2 * 5);
+    CHECK(new_count > 2 * 5);
 }
 
-TEST_CASE("file_set: a recovery that is killed itself goes on") {
+TEST_CASE("file_set: a recovery that is killed is completed by the next run") {
     const Scratch folder;
     const std::vector<std::string> names{"one/a", "two/b", "one/c"};
     long last = 0;
@@ -264,11 +264,11 @@ TEST_CASE("file_set: a recovery that is killed itself goes on") {
     CHECK(last > 20);
 }
 
-TEST_CASE("file_set: of a set that is completed, what was put there since stays") {
+TEST_CASE("file_set: completing a committed set keeps a file that was replaced since by another program") {
     const Scratch folder;
     const fs::path root = folder.path("");
-    bool met = false;
-    for (long call = 1; call < 100 && !met; ++call) {
+    bool is_committed = false;
+    for (long call = 1; call < 100 && !is_committed; ++call) {
         for (const char* name : {"a", "b", "c"}) folder.write(name, "old");
         is_killed([&] {
             FileSet set;
@@ -280,7 +280,7 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
             const ScratchFolder clears(root);
             continue;
         }
-        met = true;
+        is_committed = true;
         folder.write("c", "another's");
         // Another file than the set's, with an older time of modification, as for example a copy has it.
         fs::last_write_time(root / "c", fs::file_time_type::clock::now() - std::chrono::hours(1));
@@ -289,10 +289,10 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
         CHECK(bytes_of(folder.path("c")) == "another's");
         CHECK(folder.file_count() == 3);
     }
-    CHECK(met);
+    CHECK(is_committed);
 }
 
-TEST_CASE("file_set: only what covol made is cleared") {
+TEST_CASE("file_set: only files and folders that covol made are removed") {
     const Scratch folder;
     const fs::path root = folder.path("");
     // A user's folders whose names resemble those of covol's scratch folders, and copies of a folder that covol left
@@ -335,7 +335,7 @@ TEST_CASE("file_set: only what covol made is cleared") {
     CHECK_FALSE(fs::exists(left / "a"));
 }
 
-TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
+TEST_CASE("file_set: a manifest that was copied to another folder moves no files") {
     const Scratch folder;
     for (const char* name : {"one", "two"}) {
         fs::create_directory(folder.path(name));
@@ -363,24 +363,24 @@ TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
     CHECK(fs::exists(moved));
 }
 
-TEST_CASE("file_set: a lock of another program is waited for, and told; then it is an error, or cancelled") {
+TEST_CASE("file_set: waiting for a locked folder is logged, ends with an error, and can be cancelled") {
     const Scratch folder;
     const fs::path root = folder.path("");
     folder.write("a", "old");
     const int held = ::open(root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     REQUIRE(::flock(held, LOCK_EX) == 0);
-    std::vector<std::string> cleaned;
+    std::vector<std::string> messages;
     std::atomic<bool> cancel = false;
     RunContext run;
     run.cancel = &cancel;
     run.log = [&](LogLevel level, const std::string& line) {
         CHECK(level == LogLevel::Info);
-        cleaned.push_back(line);
+        messages.push_back(line);
     };
     const std::string why = message_of([&] { detail::FolderLock(root, run, std::chrono::milliseconds(1200)); });
     CHECK(why.find("has held a lock (flock) on this folder for 1 s") != std::string::npos);
-    REQUIRE(cleaned.size() == 1);
-    CHECK(cleaned.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
+    REQUIRE(messages.size() == 1);
+    CHECK(messages.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
     run.log = [&](LogLevel, const std::string&) { cancel = true; };
     CHECK(code_of([&] { wait_for_folder(root, run); }) == Errc::Cancelled);
     cancel = false;
@@ -394,7 +394,7 @@ TEST_CASE("file_set: a lock of another program is waited for, and told; then it 
     ::close(held);
 }
 
-TEST_CASE("file_set: one folder by two names is one folder") {
+TEST_CASE("file_set: files written under two names of one folder are all published") {
     const Scratch folder;
     fs::create_directory(folder.path("one"));
     fs::create_directory_symlink(folder.path("one"), folder.path("also"));
@@ -406,7 +406,7 @@ TEST_CASE("file_set: one folder by two names is one folder") {
     CHECK(bytes_of(folder.path("one/b")) == "new b");
 }
 
-TEST_CASE("place_of_output: as the system does it") {
+TEST_CASE("place_of_output: links are resolved as by the system, and missing folders and link cycles are errors") {
     const Scratch folder;
     const fs::path root = fs::canonical(folder.path(""));
     fs::create_directories(root / "deep/inner");
@@ -430,7 +430,7 @@ TEST_CASE("place_of_output: as the system does it") {
     CHECK(message_of([&] { place("no/q"); }).find("does not exist") != std::string::npos);
 }
 
-TEST_CASE("file_set, write_text_file: a link stays, and what it points to is replaced; permissions stay") {
+TEST_CASE("file_set, write_text_file: a link is kept and its target replaced, and permissions are kept") {
     const Scratch folder;
     const fs::path root = folder.path("");
     const auto mode_of = [&](const std::string& name) {
@@ -485,7 +485,7 @@ TEST_CASE("file_set, write_text_file: a link stays, and what it points to is rep
     }
 }
 
-TEST_CASE("write_text_file: whole, with the permissions of any new file") {
+TEST_CASE("write_text_file: a new file has the default permissions, and an error leaves no file") {
     const Scratch folder;
     const fs::path root = folder.path("");
     write_text_file(folder.path("t"), "text");

@@ -17,7 +17,7 @@ std::string in_form(const std::string& message) {
 
 }  // namespace
 
-TEST_CASE("options that a message names are found, with their values, and replaced") {
+TEST_CASE("replace_names: option names between backquotes are replaced together with their values") {
     CHECK(in_form("use a larger `voxel_size`, or `roi`") == "use a larger [voxel_size], or [roi]");
     CHECK(in_form("; `points_space = index, points_order = zyx` would") ==
           "; [points_space: index] [points_order: zyx] would");
@@ -26,7 +26,7 @@ TEST_CASE("options that a message names are found, with their values, and replac
           "[max_steps: 0] [tag_distance: 1.5e-3] or [delta]");
 }
 
-TEST_CASE("other text between backquotes stays as it is") {
+TEST_CASE("replace_names: other text between backquotes is unchanged") {
     for (const char* text :
          {"", "no option", "what `covol band` wrote", "`Roi`", "``", "`", "a `b", "`x = `` y", "cells`7.tif: `z9`"})
         CHECK(in_form(text) == text);
@@ -34,7 +34,7 @@ TEST_CASE("other text between backquotes stays as it is") {
           "its name has a ` in it; choose a part with [roi]");
 }
 
-TEST_CASE("an error carries the option that would help, however it is copied") {
+TEST_CASE("Error: a copy keeps the option to change, and an option in the text alone does not count") {
     const Error error(Errc::InvalidInput, "segment: the surface vanished; lower `delta`, or give a `tag_distance`",
                       "delta");
     const Error copy = error;  // NOLINT: the copy is under test

@@ -41,7 +41,7 @@ inline constexpr auto covol::kOptions<DummyOptions> =
                Rule<DummyOptions>{"kind", "two with places",
                                   [](const DummyOptions& o) { return o.places.empty() || o.kind == Dummy::Two; }}};
 
-TEST_CASE("options are visited in the order of their tables, those of parts with them") {
+TEST_CASE("for_each_option: options are visited in the order of the tables, including those of parts") {
     DummyOptions options;
     std::string names;
     for_each_option(options, [&](const OptionInfo& option, auto& value) {
@@ -53,7 +53,7 @@ TEST_CASE("options are visited in the order of their tables, those of parts with
     CHECK(std::string(to_string(Dummy::Two)) == "two");
 }
 
-TEST_CASE("a table says what is wrong with each field, and a rule what is wrong with several") {
+TEST_CASE("why_invalid: tables report each invalid field, and rules report invalid combinations") {
     DummyOptions options;
     CHECK(why_invalid(options).empty());
     options.dummy = -1;
@@ -75,7 +75,7 @@ TEST_CASE("a table says what is wrong with each field, and a rule what is wrong 
     CHECK(why_invalid(options).find("kind: expected") == 0);
 }
 
-TEST_CASE("ranges say what they hold") {
+TEST_CASE("Ranges are described as text, include closed ends, and exclude values that are not finite") {
     CHECK(kPositive.text() == "> 0");
     CHECK(kNotNegative.text() == ">= 0");
     CHECK(kFraction.text() == "0 to 1");
@@ -86,13 +86,13 @@ TEST_CASE("ranges say what they hold") {
     for (const double bad : {std::nan(""), double(INFINITY), -double(INFINITY)}) CHECK_FALSE(Range{}.holds(bad));
 }
 
-TEMPLATE_TEST_CASE("each struct of options can say what is wrong with it, and starts without fault", "", ExtractOptions,
+TEMPLATE_TEST_CASE("why_invalid: the default values of each struct of options are valid", "", ExtractOptions,
                    HolesOptions, ReadImageOptions, WriteMeshOptions, WriteVdbOptions, WriteImageOptions, PaintedOptions,
                    ReadPointsOptions, EdgeOptions, EvolveOptions, SegmentOptions, BrickOptions, CloudCleanupOptions) {
     CHECK(why_invalid(TestType{}).empty());
 }
 
-TEST_CASE("options without a check of their own so far are refused") {
+TEST_CASE("why_invalid: options of files, images, holes, extraction and edges that are out of range are named") {
     HolesOptions holes;
     holes.distance = 0;
     CHECK(why_invalid(holes) == "hole_distance: expected > 0, got 0");

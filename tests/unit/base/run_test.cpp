@@ -28,7 +28,7 @@ struct FlagOff {
 
 }  // namespace
 
-TEST_CASE("with_threads bounds the loops inside it and nothing else") {
+TEST_CASE("with_threads limits the concurrency of loops inside it and not outside of it") {
     const int outside = width();
     for (const int threads : {1, 2, 3, 8}) {
         RunContext run;
@@ -49,7 +49,7 @@ TEST_CASE("with_threads bounds the loops inside it and nothing else") {
     with_threads({}, [&] { CHECK(width() == outside); });
 }
 
-TEST_CASE("with_threads inside itself: as wide as asked for, on the calling thread") {
+TEST_CASE("with_threads, nested: the requested width applies, on the calling thread") {
     RunContext three, two;
     three.threads = 3;
     two.threads = 2;
@@ -67,7 +67,7 @@ TEST_CASE("with_threads inside itself: as wide as asked for, on the calling thre
     });
 }
 
-TEST_CASE("with_threads passes exceptions through, from loops too") {
+TEST_CASE("with_threads propagates exceptions, including those of parallel loops and nested calls") {
     RunContext run;
     run.threads = 3;
     const auto code_of = [&](const std::function<void()>& work) {
@@ -87,7 +87,7 @@ TEST_CASE("with_threads passes exceptions through, from loops too") {
     CHECK(code_of([&] { with_threads(run, [] { throw Error(Errc::Unsupported, "inner"); }); }) == Errc::Unsupported);
 }
 
-TEST_CASE("a switch of another library is set back when the last of overlapping calls ends") {
+TEST_CASE("WhileAny: a global setting is restored when the last of overlapping scopes ends") {
     auto first = std::make_unique<detail::WhileAny<FlagOff>>();
     auto second = std::make_unique<detail::WhileAny<FlagOff>>();
     CHECK_FALSE(flag);

@@ -5,13 +5,13 @@
 using covol::safe_lines;
 using covol::safe_text;
 
-TEST_CASE("texts without control characters are as they were") {
+TEST_CASE("safe_text: text without control characters is unchanged") {
     for (const char* text :
          {"", "two words", "Grüße 漢字 🧪", "50 µm \\ \"quoted\" 'so' $(no) `shell`", "a\xC2\xA0z"})
         CHECK(safe_text(text) == text);
 }
 
-TEST_CASE("what steers a terminal is written as its number") {
+TEST_CASE("safe_text: control characters, line separators and direction marks are escaped") {
     CHECK(safe_text("\x1b[31mred") == "\\u001b[31mred");
     CHECK(safe_text("a\nb\rc\td") == "a\\u000ab\\u000dc\\u0009d");
     CHECK(safe_text(std::string("nul\0end", 7)) == "nul\\u0000end");
@@ -25,7 +25,7 @@ TEST_CASE("what steers a terminal is written as its number") {
     CHECK(safe_text("line\xE2\x80\xA8separator") == "line\\u2028separator");
 }
 
-TEST_CASE("bytes that are no UTF-8 are written as their numbers") {
+TEST_CASE("safe_text: bytes that are not valid UTF-8 are escaped") {
     CHECK(safe_text("latin\xE9") == "latin\\xe9");
     // The byte 0x9B, which is the control sequence introducer (CSI) of 8-bit terminals.
     CHECK(safe_text("\x9b"
@@ -37,6 +37,6 @@ TEST_CASE("bytes that are no UTF-8 are written as their numbers") {
     CHECK(safe_text("cut \xE2\x80") == "cut \\xe2\\x80");
 }
 
-TEST_CASE("lines stay lines where they are meant") {
+TEST_CASE("safe_lines: line feeds are kept, and other control characters are escaped") {
     CHECK(safe_lines("one\ntwo\x1b\r\n") == "one\ntwo\\u001b\\u000d\n");
 }

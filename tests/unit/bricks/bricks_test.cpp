@@ -59,7 +59,7 @@ struct StateDifference {
     double maximum = 0;
     std::int64_t count = 0;
 };
-StateDifference apart(const FloatGrid& a, const FloatGrid& b) {
+StateDifference difference_of(const FloatGrid& a, const FloatGrid& b) {
     StateDifference result;
     const double h = a.voxelSize()[0];
     const auto at = b.getConstAccessor();
@@ -79,7 +79,7 @@ bool overlap(const VoxelBox& a, const VoxelBox& b) {
 
 }  // namespace
 
-TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenly") {
+TEST_CASE("Bricks of whole leaves partition the domain, each with at most the given number of active voxels") {
     const Domain fine = make_domain({{-60, -50, -40}, {70, 61, 53}}, 0.5);
     const Domain coarse = make_domain({{-60, -50, -40}, {70, 61, 53}}, 2.0);
     const FloatGridPtr ball = start_from_sphere(coarse, {3, 4, 5}, 30);
@@ -109,7 +109,7 @@ TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenl
     CHECK(band == 16 * std::int64_t(ball->activeVoxelCount()));
 }
 
-TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
+TEST_CASE("A ball solved in bricks is within 0.05 voxels of the one in one piece, and as accurate at seams") {
     const Image image = ball_image();
     const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
@@ -132,7 +132,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     CHECK(joined.report.surface.components == 1);
     CHECK(joined.report.surface.genus == 0);
     CHECK(joined.surface->transform() == whole.surface->transform());
-    const StateDifference difference = apart(*joined.surface, *whole.surface);
+    const StateDifference difference = difference_of(*joined.surface, *whole.surface);
     CHECK(difference.count > 20000);
     CHECK(difference.maximum < 0.05);
     // Maximum errors against the true ball: within 2 voxels of the bricks' common faces (`on`), and elsewhere (`off`).
@@ -152,7 +152,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     CHECK(on < 1.1 * off);
 }
 
-TEST_CASE("bricks joined without a mesh have the same surface") {
+TEST_CASE("Bricks joined without a mesh have the same surface and measures") {
     const Image image = ball_image();
     const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
@@ -170,14 +170,14 @@ TEST_CASE("bricks joined without a mesh have the same surface") {
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.u == nullptr);
     // The surfaces differ only by rounding errors, because each brick has its own origin.
-    CHECK(apart(*mesh.surface, *lean.surface).maximum < 1e-5);
+    CHECK(difference_of(*mesh.surface, *lean.surface).maximum < 1e-5);
     CHECK(lean.report.surface.genus == 0);
     CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
     CHECK(lean.report.fit.mean == Approx(mesh.report.fit.mean).margin(0.01));
     CHECK(lean.report.mesh.triangles == std::int64_t(extract_mesh(*lean.surface).triangles.size()));
 }
 
-TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
+TEST_CASE("A brick without neighbours' states is solved reproducibly, and joining without states is an error") {
     const Image image = ball_image();
     const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
@@ -190,12 +190,12 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     const SolvedBrick once = job.solve(plan, 1, none), again = job.solve(plan, 1, none);
     CHECK(once.stop_reason == StopReason::Steady);
     CHECK(once.steps > 0);
-    CHECK(apart(*once.state, *again.state).maximum == 0);
+    CHECK(difference_of(*once.state, *again.state).maximum == 0);
     CHECK(measure_seams(plan, 1, none) > 1);  // kHalfWidthVoxels, because no brick has a state here
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }
 
-TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
+TEST_CASE("A cloud reconstructed in bricks equals the one in one piece exactly") {
     std::vector<Vec3> points = marks_on_ball(20000);
     for (std::size_t n = 0; n < points.size(); ++n)
         for (double& x : points[n]) x *= 1 + 0.004 * std::sin(12.9898 * double(n));
@@ -210,16 +210,16 @@ TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
     std::vector<FloatGridPtr> states;
     CHECK(solve_all(job, plan, states) == 1);
     const SegmentResult joined = job.join(plan, [&](std::size_t n) { return states[n]; });
-    CHECK(apart(*joined.surface, *whole.surface).maximum == 0);
+    CHECK(difference_of(*joined.surface, *whole.surface).maximum == 0);
     CHECK(joined.mesh.triangles.size() == whole.mesh.triangles.size());
     CHECK(joined.report.surface.volume == whole.report.surface.volume);
 }
 
-TEST_CASE("what rests on all marks at once is refused in bricks") {
+TEST_CASE("BrickJob: the default model, which infers from all marks together, is rejected") {
     CHECK_THROWS_AS(BrickJob(ball_image(), marks_on_ball(200), {}, {}), Error);
 }
 
-TEST_CASE("bricks tell of a mark that went astray, as a job in one piece does") {
+TEST_CASE("Bricks: a mark far from all others causes a warning") {
     const Image image = ball_image();
     std::vector<Vec3> points = marks_on_ball(3000);
     points.push_back({50, 50, 50});

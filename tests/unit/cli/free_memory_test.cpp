@@ -66,18 +66,18 @@ std::string mib(std::uint64_t n) { return std::to_string(n * kMiB); }
 
 }  // namespace
 
-TEST_CASE("without control groups the machine says what is free") {
+TEST_CASE("Without control groups the available memory of the machine is reported") {
     const FakeMachine machine;
     CHECK(machine.free().bytes == kMachine);
     CHECK(machine.free().where == "this machine");
 }
 
-TEST_CASE("nobody says what is free") {
+TEST_CASE("Without any source of information the free memory is unknown") {
     const Scratch empty;
     CHECK_FALSE(find_free_memory(empty.path("nothing")).has_value());
 }
 
-TEST_CASE("control groups, version 2: the group that this process is in, less what it uses beside caches") {
+TEST_CASE("Control groups, version 2: the limit of the process's group less its memory that is not cache") {
     FakeMachine machine;
     machine.mounts(kV2).group("0::/user.slice/job\n");
     machine.v2("sys/fs/cgroup/user.slice/job", mib(400), "max", 150 * kMiB, 50 * kMiB);
@@ -85,7 +85,7 @@ TEST_CASE("control groups, version 2: the group that this process is in, less wh
     CHECK(machine.free().where == "the control group /sys/fs/cgroup/user.slice/job");
 }
 
-TEST_CASE("control groups, version 2: the limit that throttles counts as the hard one") {
+TEST_CASE("Control groups, version 2: the lower of memory.high and memory.max applies") {
     FakeMachine machine;
     machine.mounts(kV2).group("0::/job\n").v2("sys/fs/cgroup/job", mib(900), mib(300), 0, 0);
     CHECK(machine.free().bytes == 300 * kMiB);
@@ -93,7 +93,7 @@ TEST_CASE("control groups, version 2: the limit that throttles counts as the har
     CHECK(machine.free().bytes == 200 * kMiB);
 }
 
-TEST_CASE("control groups, version 2: every group above the process binds it") {
+TEST_CASE("Control groups, version 2: the limits of all groups above the process apply") {
     FakeMachine machine;
     machine.mounts(kV2).group("0::/slurm/job_7/step_0/task_0\n");
     machine.v2("sys/fs/cgroup/slurm/job_7", mib(500), "max", 100 * kMiB, 0);
@@ -103,7 +103,7 @@ TEST_CASE("control groups, version 2: every group above the process binds it") {
     CHECK(machine.free().where == "the control group /sys/fs/cgroup/slurm/job_7");
 }
 
-TEST_CASE("control groups, version 1: the memory controller's mount") {
+TEST_CASE("Control groups, version 1: limits are read at the memory controller's mount") {
     FakeMachine machine;
     machine.mounts(kV1).group("5:cpu,cpuacct:/elsewhere\n4:memory:/slurm/uid_1/job_7\n0::/\n");
     machine.v1("sys/fs/cgroup/memory", kUnlimited, 9000 * kMiB, 0);
@@ -116,7 +116,7 @@ TEST_CASE("control groups, version 1: the memory controller's mount") {
     CHECK(machine.free().where == "the control group /sys/fs/cgroup/memory/slurm");
 }
 
-TEST_CASE("control groups of both versions at once: the controller is in one of them") {
+TEST_CASE("Control groups of both versions at once: the version with the memory controller applies") {
     FakeMachine machine;
     machine.mounts(kV1 + "40 31 0:30 / /sys/fs/cgroup/unified rw - cgroup2 cgroup2 rw\n");
     machine.group("4:memory:/job\n0::/job\n").v1("sys/fs/cgroup/memory/job", mib(400), 0, 0);
@@ -124,7 +124,7 @@ TEST_CASE("control groups of both versions at once: the controller is in one of 
     CHECK(machine.free().bytes == 400 * kMiB);
 }
 
-TEST_CASE("unlimited values bind nothing") {
+TEST_CASE("Control groups: unlimited values do not reduce the machine's free memory") {
     FakeMachine machine;
     machine.mounts(kV1 + kV2).group("4:memory:/job\n0::/job\n");
     machine.v1("sys/fs/cgroup/memory/job", kUnlimited, 100 * kMiB, 0);
@@ -133,7 +133,7 @@ TEST_CASE("unlimited values bind nothing") {
     CHECK(machine.free().where == "this machine");
 }
 
-TEST_CASE("a container without a namespace of groups mounts its own group alone") {
+TEST_CASE("Control groups: a container without a cgroup namespace reads the mount of its own group") {
     FakeMachine machine;
     machine.mounts("33 31 0:29 /docker/0ab1 /sys/fs/cgroup/memory ro - cgroup cgroup rw,memory\n");
     machine.group("4:memory:/docker/0ab1\n").v1("sys/fs/cgroup/memory", mib(256), 56 * kMiB, 0);
@@ -142,7 +142,7 @@ TEST_CASE("a container without a namespace of groups mounts its own group alone"
     CHECK(machine.free().bytes == 100 * kMiB);
 }
 
-TEST_CASE("a group outside of the namespace: what is mounted is what is known") {
+TEST_CASE("Control groups: for a group outside of the namespace the limits of the mounted groups apply") {
     FakeMachine machine;
     machine.mounts(kV2).v2("sys/fs/cgroup", mib(256), "max", 56 * kMiB, 0);
     for (const char* group : {"0::/../..\n", "0::/../other/job\n", "0::/..\n", "0::/\n"}) {
@@ -158,14 +158,14 @@ TEST_CASE("a group outside of the namespace: what is mounted is what is known") 
     CHECK(machine.free().bytes == 200 * kMiB);
 }
 
-TEST_CASE("version 1 tells of limits above what is mounted") {
+TEST_CASE("Control groups, version 1: hierarchical_memory_limit includes limits above the mount") {
     FakeMachine machine;
     machine.mounts(kV1).group("4:memory:/\n").v1("sys/fs/cgroup/memory", kUnlimited, 10 * kMiB, 0);
     machine.write("sys/fs/cgroup/memory/memory.stat", "hierarchical_memory_limit " + mib(110) + "\n");
     CHECK(machine.free().bytes == 100 * kMiB);
 }
 
-TEST_CASE("a group that is full leaves nothing, and one beyond its limit too") {
+TEST_CASE("Control groups: a group at its limit or beyond it has no free memory") {
     FakeMachine machine;
     machine.mounts(kV2).group("0::/job\n").v2("sys/fs/cgroup/job", mib(100), "max", 100 * kMiB, 0);
     CHECK(machine.free().bytes == 0);
@@ -173,7 +173,7 @@ TEST_CASE("a group that is full leaves nothing, and one beyond its limit too") {
     CHECK(machine.free().bytes == 0);
 }
 
-TEST_CASE("mounts with blanks in their names, and files that hold something else") {
+TEST_CASE("Control groups: mount points with spaces are read, damaged lines and values are ignored") {
     FakeMachine machine;
     machine.mounts("damaged\n\n30 23 0:26 / /my\\040groups rw - cgroup2 cgroup2 rw\n").group("nothing\n0::/a b\n");
     machine.v2("my groups/a b", mib(100), "max", 0, 0);
@@ -182,7 +182,7 @@ TEST_CASE("mounts with blanks in their names, and files that hold something else
     CHECK(machine.free().bytes == kMachine);
 }
 
-TEST_CASE("limits of address space and data bind, less what is in use") {
+TEST_CASE("Limits of address space and data size apply, less what is in use") {
     struct Restored {
         decltype(RLIMIT_AS) which;
         rlimit before{};

@@ -136,7 +136,7 @@ std::vector<Cut> cuts() {
 
 }  // namespace
 
-TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask and level set") {
+TEST_CASE("A solid cut by the image ends at the image's box: mesh, cap, mask and level set") {
     double worst_volume = 0, worst_cap = 0, worst_slice = 0, worst_grid = 0;
     for (const Vec3& radii : {Vec3{14, 14, 14}, Vec3{14, 11, 17}, Vec3{27, 19, 22}})
         for (const Cut& cut : cuts()) {
@@ -204,7 +204,7 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                 worst_volume, worst_cap, worst_slice, worst_grid);
 }
 
-TEST_CASE("the clip survives a .vdb file, and a surface of a clipped surface is the same solid") {
+TEST_CASE("The clip is kept in a .vdb file, and extracting a clipped surface again keeps its volume") {
     const Scene scene = scene_of({"", {0.8, 0.8, 1.75}, 0.8, 0.5, true, false}, {9, 8, 11});
     const FloatGridPtr u = level_set(make_domain(scene.geometry.world_box(), 0.8), scene.shape);
     set_clip(*u, make_clip(scene.geometry));
@@ -219,7 +219,7 @@ TEST_CASE("the clip survives a .vdb file, and a surface of a clipped surface is 
     CHECK(measure(extract_mesh(*extract_surface(*solid))).volume == Approx(volume).epsilon(0.005));
 }
 
-TEST_CASE("a turned image cuts along its own faces") {
+TEST_CASE("A rotated image clips a solid along its own faces") {
     ImageGeometry geometry;
     geometry.size = {40, 40, 20};
     geometry.origin = {3, -2, 1};
@@ -247,7 +247,7 @@ TEST_CASE("a turned image cuts along its own faces") {
     CHECK(on_face > 400);
 }
 
-TEST_CASE("a solid that no face cuts is the same with a clip and without one") {
+TEST_CASE("A solid within the image has the same mesh with and without a clip") {
     ImageGeometry geometry;
     geometry.size = {40, 40, 40};
     const Domain domain = make_domain(geometry.world_box(), 1);
@@ -259,7 +259,7 @@ TEST_CASE("a solid that no face cuts is the same with a clip and without one") {
     CHECK(before.triangles == after.triangles);
 }
 
-TEST_CASE("a solid that fills the image is the image's box") {
+TEST_CASE("A solid that fills the image is clipped to the image's box") {
     ImageGeometry geometry;
     geometry.size = {10, 12, 9};
     geometry.spacing = {1, 1, 1.7};

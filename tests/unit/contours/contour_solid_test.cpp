@@ -63,7 +63,7 @@ double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, co
 
 // ---- between slices -------------------------------------------------------------------------------------------------
 
-TEST_CASE("a cylinder's level is the distance to its wall in all three planes, in a turned image") {
+TEST_CASE("A cylinder's level is the distance to its wall for slices across each axis of a rotated image") {
     for (const int axis : {0, 1, 2}) {
         ImageGeometry g = turned_geometry();
         std::swap(g.spacing[axis], g.spacing[2]);
@@ -97,7 +97,7 @@ TEST_CASE("a cylinder's level is the distance to its wall in all three planes, i
     }
 }
 
-TEST_CASE("steep walls, terraces and caps are closed") {
+TEST_CASE("Points between the slices close steep walls, terraces and caps") {
     Drawing drawing(cube(80));
     // A cone of radius 30 to 10, and on it a cylinder of radius 4, so that the last slice of the cone is a terrace.
     for (int k = 10; k <= 20; ++k) drawing.circle(40, 40, k, 30 - 2 * (k - 10));
@@ -110,7 +110,7 @@ TEST_CASE("steep walls, terraces and caps are closed") {
     CHECK(flood(c.along, 1, 1.5).leaks);
 }
 
-TEST_CASE("between skipped slices a cone is a cone") {
+TEST_CASE("A cone between slices five voxels apart is accurate to 0.02 voxels") {
     const auto radius = [](double k) { return 4 + 0.4 * k; };
     Drawing drawing(cube(80));
     for (int k = 10; k <= 50; k += 5) drawing.circle(40, 40, k, radius(k));
@@ -123,7 +123,7 @@ TEST_CASE("between skipped slices a cone is a cone") {
     CHECK(worst < 0.02);
 }
 
-TEST_CASE("between skipped slices an ellipsoid is met closer than by straight lines, and its poles are") {
+TEST_CASE("An ellipsoid between slices is closer than by linear interpolation, and its poles are found") {
     const double a = 28, half = 30, gap = 6;
     const auto radius = [&](double w) { return a * std::sqrt(std::max(0.0, 1 - w * w / (half * half))); };
     Drawing drawing(cube(100));
@@ -148,7 +148,7 @@ TEST_CASE("between skipped slices an ellipsoid is met closer than by straight li
     CHECK_FALSE(flood(all_points(c), 1, 1.5).leaks);
 }
 
-TEST_CASE("what the next slice lacks ends in between") {
+TEST_CASE("A hole that the next slice lacks ends between the two slices") {
     Drawing drawing(cube(60));
     for (int k = 10; k <= 20; k += 5) drawing.circle(30, 30, k, 20).circle(30, 30, k, 6);  // a hole
     for (int k = 25; k <= 40; k += 5) drawing.circle(30, 30, k, 20);
@@ -163,7 +163,7 @@ TEST_CASE("what the next slice lacks ends in between") {
     CHECK_FALSE(flood(all_points(c), 1, 1.5).leaks);
 }
 
-TEST_CASE("a single contour that moves by more than its width is carried along") {
+TEST_CASE("A single contour that moves by more than its width is followed, several ones end between slices") {
     Drawing drawing(cube(80));
     for (int n = 0; n < 5; ++n) drawing.circle(15 + 12 * n, 40, 10 + 5 * n, 4);
     Warnings warnings;
@@ -184,7 +184,7 @@ TEST_CASE("a single contour that moves by more than its width is carried along")
     CHECK(parts.solid->level({25, 35, 12.5}) > 0);
 }
 
-TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
+TEST_CASE("Slices may be unevenly spaced and lie between those of the image") {
     Drawing drawing(cube(60));
     const std::vector<double> at{10, 11.5, 14.25, 20, 21, 30.5};
     for (const double k : at) drawing.circle(30, 30, k, 10);
@@ -201,7 +201,7 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
 
 // ---- caps -----------------------------------------------------------------------------------------------------------
 
-TEST_CASE("a dome ends where the shrinking section would") {
+TEST_CASE("compute_cap_height: the section's area is extrapolated to zero, at most to the next slice") {
     // Areas of sections of an ellipsoid near its pole are linear in the height.
     CHECK(compute_cap_height(3, 9, 4, 4) == Approx(2));
     CHECK(compute_cap_height(3, 4, 4, 4) == 4);  // at most the usual distance between slices
@@ -228,7 +228,7 @@ void check_bounds(const ContourSolid& solid, const Vec3& middle, double far) {
     }
 }
 
-TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned as in one that is not") {
+TEST_CASE("A body cut by the image continues beyond its end and is bounded, also in a rotated image") {
     for (const ImageGeometry& g : {turned_geometry(), cube(80)}) {
         Drawing drawing(g);
         for (int k = 0; k < 12; k += 2) drawing.circle(40, 45, k, 8 - 0.3 * k);
@@ -243,7 +243,7 @@ TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned
     }
 }
 
-TEST_CASE("a section that widens towards the image's end does not grow for ever") {
+TEST_CASE("A section that widens towards the image's end widens by at most 45 degrees beyond it") {
     // The radius grows from 2 to 9 over three slices; the image ends 2.5 beyond the second contour.
     const Contours c = Drawing(cube(60)).circle(30, 30, 54, 2).circle(30, 30, 57, 9).densify(1);
     const auto radius_at = [&](double k) {
@@ -262,7 +262,7 @@ TEST_CASE("a section that widens towards the image's end does not grow for ever"
         CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
 }
 
-TEST_CASE("the start from contours in the corner of an image is not inside out") {
+TEST_CASE("The start from contours in a corner of the image is negative inside and positive far away") {
     // Two contours of a small body in a corner of the image, one of them along the image's end.
     Drawing drawing(cube(60));
     drawing.add({{5, 59, 55}, {1.5, 59, 55}, {0.5, 58, 55}, {4, 57, 55}});
@@ -279,7 +279,7 @@ TEST_CASE("the start from contours in the corner of an image is not inside out")
             for (const int z : {0, 30, 59}) CHECK(accessor.getValue({x, y, z}) > 0);
 }
 
-TEST_CASE("one slice makes a lens, two slices a body") {
+TEST_CASE("One slice makes a lens, and two slices make a closed body") {
     const Contours one = Drawing(cube(60)).circle(30, 30, 20, 10).densify(1);
     CHECK(one.slices == 1);
     CHECK(one.slice_distance == 1);
@@ -294,7 +294,7 @@ TEST_CASE("one slice makes a lens, two slices a body") {
 
 // ---- the body as a start --------------------------------------------------------------------------------------------
 
-TEST_CASE("may_meet never denies a ball that the surface crosses") {
+TEST_CASE("may_meet is true for every ball that the surface crosses") {
     Drawing drawing(turned_geometry());
     for (int k = 15; k <= 45; k += 5) drawing.circle(38 + 0.3 * k, 45, k, 6 + 0.1 * k);
     drawing.circle(38 + 0.3 * 25, 45, 25, 3);
@@ -324,7 +324,7 @@ TEST_CASE("may_meet never denies a ball that the surface crosses") {
     CHECK(denied > 500);
 }
 
-TEST_CASE("the start from a body has its volume, and holes stay open") {
+TEST_CASE("The start from contours has the volume of their body, and holes stay open") {
     Drawing drawing(cube(64, 0.5));
     for (int k = 12; k <= 50; k += 2) drawing.circle(32, 32, k, 12).circle(32, 32, k, 5);
     const Contours c = drawing.densify(0.5);
@@ -344,7 +344,7 @@ TEST_CASE("the start from a body has its volume, and holes stay open") {
     CHECK(inside * 0.125 == Approx(kPi * (144 - 25) * 20).epsilon(0.02));
 }
 
-TEST_CASE("the points do not depend on the number of threads") {
+TEST_CASE("densify: the points do not depend on the number of threads") {
     Drawing drawing(turned_geometry());
     for (int k = 10; k <= 50; k += 5) drawing.circle(38, 45, k, 5 + 0.1 * k).circle(38, 45, k, 2);
     RunContext run;

@@ -32,9 +32,7 @@ std::vector<Vec2> circle(double radius, const Vec2& centre) {
 
 }  // namespace
 
-TEST_CASE(
-    "the field between planes: inside between sections, linear beyond the last one, and 0 half way to a further "
-    "plane") {
+TEST_CASE("Section field: inside between sections, linear beyond them, and 0 at half the plane distance") {
     const SectionField field({square(10, 0), square(10, 1)}, 0.1, {0, 0, 0}, {});
     CHECK(field.plane_distance() == Approx(0.5));  // the height of the sections' box, 1, over the number of planes
     CHECK(value(field, {0, 0, 0.5}) == Approx(-1).margin(1e-3));
@@ -47,7 +45,7 @@ TEST_CASE(
     CHECK(value(field, {14, 0, 0.5}) == 1);
 }
 
-TEST_CASE("the field between planes of two directions: each plane's sides, and no value beyond them") {
+TEST_CASE("Section field: planes of two directions give the signs of the torus and a range of at most 2") {
     // The sections of a torus about the z axis with radii 3 and 1, in planes across z and in the plane x = 0.
     std::vector<Section> sections;
     for (const double z : {-0.8, -0.4, 0.0, 0.4, 0.8}) {

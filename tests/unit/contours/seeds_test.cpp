@@ -27,7 +27,7 @@ double value_at(const FloatGrid& grid, const Vec3& p) {
 
 }  // namespace
 
-TEST_CASE("lines of seeds are scribbles", "[seeds]") {
+TEST_CASE("Lines of seeds are sampled along their length, like scribbles", "[seeds]") {
     PointCloud cloud;
     cloud.points = {{0, 0, 0}, {4, 0, 0}, {4, 3, 0}, {9, 9, 9}};
     MarkLine line;
@@ -41,7 +41,8 @@ TEST_CASE("lines of seeds are scribbles", "[seeds]") {
     CHECK(collect_seeds(cloud, 1).size() == 13);
 }
 
-TEST_CASE("the surface between two seeds is their middle plane, within half their distance", "[seeds]") {
+TEST_CASE("start_from_seeds: a ball around the inside seed with half the distance to the outside seed as radius",
+          "[seeds]") {
     const FloatGridPtr grid = start_from_seeds(cube(64), {{20, 32, 32}}, {{40, 32, 32}});
     CHECK(value_at(*grid, {30, 32, 32}) == Approx(0).margin(0.05));
     CHECK(value_at(*grid, {29, 32, 32}) == Approx(-1).margin(0.1));
@@ -52,14 +53,14 @@ TEST_CASE("the surface between two seeds is their middle plane, within half thei
     CHECK(value_at(*grid, {20, 32, 42}) == Approx(0).margin(0.1));
 }
 
-TEST_CASE("seeds inside are joined, and alone they are small", "[seeds]") {
+TEST_CASE("start_from_seeds: seeds inside are connected, and a single one makes a ball of three voxels", "[seeds]") {
     const FloatGridPtr joined = start_from_seeds(cube(64), {{12, 32, 32}, {32, 32, 32}, {52, 32, 32}}, {});
     for (double x = 12; x <= 52; x += 1) CHECK(value_at(*joined, {x, 32, 32}) < 0);
     const FloatGridPtr alone = start_from_seeds(cube(64), {{32, 32, 32}}, {});
     CHECK(value_at(*alone, {35, 32, 32}) == Approx(0).margin(0.1));
 }
 
-TEST_CASE("seeds inside that are none", "[seeds]") {
+TEST_CASE("start_from_seeds: no seeds inside, or none of them in the domain, is an error", "[seeds]") {
     CHECK(message_of([] {
               (void)start_from_seeds(cube(8), {}, {{1, 1, 1}});
           }).find("expected seeds inside, got none") != std::string::npos);
@@ -68,7 +69,7 @@ TEST_CASE("seeds inside that are none", "[seeds]") {
           }).find("expected seeds inside the domain") != std::string::npos);
 }
 
-TEST_CASE("seeds on the wrong side of a surface", "[seeds]") {
+TEST_CASE("check_seeds: seeds on the wrong side of a surface are counted and reported", "[seeds]") {
     const FloatGridPtr ball = start_from_sphere(cube(64), {32, 32, 32}, 10);
     const SeedCheck right = check_seeds(*ball, {{32, 32, 32}, {40, 32, 32}}, {{44, 32, 32}, {0, 0, 0}});
     CHECK(right.wrong() == 0);
@@ -82,7 +83,7 @@ TEST_CASE("seeds on the wrong side of a surface", "[seeds]") {
     CHECK(check_seeds(*ball, {{44, 32, 32}}, {}, 2.5).wrong() == 0);
 }
 
-TEST_CASE("a position has one side", "[seeds]") {
+TEST_CASE("check_sides: a position that is both inside and outside is rejected", "[seeds]") {
     check_sides({{1, 2, 3}}, {{1, 2, 3.1}}, 0.01);
     CHECK(message_of([] {
               check_sides({{1, 2, 3}}, {{5, 5, 5}, {1, 2, 3}}, 0.01);

@@ -39,16 +39,16 @@ const Domain kCube = make_domain({{0, 0, 0}, {10, 10, 10}}, 0.25);  // 40^3 voxe
 
 }  // namespace
 
-TEST_CASE("a single point has a ball around it") {
+TEST_CASE("compute_distance: distances around a single point are exact") {
     check_against_brute_force({{5.03, 4.91, 5.2}}, kCube, 2.0);
     check_against_brute_force({{0.01, 9.99, 5}}, kCube, 3.1);
 }
 
-TEST_CASE("a few points share the tube") {
+TEST_CASE("compute_distance: distances around a few points are exact") {
     check_against_brute_force(box_cloud(7, {{0, 0, 0}, {10, 10, 10}}, 1), kCube, 2.5);
 }
 
-TEST_CASE("duplicates change nothing") {
+TEST_CASE("compute_distance: repeated points change nothing") {
     const std::vector<Vec3> once = box_cloud(5, {{2, 2, 2}, {8, 8, 8}}, 2);
     std::vector<Vec3> thrice = once;
     thrice.insert(thrice.end(), once.begin(), once.end());
@@ -56,16 +56,16 @@ TEST_CASE("duplicates change nothing") {
     CHECK(identical(*compute_distance(once, kCube, {2.0}).grid, *compute_distance(thrice, kCube, {2.0}).grid));
 }
 
-TEST_CASE("points outside the domain count") {
+TEST_CASE("compute_distance: points outside of the domain count") {
     check_against_brute_force({{-1.5, 5, 5}, {-0.9, 7, 5}, {5, 11, 11}}, kCube, 2.5);
-    SECTION("up to the radius") {
+    SECTION("but only within the radius") {
         const DistanceResult far = compute_distance({{-3, 5, 5}}, kCube, {2.5});
         CHECK(far.report.active_voxels == 0);
         CHECK(far.grid->tree().leafCount() == 0);
     }
 }
 
-TEST_CASE("a domain far from the origin is as exact as one at it") {
+TEST_CASE("compute_distance: distances are exact at large indices, too") {
     Domain far = kCube;
     far.min = {1 << 20, -(1 << 21), 1 << 19};
     for (int a = 0; a < 3; ++a) {
@@ -76,7 +76,7 @@ TEST_CASE("a domain far from the origin is as exact as one at it") {
     check_against_brute_force(points, far, 2.0);
 }
 
-TEST_CASE("a dense cluster in a few voxels") {
+TEST_CASE("compute_distance: distances to a dense cluster in a few voxels are accurate to 0.1 voxels") {
     const std::vector<Vec3> points = box_cloud(20000, {{5, 5, 5}, {5.6, 5.6, 5.6}}, 4);
     const DistanceResult result = compute_distance(points, kCube, {2.0});
     double worst = 0;
@@ -85,7 +85,7 @@ TEST_CASE("a dense cluster in a few voxels") {
     CHECK(worst <= 0.1 * kCube.voxel_size);
 }
 
-TEST_CASE("the number of threads does not change a bit") {
+TEST_CASE("compute_distance: distances are bit-identical for 1, 2 and 8 threads") {
     const std::vector<Vec3> points = sphere_cloud(3000, 3.5, 5, {5, 5, 5});
     RunContext run;
     run.threads = 1;
@@ -98,7 +98,7 @@ TEST_CASE("the number of threads does not change a bit") {
     }
 }
 
-TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
+TEST_CASE("compute_distance: mirrored and permuted points give mirrored and permuted distances") {
     Domain domain;  // symmetric about the origin
     domain.voxel_size = 0.5;
     domain.min = {-20, -20, -20};
@@ -120,7 +120,7 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
     CHECK(sum / double(a.report.active_voxels) <= 1e-4 * domain.voxel_size);
 }
 
-TEST_CASE("unusable input is refused") {
+TEST_CASE("compute_distance: invalid points and radii are rejected, and a run can be cancelled") {
     const auto code = [](const std::vector<Vec3>& points, double radius) {
         try {
             (void)compute_distance(points, kCube, {radius});

@@ -12,11 +12,11 @@ using covol::detail::NearestBlock;
 
 namespace {
 
-struct Offer {
+struct StoredPoint {
     float x = NearestBlock::kFar, y = NearestBlock::kFar, z = NearestBlock::kFar;
 };
 
-void set(NearestBlock& block, int i, int j, int k, const Offer& point, int index) {
+void set(NearestBlock& block, int i, int j, int k, const StoredPoint& point, int index) {
     const int at = NearestBlock::offset(i, j, k);
     block.x[at] = point.x;
     block.y[at] = point.y;
@@ -65,11 +65,11 @@ bool improves_halo(const NearestBlock& block, int face, double reach) {
 
 }  // namespace
 
-TEST_CASE("the six faces' news are those of a loop over the halo") {
+TEST_CASE("improved_faces: the faces that offer the halo a nearer point are those of a plain loop") {
     std::mt19937 random(4);
     std::uniform_real_distribution<float> place(-3.0F, 10.0F);
     std::uniform_int_distribution<int> voxel(-1, 8), kind(0, 9);
-    std::array<int, 6> found_in{}, silent{};
+    std::array<int, 6> found_in{}, unimproved{};
     for (int round = 0; round < 4000; ++round) {
         const auto block = no_points();
         // One or two points, each at a random voxel of the block or of the halo around it.
@@ -77,26 +77,26 @@ TEST_CASE("the six faces' news are those of a loop over the halo") {
             set(*block, voxel(random), voxel(random), voxel(random), {place(random), place(random), place(random)},
                 count);
         const double reach = kind(random) == 0 ? 4.0 : 400.0;
-        const unsigned news = covol::detail::improved_faces(*block, float(reach));
+        const unsigned improved = covol::detail::improved_faces(*block, float(reach));
         for (int face = 0; face < 6; ++face) {
             const bool expected = improves_halo(*block, face, reach);
             INFO("round " << round << ", face " << face);
-            REQUIRE((news >> face & 1U) == unsigned(expected));
-            ++(expected ? found_in : silent)[face];
+            REQUIRE((improved >> face & 1U) == unsigned(expected));
+            ++(expected ? found_in : unimproved)[face];
         }
-        REQUIRE(news < 64);
+        REQUIRE(improved < 64);
     }
     for (int face = 0; face < 6; ++face) {
         CHECK(found_in[face] > 100);
-        CHECK(silent[face] > 100);
+        CHECK(unimproved[face] > 100);
     }
 }
 
-TEST_CASE("a sweep carries a single point to every voxel of the leaf") {
+TEST_CASE("sweep_nearest: a single point reaches every voxel of the leaf") {
     for (const std::array<int, 3>& from :
          {std::array{0, 0, 0}, {7, 7, 7}, {3, 0, 7}, {-1, 4, 4}, {4, 8, 2}, {5, 2, -1}}) {
         const auto block = no_points();
-        const Offer point{float(from[0]) + 0.2F, float(from[1]) - 0.3F, float(from[2]) + 0.1F};
+        const StoredPoint point{float(from[0]) + 0.2F, float(from[1]) - 0.3F, float(from[2]) + 0.1F};
         set(*block, from[0], from[1], from[2], point, 7);
         covol::detail::sweep_nearest(*block);
         std::array<float, 512> distances{};
@@ -111,13 +111,13 @@ TEST_CASE("a sweep carries a single point to every voxel of the leaf") {
     }
 }
 
-TEST_CASE("each voxel ends with the nearer of two points, but for a few between them") {
+TEST_CASE("sweep_nearest: each voxel gets the nearer of two points, except for at most 0.2 % of the voxels") {
     std::mt19937 random(9);
     std::uniform_real_distribution<float> place(-0.5F, 7.5F);
     int wrong = 0, all = 0;
     for (int round = 0; round < 200; ++round) {
         const auto block = no_points();
-        std::array<Offer, 2> points{};
+        std::array<StoredPoint, 2> points{};
         for (int n = 0; n < 2; ++n) {
             points[n] = {place(random), place(random), place(random)};
             const std::array<int, 3> voxel{int(std::lround(points[n].x)), int(std::lround(points[n].y)),
@@ -129,7 +129,7 @@ TEST_CASE("each voxel ends with the nearer of two points, but for a few between 
         for (int i = 0; i < 8; ++i)
             for (int j = 0; j < 8; ++j)
                 for (int k = 0; k < 8; ++k) {
-                    const auto off = [&](const Offer& p) {
+                    const auto off = [&](const StoredPoint& p) {
                         return (i - p.x) * (i - p.x) + (j - p.y) * (j - p.y) + (k - p.z) * (k - p.z);
                     };
                     const float nearest = std::min(off(points[0]), off(points[1]));
@@ -142,7 +142,7 @@ TEST_CASE("each voxel ends with the nearer of two points, but for a few between 
     CHECK(wrong < 0.002 * all);
 }
 
-TEST_CASE("points are taken over as a loop would, and those that changed within reach are told") {
+TEST_CASE("store_points: points are stored as by a plain loop, and changes within reach are flagged") {
     std::mt19937 random(6);
     std::uniform_real_distribution<float> place(-3.0F, 10.0F);
     std::uniform_int_distribution<int> index(0, 2);
@@ -165,10 +165,10 @@ TEST_CASE("points are taken over as a loop would, and those that changed within 
                     const std::size_t at = std::size_t((i * 8 + j) * 8 + k);
                     const std::int32_t now = block->index[NearestBlock::offset(i, j, k)];
                     REQUIRE(nearest[at] == now);
-                    const bool is_news =
+                    const bool is_changed =
                         (all || now != before[at]) && squared(*block, {i, j, k}, {i, j, k}) <= double(kReach);
-                    REQUIRE((changed[std::size_t(i)] >> (8 * j + k) & 1) == std::uint64_t(is_news));
-                    found_in += is_news;
+                    REQUIRE((changed[std::size_t(i)] >> (8 * j + k) & 1) == std::uint64_t(is_changed));
+                    found_in += is_changed;
                 }
         CHECK(found_in > 50);
         CHECK(found_in < 450);

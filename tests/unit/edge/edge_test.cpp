@@ -73,7 +73,7 @@ Errc edge_code(const std::function<void()>& call) { return code_of(call); }
 
 }  // namespace
 
-TEST_CASE("every edge option says when it is out of range") {
+TEST_CASE("EdgeOptions: every option that is out of range is named") {
     CHECK(why_invalid(EdgeOptions{}).empty());
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     const auto rejects = [](const char* field, auto EdgeOptions::*member, auto value) {
@@ -93,7 +93,7 @@ TEST_CASE("every edge option says when it is out of range") {
     rejects("intensities", &EdgeOptions::intensities, std::array{0.0, nan});
 }
 
-TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised image") {
+TEST_CASE("On a ramp g is 1/(1 + K s^2), with s per world unit of the normalised image") {
     const Domain domain = cube_domain(24, kH, -9);
     // The intensity rises from 200 to 440 over the box of 12 units and is normalised by [100, 500]: s = 240 / 12 / 400.
     const Image image = image_on(domain, [](const Vec3& x) { return 320 + 20 * x[1]; });
@@ -113,7 +113,7 @@ TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised
     CHECK(result.report.high == 500);
 }
 
-TEST_CASE("the edge detector is the dense reference's") {
+TEST_CASE("The edge detector equals that of the dense reference") {
     const Domain domain = cube_domain(21, kH, 2);  // the domain ends inside leaves
     const Function waves = random_waves(31, 3.0);
     const Function f = [&](const Vec3& x) { return 0.5 + 0.45 * waves(x); };  // some values are clamped
@@ -130,7 +130,7 @@ TEST_CASE("the edge detector is the dense reference's") {
     }
 }
 
-TEST_CASE("a band gets the values of the whole domain, and keeps its topology") {
+TEST_CASE("A band has the edge detector of the whole domain and keeps its topology") {
     const Domain domain = cube_domain(40, kH, -13);
     const Function waves = random_waves(32, 3.0);
     const Image image = image_on(domain, [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); });
@@ -144,7 +144,7 @@ TEST_CASE("a band gets the values of the whole domain, and keeps its topology") 
     CHECK(largest_difference(domain, *band.grid, to_dense(domain, *all.grid)) < 1e-3);
 }
 
-TEST_CASE("g is 1/2 at the contrast, asked for or chosen") {
+TEST_CASE("g is 1/2 at the contrast, whether given or chosen by percentile") {
     const Domain domain = cube_domain(24, kH);
     const Function waves = random_waves(33, 3.0);
     const Image image = image_on(domain, [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); });
@@ -161,7 +161,7 @@ TEST_CASE("g is 1/2 at the contrast, asked for or chosen") {
     CHECK(chosen.report.edge_k == Approx(1 / (chosen.report.edge_contrast * chosen.report.edge_contrast)));
 }
 
-TEST_CASE("a mirrored or permuted image has a mirrored or permuted edge detector") {
+TEST_CASE("A mirrored or permuted image has a mirrored or permuted edge detector") {
     const Domain domain = cube_domain(11, kH, -3);
     const Function waves = random_waves(34, 2.0);
     const Function f = [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); };
@@ -181,7 +181,7 @@ TEST_CASE("a mirrored or permuted image has a mirrored or permuted edge detector
     }
 }
 
-TEST_CASE("detect_edges(): the same bits for 1, 2 and 8 threads") {
+TEST_CASE("detect_edges(): g is bit-identical for 1, 2 and 8 threads") {
     const Domain domain = cube_domain(40, kH);
     const Function waves = random_waves(35, 2.0);
     const Image image = image_on(domain, waves);
@@ -202,7 +202,7 @@ TEST_CASE("detect_edges(): the same bits for 1, 2 and 8 threads") {
     }
 }
 
-TEST_CASE("detect_edges() refuses what has no edges") {
+TEST_CASE("detect_edges(): invalid options, a constant image and an empty band are rejected") {
     const Domain domain = cube_domain(10, kH);
     const Image image = image_on(domain, [](const Vec3& x) { return x[0]; });
     const Image constant = image_on(domain, [](const Vec3&) { return 7.0; });
@@ -237,15 +237,15 @@ MarkedFeature feature_on_sheet(const Image& image) {
 
 }  // namespace
 
-TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
+TEST_CASE("g of a line has its minimum in the middle of the line, g of a slope at its sides") {
     const Domain domain = cube_domain(40, kH);
     const Image bright = image_on(domain, sheet), dark = image_on(domain, [](const Vec3&x) { return 1 - sheet(x); });
-    const FloatGridPtr where = topology_where(
+    const FloatGridPtr band = topology_where(
         domain, [](const Vec3& x) { return std::abs(x[0]) < 4 && std::abs(x[1]) < 2 && std::abs(x[2]) < 2; });
     EdgeOptions o = options(0.5, 4);
     const auto minimum = [&](const Image& image, EdgeFeature feature) {
         o.feature = feature;
-        const EdgeResult r = detect_edges(image, *where, o);
+        const EdgeResult r = detect_edges(image, *band, o);
         double at = 0, value = 2;
         for (auto v = r.grid->cbeginValueOn(); v; ++v)
             if (*v < value) value = *v, at = r.grid->indexToWorld(v.getCoord())[0];
@@ -258,7 +258,7 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     // For a line, s in g = 1 / (1 + K s^2) is the brightness itself, here without smoothing.
     o.feature = EdgeFeature::BrightLine;
     o.sigma = 0;
-    const EdgeResult exact = detect_edges(bright, *where, o);
+    const EdgeResult exact = detect_edges(bright, *band, o);
     for (auto v = exact.grid->cbeginValueOn(); v; ++v) {
         const openvdb::Vec3d x = exact.grid->indexToWorld(v.getCoord());
         const double s = sheet({x[0], x[1], x[2]});
@@ -266,9 +266,9 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     }
 }
 
-TEST_CASE("lines take their contrast from a third of the median") {
+TEST_CASE("The automatic contrast of lines is a third of the median brightness") {
     const Domain domain = cube_domain(40, kH);
-    const FloatGridPtr where = topology_where(domain, [](const Vec3& x) { return length(x) < 5; });
+    const FloatGridPtr band = topology_where(domain, [](const Vec3& x) { return length(x) < 5; });
     EdgeOptions o;
     o.intensities = {0, 1};
     o.sigma = 0.5;
@@ -277,7 +277,7 @@ TEST_CASE("lines take their contrast from a third of the median") {
     const Image oblique = image_on(domain, [](const Vec3& x) {
         return sheet({x[0] + 0.13 * x[1] + 0.07 * x[2], x[1], x[2]});
     });
-    const EdgeResult r = detect_edges(oblique, *where, o);
+    const EdgeResult r = detect_edges(oblique, *band, o);
     std::int64_t above = 0;
     // At the median brightness, which is three times the contrast, g is 1 / (1 + 3^2) = 0.1. Half of the voxels are
     // brighter and therefore have a smaller g.
@@ -285,7 +285,7 @@ TEST_CASE("lines take their contrast from a third of the median") {
     CHECK(double(above) / double(r.grid->activeVoxelCount()) == Approx(0.5).margin(0.01));
 }
 
-TEST_CASE("marks tell lines from borders, and both from noise") {
+TEST_CASE("detect_feature: marks distinguish lines from borders, and noise counts as a border") {
     const Domain domain = cube_domain(40, kH);
     const MarkedFeature bright = feature_on_sheet(image_on(domain, sheet));
     CHECK(bright.feature == EdgeFeature::BrightLine);
@@ -309,7 +309,7 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
     CHECK(detect_feature(image_on(domain, sheet), {}, {}, 1).feature == EdgeFeature::Slope);
 }
 
-TEST_CASE("a value of a rank is that of a sort") {
+TEST_CASE("nth_values: the value of a rank is that in the sorted list") {
     std::mt19937 random(5);
     std::normal_distribution<float> normal(0.0F, 100.0F);
     for (const std::size_t count : {1, 2, 1000, 150'000}) {

@@ -28,7 +28,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A problem with both terms of the flow: a distance to points and an edge detector. The start is an ellipsoid beside
 /// the centre, so that exchanged axes change the result. The active voxels are those near its surface, not whole
 /// leaves, so that partly active leaves are tested, too.
-Problem everything_on(int n = 28, int first = -5) {
+Problem problem_with_all_terms(int n = 28, int first = -5) {
     Problem p;
     p.domain = cube_domain(n, kH, first);
     const Function surface = [](const Vec3& x) { return length({x[0] - 0.4, 1.2 * x[1], x[2] + 0.3}) - 4.0; };
@@ -58,7 +58,7 @@ bool same_bits(const FloatGrid& a, const FloatGrid& b) {
 
 }  // namespace
 
-TEST_CASE("every option says when it is out of range") {
+TEST_CASE("EvolveOptions: every option that is out of range is named") {
     CHECK(why_invalid(EvolveOptions{}).empty());
     const auto rejects = [](const char* field, auto EvolveOptions::*member, auto value) {
         EvolveOptions o;
@@ -99,8 +99,8 @@ TEST_CASE("every option says when it is out of range") {
     CHECK(why_invalid(two) == "theta: expected 0 to 1, got 2\nmax_steps: expected >= 0, got -3");
 }
 
-TEST_CASE("unusable options and grids are refused, and u stays as it was") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): invalid options and grids are rejected, and u is unchanged") {
+    const Problem p = problem_with_all_terms(20);
     const Fields grids(p);
     const FloatGridPtr u = start_of(p), before = start_of(p);
     const EvolveOptions good = evolve_options(p.options, 2);
@@ -119,13 +119,13 @@ TEST_CASE("unusable options and grids are refused, and u stays as it was") {
         fields.edge = nullptr;
         CHECK(evolve_code([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
     }
-    SECTION("another voxel size") {
+    SECTION("distance with another voxel size") {
         Domain other = p.domain;
         other.voxel_size *= 1.01;
         set_domain(*grids.distance, other);
         CHECK(evolve_code([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
     }
-    SECTION("another origin") {
+    SECTION("edge detector with another origin") {
         Domain other = p.domain;
         other.origin[1] += 0.1 * kH;
         set_domain(*grids.edge, other);
@@ -134,8 +134,8 @@ TEST_CASE("unusable options and grids are refused, and u stays as it was") {
     CHECK(same_bits(*u, *before));
 }
 
-TEST_CASE("steps whose coefficients round to nothing are refused, those near them are not") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): a time step or delta whose coefficients underflow or overflow is rejected") {
+    const Problem p = problem_with_all_terms(20);
     const Fields grids(p);
     const FloatGridPtr u = start_of(p), before = start_of(p);
     EvolveOptions options = evolve_options(p.options, 2);
@@ -154,15 +154,15 @@ TEST_CASE("steps whose coefficients round to nothing are refused, those near the
     CHECK_FALSE(same_bits(*u, *before));
 }
 
-TEST_CASE("an empty band is refused") {
+TEST_CASE("evolve(): an empty band is rejected") {
     const FloatGridPtr u = make_grid(cube_domain(8, kH), 1.0F, "u");
     EvolveOptions o;
     o.theta = o.rho = 0;
     CHECK(evolve_code([&] { evolve(*u, {}, o); }) == Errc::InvalidInput);
 }
 
-TEST_CASE("a value that is not finite is named, and u stays as it was") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): an active value that is not finite is rejected, and u is unchanged") {
+    const Problem p = problem_with_all_terms(20);
     for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
         for (const auto& [what, follow] :
              {std::pair("u", false), std::pair("distance", false), std::pair("edge", false), std::pair("u", true),
@@ -184,8 +184,8 @@ TEST_CASE("a value that is not finite is named, and u stays as it was") {
         }
 }
 
-TEST_CASE("a frozen value that is not finite leaves u at the step before") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): a frozen value that is not finite is an error, and u is unchanged") {
+    const Problem p = problem_with_all_terms(20);
     const FloatGridPtr u = start_of(p);
     // The voxel that is not finite lies next to an active voxel, so that its value enters a row of the system.
     openvdb::Coord at = u->cbeginValueOn().getCoord();
@@ -197,8 +197,8 @@ TEST_CASE("a frozen value that is not finite leaves u at the step before") {
     CHECK(same_bits(*u, *before));
 }
 
-TEST_CASE("no step leaves every bit") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): without steps u is unchanged") {
+    const Problem p = problem_with_all_terms(20);
     const FloatGridPtr u = start_of(p);
     const EvolveReport report = evolve(*u, Fields(p).get(), evolve_options(p.options, 0));
     CHECK(report.steps == 0);
@@ -206,8 +206,8 @@ TEST_CASE("no step leaves every bit") {
     CHECK(max_difference(to_dense(p.domain, *u), p.u) == 0);
 }
 
-TEST_CASE("u keeps its topology, and its inactive values") {
-    const Problem p = everything_on();
+TEST_CASE("evolve(): u keeps its topology and its inactive values") {
+    const Problem p = problem_with_all_terms();
     const FloatGridPtr before = start_of(p), u = start_of(p);
     const EvolveReport report = evolve(*u, Fields(p).get(), evolve_options(p.options, 3));
     CHECK(report.steps == 3);
@@ -221,8 +221,8 @@ TEST_CASE("u keeps its topology, and its inactive values") {
     CHECK(max_difference(to_dense(p.domain, *u), p.u) > 0.1 * kH);
 }
 
-TEST_CASE("the same bits for 1, 2 and 8 threads") {
-    const Problem p = everything_on(44);
+TEST_CASE("evolve(): u is bit-identical for 1, 2 and 8 threads") {
+    const Problem p = problem_with_all_terms(44);
     EvolveOptions options = evolve_options(p.options, 6);
     options.solver_tolerance = 1e-3;
     options.attraction_range = 4 * kH;
@@ -235,7 +235,7 @@ TEST_CASE("the same bits for 1, 2 and 8 threads") {
     }
 }
 
-TEST_CASE("it stops when it is steady, and says so") {
+TEST_CASE("evolve(): the evolution ends when the surface is steady, and reports this") {
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
     set_distance(p, [](const Vec3& x) { return std::abs(length(x) - 3.0); });
     EvolveOptions o = evolve_options(p.options, 100);
@@ -252,7 +252,7 @@ TEST_CASE("it stops when it is steady, and says so") {
     for (const Crossing& c : zero_crossings(p.domain, end)) CHECK(length(c.position) == Approx(3.0).margin(0.5 * kH));
 }
 
-TEST_CASE("an automatic step grows by its ratio while the surface hardly moves") {
+TEST_CASE("evolve(): an automatic time step grows by sqrt(2) while the surface hardly moves") {
     // In a distance field of constant slope, a plane moves by the slope times the time step in each step.
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
     set_distance(p, [](const Vec3& x) { return 10 - 0.02 * x[0]; });
@@ -265,7 +265,7 @@ TEST_CASE("an automatic step grows by its ratio while the surface hardly moves")
         CHECK(changes[n] / changes[n - 1] == Approx(std::sqrt(2.0)).epsilon(0.02));
 }
 
-TEST_CASE("inactive leaves leave the surface where it would be") {
+TEST_CASE("evolve(): inactive leaves change the surface by less than 0.01 voxels") {
     // The sphere of the points touches the start on one side. This side is steady long before the opposite one arrives.
     const Vec3 target{4, 0, 0};
     Problem p = whole_cube(48, kH, [](const Vec3& x) { return clamp_to(length(x) - 9.5, 3 * kH); });
@@ -301,7 +301,7 @@ TEST_CASE("inactive leaves leave the surface where it would be") {
     }
 }
 
-TEST_CASE("a surface that shrinks away has vanished") {
+TEST_CASE("evolve(): a surface that shrinks to nothing is reported as vanished") {
     Problem p = whole_cube(14, kH, [](const Vec3& x) { return clamp_to(length(x) - 1.0, 3 * kH); });
     p.options.delta = 4 * kH;
     const FloatGridPtr u = start_of(p);
@@ -311,7 +311,7 @@ TEST_CASE("a surface that shrinks away has vanished") {
     CHECK(zero_crossings(p.domain, to_dense(p.domain, *u)).empty());
 }
 
-TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
+TEST_CASE("evolve(): a shrinking surface stops at an obstacle") {
     constexpr double kRadius = 2.0;
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
     const FloatGridPtr obstacle = start_grid(
@@ -335,7 +335,7 @@ TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
     }
 }
 
-TEST_CASE("between an obstacle and a floor a surface stays where they hold it") {
+TEST_CASE("evolve(): a surface between a coinciding obstacle and floor stays in place") {
     Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
     const FloatGridPtr held = start_grid(
         p.domain, [](const Vec3& x) { return length(x) - 3.5; }, 3 * kH);
@@ -355,7 +355,7 @@ TEST_CASE("between an obstacle and a floor a surface stays where they hold it") 
     }
 }
 
-TEST_CASE("a tracked band that its domain cuts off has the solid's inside, whichever faces cut it") {
+TEST_CASE("evolve(): a tracked band cut by any faces of its domain keeps the sign of the solid") {
     constexpr double kBall = 90;
     const Domain whole = make_domain({{-128, -128, -128}, {128, 128, 128}}, 1.0);
     const FloatGridPtr ball = start_from_sphere(make_domain(whole.world_box(), 2.0), {0, 0, 0}, kBall);
@@ -380,8 +380,8 @@ TEST_CASE("a tracked band that its domain cuts off has the solid's inside, which
     }
 }
 
-TEST_CASE("cancelled between steps, u holds the last whole one") {
-    const Problem p = everything_on(20);
+TEST_CASE("evolve(): after cancellation u is the result of the last complete step") {
+    const Problem p = problem_with_all_terms(20);
     std::atomic<bool> cancel{false};
     RunContext run;
     run.cancel = &cancel;
@@ -398,7 +398,7 @@ TEST_CASE("cancelled between steps, u holds the last whole one") {
     CHECK(max_difference(to_dense(p.domain, *u), run_evolve(p, 3)) == 0);
 }
 
-TEST_CASE("Neumann: a plane that meets the boundary stays a plane") {
+TEST_CASE("Neumann condition: a plane perpendicular to the boundary stays a plane") {
     for (int axis = 0; axis < 3; ++axis) {
         // A domain of 13 voxels along each axis ends inside leaves.
         Problem p = whole_cube(
@@ -417,7 +417,7 @@ TEST_CASE("Neumann: a plane that meets the boundary stays a plane") {
     }
 }
 
-TEST_CASE("Neumann: a domain and its mirror image side by side give the same values") {
+TEST_CASE("Neumann condition: a domain together with its mirror image gives the same values") {
     const Function waves = random_waves(21, 4.0), slopes = random_waves(22, 5.0);
     for (int axis = 0; axis < 3; ++axis) {
         const int n = 11;
@@ -452,7 +452,7 @@ TEST_CASE("Neumann: a domain and its mirror image side by side give the same val
     }
 }
 
-TEST_CASE("beyond the attraction range the points do not pull") {
+TEST_CASE("Attraction range: points farther away do not move the surface") {
     Problem p = whole_cube(16, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
     set_distance(p, [](const Vec3& x) { return 10 - x[0]; });
     p.options.attraction_range = 4.0;
@@ -461,7 +461,7 @@ TEST_CASE("beyond the attraction range the points do not pull") {
     CHECK(max_difference(run_evolve(p, 3), p.u) > kH);
 }
 
-TEST_CASE("where the distance is not known the image keeps its full weight") {
+TEST_CASE("image_yields: where the distance is unknown, the image keeps its full weight") {
     Problem p = whole_cube(16, kH, [](const Vec3& x) { return clamp_to(x[1], 3 * kH); });
     p.distance = sample(p.domain, [](const Vec3& x) { return x[0] > 0 ? NAN : 0.1; });
     set_edge(p, [](const Vec3& x) { return 0.5 + 0.05 * x[1]; });
@@ -473,7 +473,7 @@ TEST_CASE("where the distance is not known the image keeps its full weight") {
     CHECK(u.at(12, 8, 8) > p.u.at(12, 8, 8) + kH);
 }
 
-TEST_CASE("the change of a leaf is its largest, and one value that is not finite is seen anywhere") {
+TEST_CASE("change_of: the maximum change in a leaf, and any value that is not finite is detected") {
     std::vector<float> before(512), now(512);
     for (std::size_t n = 0; n < 512; ++n) now[n] = before[n] = float(n) - 200.0F;
     now[301] -= 3.5F;

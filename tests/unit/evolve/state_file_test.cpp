@@ -47,7 +47,7 @@ void load(const std::string& path) {
 
 }  // namespace
 
-TEST_CASE("A state comes back from its file with the same bits") {
+TEST_CASE("A state is restored bit by bit from its file") {
     const Scratch folder;
     State written{0.1, {1.5F, -2.25F, std::numeric_limits<float>::denorm_min()}, {1, 2, 255}}, back;
     {
@@ -61,7 +61,7 @@ TEST_CASE("A state comes back from its file with the same bits") {
     CHECK(std::equal(back.fixed, back.fixed + 3, written.fixed));
 }
 
-TEST_CASE("A state's file that is damaged anywhere, cut or too long is refused") {
+TEST_CASE("A state file that is damaged at any byte, truncated, too long or missing is rejected") {
     const Scratch folder;
     const std::string path = folder.path("s");
     {

@@ -42,7 +42,7 @@ double clamped(double value) { return std::clamp(value, -kClamp * kH, kClamp * k
 
 struct Difference {
     double largest = 0, crossing = 0;
-    int signs = 0, apart = 0;
+    int signs = 0, activity = 0;
 };
 
 /// Differences of two bands: the maximum difference of values up to the clamp, in voxels; that of the positions at
@@ -56,7 +56,7 @@ Difference difference(const FloatGrid& one, const FloatGrid& other) {
     for (auto voxel = box.begin(); voxel; ++voxel) {
         const float u = a.getValue(*voxel), v = b.getValue(*voxel);
         result.signs += (u < 0) != (v < 0);
-        result.apart += a.isValueOn(*voxel) != b.isValueOn(*voxel);
+        result.activity += a.isValueOn(*voxel) != b.isValueOn(*voxel);
         result.largest = std::max(result.largest, std::abs(clamped(u) - clamped(v)) / kH);
         for (int axis = 0; axis < 3; ++axis) {
             openvdb::Coord next = *voxel;
@@ -72,7 +72,7 @@ Difference difference(const FloatGrid& one, const FloatGrid& other) {
 
 }  // namespace
 
-TEST_CASE("a band is tracked to first order as by exact distances, from whatever profile and however wide") {
+TEST_CASE("track_surface: a band of any slope and width agrees with exact distances to first order") {
     const double reach = GENERATE(3.0, 14.0);
     const float scale = GENERATE(1.0F, 0.07F);
     INFO(reach << " voxels, scaled by " << scale);
@@ -80,15 +80,15 @@ TEST_CASE("a band is tracked to first order as by exact distances, from whatever
     const FloatGridPtr exact =
         detail::redistance(*before, kDomain, detail::kTrackingWidth, detail::DomainEnd::Open, "u", {});
     detail::track_surface(*fast, kDomain, kClamp);
-    const Difference apart = difference(*fast, *exact);
-    CHECK(apart.signs == 0);
+    const Difference from_exact = difference(*fast, *exact);
+    CHECK(from_exact.signs == 0);
     // Neither redistance() nor track_surface() may move the surface. Their results differ only in the groove between
     // the balls.
     CHECK(difference(*fast, *before).crossing <= difference(*exact, *before).crossing);
     CHECK(difference(*exact, *before).crossing < 0.03);
-    CHECK(apart.largest < 0.25);
+    CHECK(from_exact.largest < 0.25);
     const auto active = double(exact->activeVoxelCount());
-    CHECK(apart.apart < 0.1 * active);
+    CHECK(from_exact.activity < 0.1 * active);
     CHECK(fast->background() == float(kClamp * kH));
     CHECK(double(fast->tree().leafCount()) <= 1.1 * double(exact->tree().leafCount()));
     for (auto value = fast->cbeginValueOn(); value; ++value)
@@ -98,7 +98,7 @@ TEST_CASE("a band is tracked to first order as by exact distances, from whatever
         }
 }
 
-TEST_CASE("a free surface stays where it is, and its band holds the distance") {
+TEST_CASE("track_free_surface: the surface stays in place, and the band contains the signed distance") {
     const float scale = GENERATE(0.07F, 0.7F, 1.0F, 1.6F, 8.0F);
     const bool is_distance = scale > detail::kFlattest && scale < detail::kSteepest;
     INFO("scaled by " << scale);
@@ -131,7 +131,7 @@ TEST_CASE("a free surface stays where it is, and its band holds the distance") {
     CHECK(std::abs(values.getValue(corner) - level(world_of(kDomain, corner))) < kH / kRadius);
 }
 
-TEST_CASE("a level set without a surface is refused, and stays as it was") {
+TEST_CASE("track_surface: a level set without a surface is rejected and unchanged") {
     FloatGridPtr u = make_grid(kDomain, 1.5F, "u");
     u->tree().setValue({3, 4, 5}, 0.7F);
     const FloatGridPtr before = u->deepCopy();

@@ -8,7 +8,7 @@
 
 using namespace covol::detail;
 
-TEST_CASE("a leaf's neighbours are those of a plain search, near the origin and where keys begin again") {
+TEST_CASE("LeafBand: neighbours are those of a plain search, near the origin and where keys wrap around") {
     const int center = GENERATE(0, 1 << 23, -(1 << 23), (1 << 23) - 8);
     // Leaves are drawn at random within this many leaves of the centre. With 2 all of them are present, with 6 there
     // are some gaps, and with 40 they are far apart.

@@ -6,7 +6,7 @@
 
 using namespace covol::detail;
 
-TEST_CASE("a mask spreads through faces, not along edges or corners, as a plain search has it") {
+TEST_CASE("spread: a leaf mask grows through faces only, as by a plain flood fill") {
     std::mt19937_64 random(1);
     std::uniform_int_distribution<int> percent(0, 99), any(0, kLeafSize - 1);
     for (int round = 0; round < 300; ++round) {

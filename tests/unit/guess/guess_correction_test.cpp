@@ -53,7 +53,7 @@ Vec3 at(double radius, double theta, double phi) {
 
 }  // namespace
 
-TEST_CASE("the corrected surface passes a mark, near or far, outside or inside", "[guess]") {
+TEST_CASE("The corrected surface passes through a mark, near or far, outside or inside of the guess", "[guess]") {
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     for (const double off : {-7.0, -2.0, 1.0, 3.0, 9.0}) {
         const Vec3 mark = at(kRadius + off, 1.1, 0.4);
@@ -70,7 +70,7 @@ TEST_CASE("the corrected surface passes a mark, near or far, outside or inside",
     }
 }
 
-TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[guess]") {
+TEST_CASE("Marks on the guess leave it unchanged, and hold it in place beside other marks", "[guess]") {
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 voxels apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
@@ -87,7 +87,7 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     CHECK(both.shift(off) == Approx(5).margin(0.5));
 }
 
-TEST_CASE("many marks of another surface give that surface", "[guess]") {
+TEST_CASE("Many marks on another surface move the guess to that surface", "[guess]") {
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const auto [count, within] = GENERATE(Catch::Generators::table<int, double>({{150, 2.0}, {600, 1.0}}));
     std::mt19937 random(3);
@@ -109,7 +109,7 @@ TEST_CASE("many marks of another surface give that surface", "[guess]") {
     CHECK(worst < within);
 }
 
-TEST_CASE("a part that is missing is filled, and what is right beside it is not inflated", "[guess]") {
+TEST_CASE("A missing part is filled without inflating the correct part beside it", "[guess]") {
     // A ball without its cap, which has a quarter of the ball's area and is 0.65 radii high, and ten random marks on
     // the cap.
     constexpr double kPlane = 0.347 * kRadius;
@@ -163,7 +163,7 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
     CHECK(reached[5] > given + 0.07);
 }
 
-TEST_CASE("voxels beyond the marks' reach keep their value to the bit", "[guess]") {
+TEST_CASE("Voxels beyond the reach of the marks keep their value", "[guess]") {
     const Image mask = ball_mask(kRadius, 200, 2);  // the mask also contains a plane of another label
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const GuessCorrection correction = correct_guess(guess, {at(kRadius + 4, 0.7, 2), at(kRadius - 3, 2.2, 5)}, {}, {});
@@ -188,7 +188,7 @@ TEST_CASE("voxels beyond the marks' reach keep their value to the bit", "[guess]
     CHECK(reached < mask.geometry().size[0] * std::size_t(kSize) * kSize / 4);
 }
 
-TEST_CASE("seeds move a guess that has them on the wrong side, and no other", "[guess]") {
+TEST_CASE("Seeds on the wrong side move the guess, those on the right side are not counted", "[guess]") {
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 in = at(kRadius + 4, 1, 1), out = at(kRadius - 4, 2, 4);
     const GuessCorrection correction = correct_guess(guess, {}, {in, kMiddle}, {out, {1, 1, 1}});
@@ -198,14 +198,14 @@ TEST_CASE("seeds move a guess that has them on the wrong side, and no other", "[
     CHECK(value_at(*start, out) > 0);
 }
 
-TEST_CASE("without marks a guess stays", "[guess]") {
+TEST_CASE("Without marks a guess is unchanged", "[guess]") {
     const GuessCorrection correction = correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {});
     const CorrectedMask same = correction.apply(ball_mask(kRadius), 1);
     CHECK(same.added + same.removed + same.reached == 0);
     CHECK(value_at(*correction.start(), at(kRadius, 1, 1)) == Approx(0).margin(0.05));
 }
 
-TEST_CASE("options of a correction", "[guess]") {
+TEST_CASE("CorrectionOptions: values out of range are named and rejected", "[guess]") {
     CorrectionOptions options;
     CHECK(why_invalid(options).empty());
     options.precision = -1;

@@ -71,7 +71,7 @@ std::vector<Vec3> draw(const Shape& shape, int count, unsigned seed) {
     return points;
 }
 
-GuessOptions precision(const Vec3& spacing, double fraction = 0.3) {
+GuessOptions options_of_precision(const Vec3& spacing, double fraction = 0.3) {
     GuessOptions options;
     for (int a = 0; a < 3; ++a) options.deviation[a][a] = fraction * spacing[a];
     return options;
@@ -92,14 +92,14 @@ Bias bias_of(const Shape& shape, const std::vector<Vec3>& marks, const GuessOpti
 
 }  // namespace
 
-TEST_CASE("exact points are met without bias, however few") {
+TEST_CASE("Exact marks are interpolated without bias, however few they are") {
     const Shape shapes[] = {ellipsoid("sphere", {20, 20, 20}), ellipsoid("ellipsoid", {28, 18, 14}), torus(24, 11)};
     for (const Vec3& spacing : {Vec3{1, 1, 1}, Vec3{1, 1, 5}})
         for (const Shape& shape : shapes)
             for (const int count : {50, 300, 3000})
                 for (const unsigned seed : {1u, 2u}) {
                     if (count == 3000 && seed > 1) continue;
-                    const Bias bias = bias_of(shape, draw(shape, count, seed), precision(spacing));
+                    const Bias bias = bias_of(shape, draw(shape, count, seed), options_of_precision(spacing));
                     INFO(shape.name << ", " << count << " points, seed " << seed << ", spacing " << spacing[2]
                                     << ": mean " << bias.mean << " voxels, volume " << bias.volume);
                     CHECK(std::abs(bias.mean) <= (count == 50 ? shape.bias_of_50 : 0.02));
@@ -107,7 +107,7 @@ TEST_CASE("exact points are met without bias, however few") {
                 }
 }
 
-TEST_CASE("rough marks in thick slices enclose a body") {
+TEST_CASE("Inaccurate marks in thick slices enclose a body of half to twice the true volume") {
     // The marks are scattered, so that the body is bumpy. By bending energy alone, many surfaces through such marks run
     // to infinity and do not close.
     const Shape shape = ellipsoid("ellipsoid", {18, 13, 16});
@@ -117,12 +117,12 @@ TEST_CASE("rough marks in thick slices enclose a body") {
         for (unsigned seed = 1; seed <= 12; ++seed) {
             std::vector<Vec3> marks = draw(shape, count, seed);
             std::mt19937 random(seed);
-            std::uniform_real_distribution<double> off(-0.5, 0.5), knob(0.75, 1.25);
+            std::uniform_real_distribution<double> off(-0.5, 0.5), factor(0.75, 1.25);
             for (Vec3& mark : marks) {
-                const double times = knob(random);
+                const double times = factor(random);
                 for (int a = 0; a < 3; ++a) mark[a] = times * mark[a] + off(random) * spacing[a];
             }
-            const Guess guess = guess_from_marks(cube_domain(120, 1.0), marks, precision(spacing));
+            const Guess guess = guess_from_marks(cube_domain(120, 1.0), marks, options_of_precision(spacing));
             const double volume = measure(extract_mesh(*extract_surface(*guess.u), {})).volume / shape.volume;
             held += guess.report.held_around;
             INFO(count << " marks, seed " << seed << ": volume " << volume << ", held " << guess.report.held_around);
@@ -132,10 +132,10 @@ TEST_CASE("rough marks in thick slices enclose a body") {
     CHECK(held > 0);
 }
 
-TEST_CASE("what encloses nothing is refused with a reason") {
+TEST_CASE("Marks that enclose nothing are rejected with a reason") {
     const Domain domain = cube_domain(40, 1.0);
     const auto guess = [&](const std::vector<Vec3>& marks) {
-        return guess_from_marks(domain, marks, precision({1, 1, 1})).u;
+        return guess_from_marks(domain, marks, options_of_precision({1, 1, 1})).u;
     };
     CHECK_THROWS_WITH(guess({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}}), Catch::Contains("at least 4 marks"));
     std::vector<Vec3> ring;
@@ -143,25 +143,25 @@ TEST_CASE("what encloses nothing is refused with a reason") {
     CHECK_THROWS_WITH(guess(ring), Catch::Contains("second slice"));
 }
 
-TEST_CASE("a guess does not depend on the number of threads, nor on where the world begins") {
+TEST_CASE("The guess is bit-identical for 1 and 4 threads") {
     const Shape shape = ellipsoid("ellipsoid", {18, 12, 10});
     const Domain domain = cube_domain(56, 1.0);
     const std::vector<Vec3> marks = draw(shape, 500, 5);  // so many that the surface is computed in patches
     RunContext one, four;
     one.threads = 1;
     four.threads = 4;
-    const Guess a = guess_from_marks(domain, marks, precision({1, 1, 1}), one);
-    const Guess b = guess_from_marks(domain, marks, precision({1, 1, 1}), four);
+    const Guess a = guess_from_marks(domain, marks, options_of_precision({1, 1, 1}), one);
+    const Guess b = guess_from_marks(domain, marks, options_of_precision({1, 1, 1}), four);
     CHECK(a.report.patches > 0);
     CHECK(identical(*a.u, *b.u));
 }
 
-TEST_CASE("marks in the cut are told from marks on the surface") {
+TEST_CASE("Marks in the cut are distinguished from marks on the surface") {
     // A ball whose upper third is beyond the end of the image, with marks on its surface and on the cut.
     const Shape shape = ellipsoid("sphere", {20, 20, 20});
     Domain domain = cube_domain(72, 1.0);
     domain.max[2] = domain.min[2] + 41;
-    GuessOptions options = precision({1, 1, 1});
+    GuessOptions options = options_of_precision({1, 1, 1});
     options.end = domain.world_box();
     const double top = options.end->max[2];
     std::vector<Vec3> marks;
@@ -184,13 +184,13 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
     CHECK(std::abs(sum / count) < 0.03);
 }
 
-TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
+TEST_CASE("An outside seed in a cavity keeps the cavity open") {
     // A thick shell with marks on both walls. Without a seed, the cavity may be taken for part of the body.
     std::vector<Vec3> marks = draw(ellipsoid("outer", {22, 22, 22}), 120, 11);
     const std::vector<Vec3> inner = draw(ellipsoid("inner", {10, 10, 10}), 40, 12);
     marks.insert(marks.end(), inner.begin(), inner.end());
     const Domain domain = cube_domain(64, 1.0);
-    GuessOptions options = precision({1, 1, 1});
+    GuessOptions options = options_of_precision({1, 1, 1});
     options.outside = {{0, 0, 0}};
     options.inside = {{16, 0, 0}, {0, -16, 0}};
     const auto [guess, kept, report] = guess_from_marks(domain, marks, options);

@@ -15,7 +15,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 
 /// The identity plus the Laplacian of a graph, a ring with some chords. This matrix is symmetric and positive definite.
-Sparse half_of(int n) {
+Sparse graph_matrix(int n) {
     std::mt19937_64 random(7);
     std::vector<Eigen::Triplet<double>> entries;
     const auto couple = [&](int a, int b, double weight) {
@@ -36,9 +36,9 @@ Sparse half_of(int n) {
 
 }  // namespace
 
-TEST_CASE("conjugate gradients solve what a factorization solves, from anywhere, the same for any number of threads") {
+TEST_CASE("Conjugate gradients agree with a factorization and are bit-identical on any number of threads") {
     const int n = GENERATE(1, 5, 1023, 3000);
-    const Sparse half = n < 3 ? Sparse(Eigen::MatrixXd::Constant(1, 1, 4.0).sparseView()) : half_of(n);
+    const Sparse half = n < 3 ? Sparse(Eigen::MatrixXd::Constant(1, 1, 4.0).sparseView()) : graph_matrix(n);
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> uniform(-1, 1);
     std::vector<double> weight(n), diagonal(n), right(n), begin(n);

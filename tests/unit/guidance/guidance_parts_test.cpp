@@ -34,7 +34,7 @@ Domain cube(int half, double h) {
 
 }  // namespace
 
-TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guidance]") {
+TEST_CASE("WideDistance: distances to a sphere in a wide band, and the sphere moved by an offset", "[guidance]") {
     const double h = 0.5;
     const Domain domain = cube(32, h);
     const FloatGridPtr start = start_from_sphere(domain, {0, 0, 0}, kRadius * h);
@@ -65,7 +65,7 @@ TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guid
     }
 }
 
-TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
+TEST_CASE("drop_unmarked_pieces: small pieces and cavities are removed unless a mark is near", "[guidance]") {
     const Domain domain = cube(32, 1);
     const Vec3 speck{26, 0, 0}, bubble{0, -8, 0};
     const auto made = [&] {
@@ -95,7 +95,7 @@ TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
     CHECK(sides(*marked) == std::pair(true, false));
 }
 
-TEST_CASE("of a random field the pieces go that a plain search through faces finds", "[guidance]") {
+TEST_CASE("drop_unmarked_pieces: pieces of a random field are those of a plain search through faces", "[guidance]") {
     using openvdb::Coord;
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
     CAPTURE(seed);
@@ -156,7 +156,7 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
         if (u->tree().getValue(at) != value) FAIL_CHECK(at << ": " << u->tree().getValue(at) << ", expected " << value);
 }
 
-TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows which patches meet", "[guidance]") {
+TEST_CASE("Patches partition a surface's vertices and area, and have the right borders and neighbours", "[guidance]") {
     const double h = 0.5, radius = 8;
     const TriangleMesh mesh = extract_mesh(*start_from_sphere(cube(24, h), {0, 0, 0}, radius));
     guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 1.5);

@@ -132,7 +132,7 @@ TEST_CASE("Between the marks the border of a noisy bright ball is found") {
     }
 }
 
-TEST_CASE("A guess that is off by three voxels between 20 marks is brought home") {
+TEST_CASE("A guess that is off by up to three voxels between 20 marks is moved to the border") {
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
@@ -144,7 +144,7 @@ TEST_CASE("A guess that is off by three voxels between 20 marks is brought home"
     CHECK(radius_of(*target, kRadius).largest < 1.2);
 }
 
-TEST_CASE("An image that shows nothing leaves the guess as it is") {
+TEST_CASE("An image of noise does not worsen the guess, and a constant image does not change it") {
     const ImageGeometry g = lattice();
     const std::vector<Vec3> marks = marks_on_sphere(60, kRadius);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
@@ -164,7 +164,7 @@ TEST_CASE("An image that shows nothing leaves the guess as it is") {
     CHECK(radius_of(*target, kRadius).rms == Approx(before).epsilon(0.01));
 }
 
-TEST_CASE("A stained membrane is found, bright or dark, whatever lies beside it") {
+TEST_CASE("A stained membrane is found, whether bright or dark") {
     const ImageGeometry g = lattice();
     for (const double line : {80.0, -40.0}) {
         const Image image = picture(
@@ -177,7 +177,7 @@ TEST_CASE("A stained membrane is found, bright or dark, whatever lies beside it"
     }
 }
 
-TEST_CASE("The border is where the marks have it, not where the slope is steepest") {
+TEST_CASE("The border is found at the marks' intensity profile, not at the steepest slope") {
     // The slope of the image is steepest one and a half voxels inside of the sphere on which the marks lie.
     const ImageGeometry g = lattice();
     const Image image = picture(
@@ -189,7 +189,7 @@ TEST_CASE("The border is where the marks have it, not where the slope is steepes
     CHECK(radius_of(*target, kRadius).rms < 0.5 * radius_of(*guess, kRadius).rms);
 }
 
-TEST_CASE("A second structure nearby does not draw the surface to itself") {
+TEST_CASE("A brighter structure nearby does not attract the surface") {
     const ImageGeometry g = lattice();
     // Beside the marked ball, two voxels away, there is a second, brighter one.
     const double other = 8;
@@ -208,7 +208,7 @@ TEST_CASE("A second structure nearby does not draw the surface to itself") {
     CHECK(radius_of(*target, kRadius).largest < radius_of(*guess, kRadius).largest);
 }
 
-TEST_CASE("Slices five voxels apart: the ball is found along them too") {
+TEST_CASE("The border is found in slices that are five voxels apart") {
     const ImageGeometry g = lattice(5);
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
@@ -218,7 +218,7 @@ TEST_CASE("Slices five voxels apart: the ball is found along them too") {
     CHECK(radius_of(*target, kRadius).rms < 0.8 * radius_of(*guess, kRadius).rms);
 }
 
-TEST_CASE("Guidance gives the same bits for any number of threads") {
+TEST_CASE("Guidance is bit-identical for 1, 2 and 8 threads") {
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
@@ -240,7 +240,7 @@ TEST_CASE("Guidance gives the same bits for any number of threads") {
     }
 }
 
-TEST_CASE("the precision of marks is their standard deviation, as segment() means it") {
+TEST_CASE("Giving the automatic precision of marks changes nothing, another precision changes the error") {
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
@@ -259,7 +259,7 @@ TEST_CASE("the precision of marks is their standard deviation, as segment() mean
     CHECK(coarse.image_error != Approx(automatic.image_error));
 }
 
-TEST_CASE("Guidance says what is wrong with its options") {
+TEST_CASE("Guidance names and rejects an option that is out of range") {
     GuidanceOptions options;
     options.weight = 2;
     CHECK(why_invalid(options).find("weight: expected 0 to 1, got 2") == 0);

@@ -66,7 +66,7 @@ FloatGridPtr body(const Appearance& look = {}) {
                             });
 }
 
-CompareReport apart(const FloatGridPtr& one, const FloatGridPtr& other) {
+CompareReport compare_level_sets(const FloatGridPtr& one, const FloatGridPtr& other) {
     Solid a, b;
     a.level_set = one;
     b.level_set = other;
@@ -75,7 +75,7 @@ CompareReport apart(const FloatGridPtr& one, const FloatGridPtr& other) {
 
 }  // namespace
 
-TEST_CASE("In an image that did not change a surface stays where it is") {
+TEST_CASE("A surface stays in place if the image does not change") {
     const double noise = GENERATE(0.0, 0.1);
     const Appearance look{.noise = noise};
     const FloatGridPtr before = body();
@@ -86,7 +86,7 @@ TEST_CASE("In an image that did not change a surface stays where it is") {
     CHECK(followed.u == before);
 }
 
-TEST_CASE("A surface follows what moves and grows, whatever the lamp does") {
+TEST_CASE("A surface follows a body that moves and grows while gain and offset of the image change") {
     const Appearance then{.noise = 0.03};
     Appearance now{.shift = {3.2, -1.6, 0.7}, .gain = 60, .base = 90, .noise = 0.03};
     now.grown = GENERATE(0.0, 1.0);
@@ -95,11 +95,11 @@ TEST_CASE("A surface follows what moves and grows, whatever the lamp does") {
     for (int a = 0; a < 3; ++a) CHECK(followed.report.translation[a] == Approx(now.shift[a]).margin(0.3));
     CHECK(followed.report.mean_offset == Approx(now.grown).margin(0.3));
     CHECK(followed.report.correlation > 0.9);
-    CHECK(apart(followed.u, body(now)).assd < 0.3);
-    CHECK(apart(before, body(now)).assd > 1.2);  // the error if the surface did not follow
+    CHECK(compare_level_sets(followed.u, body(now)).assd < 0.3);
+    CHECK(compare_level_sets(before, body(now)).assd > 1.2);  // the error if the surface did not follow
 }
 
-TEST_CASE("The surface that follows does not depend on threads") {
+TEST_CASE("The followed surface does not depend on the number of threads") {
     const Image then = frame({}), now = frame({.shift = {1, 0, 0}, .grown = 0.5, .noise = 0.05});
     std::vector<FloatGridPtr> found;
     for (const int threads : {1, 3}) {
@@ -112,7 +112,7 @@ TEST_CASE("The surface that follows does not depend on threads") {
         REQUIRE(*value == found[1]->tree().getValue(value.getCoord()));
 }
 
-TEST_CASE("A static time-lapse keeps its surface to a tenth of a voxel over ten frames") {
+TEST_CASE("In a static time-lapse the surface moves by less than a tenth of a voxel over ten frames") {
     Marks marks;
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;
@@ -133,10 +133,10 @@ TEST_CASE("A static time-lapse keeps its surface to a tenth of a voxel over ten 
     const Image still = frame({.noise = 0.03});
     TimeLapse lapse;
     const FloatGridPtr first = lapse.segment(still, {marks}).structures.at(0).result.surface;
-    CHECK(apart(first, body()).assd < 0.5);
+    CHECK(compare_level_sets(first, body()).assd < 0.5);
     StructuresResult last;
     for (int n = 1; n < 10; ++n) last = lapse.segment(still, {Marks{}});
-    CHECK(apart(first, last.structures.at(0).result.surface).hausdorff < 0.1);
+    CHECK(compare_level_sets(first, last.structures.at(0).result.surface).hausdorff < 0.1);
     REQUIRE(last.structures.at(0).motion);
     CHECK(last.structures.at(0).result.report.solve.steps == 0);
 }

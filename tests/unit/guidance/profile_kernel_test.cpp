@@ -10,7 +10,7 @@ using namespace covol::guidance;
 namespace {
 
 template <typename T>
-std::vector<T> some(std::size_t count, unsigned seed) {
+std::vector<T> random_values(std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<T> value(-1, 1);
     std::vector<T> values(count);
@@ -20,25 +20,25 @@ std::vector<T> some(std::size_t count, unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("a sum of products, for each multiple of eight") {
+TEST_CASE("sum_of_products equals a plain sum for multiples of eight") {
     for (const std::size_t count : {0U, 8U, 16U, 24U, 504U}) {
-        const std::vector<float> a = some<float>(count, 1), b = some<float>(count, 2);
+        const std::vector<float> a = random_values<float>(count, 1), b = random_values<float>(count, 2);
         double expected = 0;
         for (std::size_t n = 0; n < count; ++n) expected += double(a[n]) * double(b[n]);
         CHECK(sum_of_products(a.data(), b.data(), count) == Approx(expected).margin(1e-5));
     }
 }
 
-TEST_CASE("weighted values are added") {
-    std::vector<double> sums = some<double>(37, 3);
-    const std::vector<double> before = sums, values = some<double>(37, 4);
+TEST_CASE("add_weighted adds weighted values") {
+    std::vector<double> sums = random_values<double>(37, 3);
+    const std::vector<double> before = sums, values = random_values<double>(37, 4);
     add_weighted(sums.data(), values.data(), 0.3, sums.size());
     for (std::size_t n = 0; n < sums.size(); ++n) CHECK(sums[n] == Approx(before[n] + 0.3 * values[n]));
 }
 
-TEST_CASE("a convolution, its last values too") {
+TEST_CASE("convolve equals a plain convolution and writes nothing beyond the last value") {
     for (const std::size_t count : {1U, 7U, 8U, 21U}) {
-        const std::vector<float> kernel = some<float>(5, 5), line = some<float>(count + 4, 6);
+        const std::vector<float> kernel = random_values<float>(5, 5), line = random_values<float>(count + 4, 6);
         std::vector<float> out(count + 1, 9.0F);
         convolve(line.data(), kernel.data(), kernel.size(), out.data(), count);
         for (std::size_t n = 0; n < count; ++n) {

@@ -86,7 +86,7 @@ TreatedHoles treat(Function function, const TriangleMesh& mesh, const std::vecto
 
 }  // namespace
 
-TEST_CASE("boundary loops: number, edges, length") {
+TEST_CASE("Boundary loops: a strip with a hole has two, with their lengths, and a closed mesh has none") {
     // A strip of 4 x 3 unit squares without the square at (1,1).
     TriangleMesh strip;
     for (int j = 0; j <= 3; ++j)
@@ -107,7 +107,7 @@ TEST_CASE("boundary loops: number, edges, length") {
     CHECK(find_boundary_loops(sphere_mesh(2)).empty());
 }
 
-TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
+TEST_CASE("Cutting a sphere along a plane: the kept cap has its area and rim, and all angles exceed 8 degrees") {
     const TriangleMesh sphere = sphere_mesh(5);
     const double area = measure(sphere).area;
     for (const double level : {-0.61, 0.0, 0.123, 0.5, 0.97}) {
@@ -128,7 +128,7 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
     }
 }
 
-TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
+TEST_CASE("A vertex at which two triangle fans meet is duplicated, so that the part is manifold") {
     // A square of four triangles around a centre. Only two opposite triangles are kept, which meet in the centre alone.
     const TriangleMesh square{{{0, 0, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}},
                               {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}}};
@@ -140,7 +140,7 @@ TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
     CHECK(find_boundary_loops(part).size() == 2);
 }
 
-TEST_CASE("the membrane between two rings is a catenoid, over a flat rim a plane") {
+TEST_CASE("The membrane between two rings is a catenoid, and the membrane over a planar rim is planar") {
     // Two rings of radius cosh(0.5) at z = -0.5 and 0.5. The minimal surface between them is the catenoid r = cosh z.
     constexpr int kAround = 96, kAlong = 40;
     TriangleMesh tube;
@@ -174,7 +174,7 @@ TEST_CASE("the membrane between two rings is a catenoid, over a flat rim a plane
     CHECK(measure(sphere).volume == Approx(2 * kPi / 3).epsilon(0.01));
 }
 
-TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
+TEST_CASE("A partly sampled sphere is trimmed, or closed by a flat lid, at the border of its points") {
     const TriangleMesh sphere = sphere_mesh(6);
     for (unsigned seed = 1; seed <= 5; ++seed)
         for (const double level : {0.0, 0.5, 0.85}) {
@@ -217,7 +217,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
         }
 }
 
-TEST_CASE("two holes, no hole, and nothing but holes") {
+TEST_CASE("Two holes are trimmed, a complete sphere is unchanged, bare surfaces and invalid input are rejected") {
     const TriangleMesh sphere = sphere_mesh(5);
     const std::vector<Vec3> belt = sphere_points(8000, 3, [](const Vec3& p) { return std::abs(p[2]) < 0.6; });
     const TreatedHoles open = treat(trim_holes, sphere, belt);
@@ -239,7 +239,7 @@ TEST_CASE("two holes, no hole, and nothing but holes") {
     CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, all), 0.1, 0.1), Error);
 }
 
-TEST_CASE("a few points by themselves in a hole are no piece of the surface") {
+TEST_CASE("An isolated point in a hole does not keep a piece of the surface") {
     const TriangleMesh sphere = sphere_mesh(5);
     std::vector<Vec3> points = sphere_points(8000, 5, [](const Vec3& p) { return p[2] < 0; });
     points.push_back({0, 0, 1});
@@ -249,7 +249,7 @@ TEST_CASE("a few points by themselves in a hole are no piece of the surface") {
     CHECK(measure(open.mesh).components == 1);
 }
 
-TEST_CASE("distances to points are those of brute force; the share is that of a cap") {
+TEST_CASE("Distances to points equal brute force, and the fraction beyond a distance is that outside of a cap") {
     const TriangleMesh sphere = sphere_mesh(4);
     const std::vector<Vec3> points = test::sphere_cloud(200, 1.1, 6);
     const std::vector<float> distances = measure_distances(sphere, points);
@@ -263,7 +263,7 @@ TEST_CASE("distances to points are those of brute force; the share is that of a 
     CHECK(measure_fraction_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
 }
 
-TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set says the same but for open") {
+TEST_CASE("segment: a hemisphere is closed, left open (with a closed level set) or given a flat lid") {
     std::vector<Vec3> points = sphere_points(12000, 7, [](const Vec3& p) { return p[2] < 0; });
     SegmentOptions options;
     options.voxel_size = 0.04;

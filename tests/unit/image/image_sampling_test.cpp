@@ -9,7 +9,7 @@
 using namespace covol;
 using namespace covol::test;
 
-TEST_CASE("index and world are inverse, and the box holds the voxels' corners") {
+TEST_CASE("Index and world coordinates are inverse maps, and the world box includes the outer voxel corners") {
     const ImageGeometry g = oblique();
     const Vec3 index{2.5, 4.0, -1.0};
     const Vec3 back = g.world_to_index(g.index_to_world(index));
@@ -26,7 +26,7 @@ TEST_CASE("index and world are inverse, and the box holds the voxels' corners") 
     CHECK(plain.world_box().min == Vec3{6.5, -9, -1.5});
 }
 
-TEST_CASE("samples on the image's own lattice are its values") {
+TEST_CASE("Samples on the image's own lattice equal its voxel values") {
     ImageGeometry g;
     g.size = {6, 5, 4};
     g.spacing = {0.35, 0.35, 0.35};
@@ -50,7 +50,7 @@ TEST_CASE("samples on the image's own lattice are its values") {
     CHECK(corner[0] == float(image.at(5, 2, 3)));
 }
 
-TEST_CASE("trilinear samples of a linear function are exact in any frame") {
+TEST_CASE("Trilinear samples of a linear function are exact for any image geometry") {
     ImageGeometry anisotropic;
     anisotropic.size = {9, 8, 7};
     anisotropic.spacing = {0.5, 0.8, 2};
@@ -89,7 +89,7 @@ TEST_CASE("trilinear samples of a linear function are exact in any frame") {
     }
 }
 
-TEST_CASE("percentiles and range") {
+TEST_CASE("Percentiles and range of a permuted ramp and of a constant image") {
     ImageGeometry g;
     g.size = {10, 10, 10};
     std::vector<float> values(1000);

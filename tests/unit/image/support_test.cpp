@@ -18,11 +18,11 @@ Image slab(const std::function<double(double)>& value, double noise = 0.05) {
     geometry.size = {48, 48, 48};
     geometry.spacing = {0.5, 0.5, 0.5};
     std::mt19937 random(7);
-    std::normal_distribution<float> some(0, float(noise));
+    std::normal_distribution<float> distribution(0, float(noise));
     std::vector<float> values;
     for (int k = 0; k < 48; ++k)
         for (int j = 0; j < 48; ++j)
-            for (int i = 0; i < 48; ++i) values.push_back(float(value(i)) + some(random));
+            for (int i = 0; i < 48; ++i) values.push_back(float(value(i)) + distribution(random));
     return Image::from_values(geometry, values.data());
 }
 
@@ -38,7 +38,7 @@ StrongestBorder border_at(const Image& image, double x_voxels, double normal = 1
 
 }  // namespace
 
-TEST_CASE("Marks on a border have the steepest slope where they are") {
+TEST_CASE("Marks within a voxel of a border: the steepest slope is found at the marks") {
     const Image image = slab([](double x) { return x > 20.3 ? 1 : 0; });
     for (const double off : {-0.7, 0.0, 0.6}) {
         CAPTURE(off);
@@ -49,7 +49,7 @@ TEST_CASE("Marks on a border have the steepest slope where they are") {
     }
 }
 
-TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward along the normals") {
+TEST_CASE("Marks 6 voxels beside a border: it is found 6 voxels away along the normals, for either sign") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return x > 20.5 ? sign : 0; });
         const StrongestBorder behind = border_at(image, 26.5), before = border_at(image, 26.5, -1);
@@ -62,7 +62,7 @@ TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward a
     }
 }
 
-TEST_CASE("The steeper of two borders is found, and how much less steep the own one is") {
+TEST_CASE("The steeper of two borders is found, with the relative steepness of the border at the marks") {
     const Image image = slab([](double x) { return (x > 20.5 ? 1.0 : 0.0) + (x > 27.5 ? 4.0 : 0.0); });
     const StrongestBorder found = border_at(image, 20.5);
     CHECK(std::abs(found.at - 7) <= 1);
@@ -70,7 +70,7 @@ TEST_CASE("The steeper of two borders is found, and how much less steep the own 
     CHECK(border_at(image, 27.5).fraction == 1);
 }
 
-TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
+TEST_CASE("Marks at the centre of a line have full strength if judged as a line, but not as a slope") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 18); });
         CHECK(border_at(image, 22).fraction < 0.7);  // if the line is judged as a slope
@@ -82,12 +82,12 @@ TEST_CASE("Marks on the middle of a line have its strength, not the slopes of it
     }
 }
 
-TEST_CASE("In noise nothing is steeper by more than chance") {
+TEST_CASE("In pure noise no significantly steeper border is found") {
     const Image image = slab([](double) { return 0; }, 1);
     CHECK(border_at(image, 24).errors < 4);
 }
 
-TEST_CASE("Lines that leave the image do not count, and no line is no answer") {
+TEST_CASE("Profile lines outside the image are not counted, and without any line the fraction is 1") {
     const Image image = slab([](double x) { return x > 3.5 ? 1 : 0; });
     CHECK(border_at(image, 3.5).fraction == 1);
     const StrongestBorder none = border_at(image, 500);

@@ -44,7 +44,7 @@ double energy(const Lattice& l, const Field& weight, const Field& cost, const Fi
 
 }  // namespace
 
-TEST_CASE("A lattice's nodes are voxels where these are few, and symmetric otherwise") {
+TEST_CASE("A lattice has the voxels as nodes if these are few, and otherwise coarser nodes centred in the box") {
     const ImageGeometry g = geometry({40, 50, 20}, {1, 1, 2});
     const Lattice fine = cover(g, {3.5, 4, 2}, {30, 40, 30}, 1e6);
     CHECK(fine.spacing == Vec3{1, 1, 2});
@@ -62,7 +62,7 @@ TEST_CASE("A lattice's nodes are voxels where these are few, and symmetric other
     CHECK(beyond.size == g.size);
 }
 
-TEST_CASE("Samples of an image on a lattice: its voxels, or means that keep what is linear") {
+TEST_CASE("Sampling gives voxel values on a fine lattice, and means close to a linear image on a coarse one") {
     const ImageGeometry g = geometry({31, 29, 17}, {1, 1, 2});
     std::vector<float> values;
     for (int k = 0; k < 17; ++k)
@@ -85,7 +85,7 @@ TEST_CASE("Samples of an image on a lattice: its voxels, or means that keep what
     CHECK(coarse.value(means, coarse.place(2, 1, 1)) == Approx(double(means[coarse.node(2, 1, 1)])));
 }
 
-TEST_CASE("Signed distances on a lattice are those of all pairs of nodes") {
+TEST_CASE("Signed distances on a lattice equal a brute-force search over all pairs of nodes") {
     const Lattice l = cube(9, {1, 1.5, 2});
     std::mt19937 random(3);
     std::vector<char> inside(l.count());
@@ -102,7 +102,7 @@ TEST_CASE("Signed distances on a lattice are those of all pairs of nodes") {
     }
 }
 
-TEST_CASE("Parts are joined by faces, not by edges") {
+TEST_CASE("Connected parts: voxels are joined across faces, not across edges") {
     const Lattice l = cube(4);
     std::vector<char> inside(l.count());
     for (const auto& [i, j, k] : {std::array{0, 0, 0}, {1, 0, 0}, {2, 1, 0}, {3, 3, 3}}) inside[l.node(i, j, k)] = 1;
@@ -113,7 +113,7 @@ TEST_CASE("Parts are joined by faces, not by edges") {
     CHECK(parts.number[l.node(3, 3, 2)] == 0);
 }
 
-TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radius has a closed form") {
+TEST_CASE("Minimal surface: the sign of the cost decides without area weight, and a ball survives only if a R > 3") {
     const Lattice l = cube(33);
     Field cost(l.count()), weight(l.count(), 0.0F), u(l.count(), 0.5F);
     for (std::size_t n = 0; n < cost.size(); ++n) cost[n] = n % 3 == 0 ? -1.0F : 0.5F;
@@ -151,7 +151,7 @@ TEST_CASE("The minimal surface: cost alone, surface alone, and a ball whose radi
     }
 }
 
-TEST_CASE("The regression tells apart what differs, and says that it does not tell apart noise") {
+TEST_CASE("Appearance: held-out bits are high for separable and low for equal classes, log odds are extrapolated") {
     std::mt19937 random(5);
     std::normal_distribution<float> normal;
     const auto samples = [&](float apart) {
@@ -173,8 +173,8 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
     };
     CHECK(held_out_bits(samples(2), kFolds) > 0.8);
     CHECK(held_out_bits(samples(0), kFolds) < 0.1);
-    const std::vector<Sample> learnt = samples(2);
-    const Appearance appearance(learnt);
+    const std::vector<Sample> training = samples(2);
+    const Appearance appearance(training);
     Features middle{}, off{}, far{};
     off[0] = 2;
     // Beyond the range of the samples, the log odds continue with the slope that they have at its end.
@@ -185,7 +185,7 @@ TEST_CASE("The regression tells apart what differs, and says that it does not te
     CHECK(appearance.log_odds(far) > 10 * appearance.log_odds(off));
 }
 
-TEST_CASE("Marks are ordered by their place, and their hull leaves the image's end open") {
+TEST_CASE("Marks: order and duplicates do not matter, and the hull contains marks at the image's end") {
     const ImageGeometry g = geometry({50, 50, 50}, {1, 1, 1});
     std::vector<Vec3> world;
     std::mt19937 random(2);
@@ -193,16 +193,16 @@ TEST_CASE("Marks are ordered by their place, and their hull leaves the image's e
     for (int n = 0; n < 200; ++n) world.push_back({uniform(random), uniform(random), uniform(random)});
     const Marks marks(g, world);
     CHECK(marks.spread.size() == 150);
-    std::vector<Vec3> turned(world.rbegin(), world.rend());
-    turned.push_back(world.front());  // duplicates count once
-    CHECK(Marks(g, turned).places == marks.places);
+    std::vector<Vec3> reversed(world.rbegin(), world.rend());
+    reversed.push_back(world.front());  // duplicates count once
+    CHECK(Marks(g, reversed).places == marks.places);
     CHECK(marks.above_hull({25, 25, 25}) < 0);
     CHECK(marks.above_hull({25, 25, 49}) > 5);
     world.push_back({25, 25, 49.4});
     CHECK(Marks(g, world).above_hull({25, 25, 49.4}) < 0);
-    std::vector<std::size_t> rest, out;
-    const Marks part = marks.without(2, g, rest, out);
-    CHECK(rest.size() + out.size() == marks.places.size());
-    CHECK(part.places.size() == rest.size());
+    std::vector<std::size_t> kept, held_out;
+    const Marks part = marks.without(2, g, kept, held_out);
+    CHECK(kept.size() + held_out.size() == marks.places.size());
+    CHECK(part.places.size() == kept.size());
     CHECK(part.spacing == marks.spacing);
 }

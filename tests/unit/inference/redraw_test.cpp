@@ -17,8 +17,8 @@ constexpr int kSize = 40;
 const Vec3 kMiddle{19.4, 20.2, 19.8};
 constexpr double kRadius = 11;
 
-double away(const Vec3& p) { return std::hypot(p[0] - kMiddle[0], p[1] - kMiddle[1], p[2] - kMiddle[2]); }
-bool in_truth(const Vec3& p) { return away(p) < kRadius; }
+double distance_to_middle(const Vec3& p) { return std::hypot(p[0] - kMiddle[0], p[1] - kMiddle[1], p[2] - kMiddle[2]); }
+bool in_truth(const Vec3& p) { return distance_to_middle(p) < kRadius; }
 /// The guess is the result of another tool, which lacks everything beyond a plane.
 bool in_guess(const Vec3& p) { return in_truth(p) && p[0] < kMiddle[0] + 4; }
 
@@ -36,8 +36,9 @@ Image picture(double contrast) {
     for (int k = 0; k < kSize; ++k)
         for (int j = 0; j < kSize; ++j)
             for (int i = 0; i < kSize; ++i)
-                values.push_back(float(contrast / (1 + std::exp((away({i + 0.0, j + 0.0, k + 0.0}) - kRadius) / 0.6)) +
-                                       normal(random)));
+                values.push_back(
+                    float(contrast / (1 + std::exp((distance_to_middle({i + 0.0, j + 0.0, k + 0.0}) - kRadius) / 0.6)) +
+                          normal(random)));
     return Image::from_values(geometry(), values.data());
 }
 
@@ -85,7 +86,7 @@ std::function<bool(const Vec3&)> inside_of(const FloatGridPtr& u) {
 
 }  // namespace
 
-TEST_CASE("Where marks say that a guess lacks a part the image redraws it") {
+TEST_CASE("A part that the guess lacks according to the marks is redrawn from the image") {
     const FloatGridPtr given = guess();
     const Redrawn redrawn = redraw(given, marks(), picture(6));
     REQUIRE(redrawn.used);
@@ -106,7 +107,7 @@ TEST_CASE("Where marks say that a guess lacks a part the image redraws it") {
     CHECK(mask.removed == 0);
 }
 
-TEST_CASE("An image that does not tell the sides of a guess does not redraw it, nor do marks that it passes") {
+TEST_CASE("A guess is not redrawn from an image of noise, nor if its surface passes through the marks") {
     const FloatGridPtr given = guess();
     const Redrawn by_noise = redraw(given, marks(), picture(0));
     CHECK_FALSE(by_noise.used);
@@ -116,14 +117,14 @@ TEST_CASE("An image that does not tell the sides of a guess does not redraw it, 
     CHECK_FALSE(passed.used);
 }
 
-TEST_CASE("What hangs on nothing does not come") {
+TEST_CASE("Redrawing does not add a bright ball that is separate from the missing part") {
     // A second, equally bright ball, which is near the missing part but separate from it, must not be added.
     const Vec3 other{kMiddle[0] + kRadius + 4, kMiddle[1], kMiddle[2]};
     std::vector<float> values;
     for (int k = 0; k < kSize; ++k)
         for (int j = 0; j < kSize; ++j)
             for (int i = 0; i < kSize; ++i) {
-                const double d = std::min(away({i + 0.0, j + 0.0, k + 0.0}) - kRadius,
+                const double d = std::min(distance_to_middle({i + 0.0, j + 0.0, k + 0.0}) - kRadius,
                                           std::hypot(i - other[0], j - other[1], k - other[2]) - 2.5);
                 values.push_back(float(1 / (1 + std::exp(d / 0.4)) + 0.02 * std::sin(1.7 * i + 2.3 * j + 0.9 * k)));
             }

@@ -33,24 +33,24 @@ std::size_t open_descriptors() {
 
 }  // namespace
 
-TEST_CASE("A program's result comes back, and nothing of it stays open") {
+TEST_CASE("Child process: its result is in the shared memory, and no file descriptor stays open") {
     const std::size_t before = open_descriptors();
     {
         const SharedMemory results(16);
         const PieceOutcome trial = try_one({"write", "", 8, 4}, 10, results);
         CHECK_FALSE(trial.crashed);
         CHECK_FALSE(trial.refused);
-        std::uint32_t written = 0, beside = 0;
+        std::uint32_t written = 0, neighbour = 0;
         std::memcpy(&written, results.data() + 8, sizeof written);
-        std::memcpy(&beside, results.data() + 4, sizeof beside);
+        std::memcpy(&neighbour, results.data() + 4, sizeof neighbour);
         CHECK(written == kTask);
-        CHECK(beside == 0);
+        CHECK(neighbour == 0);
         CHECK(ftruncate(results.descriptor(), 1) != 0);  // nobody may shrink the shared memory, not even the program
     }
     CHECK(open_descriptors() == before);
 }
 
-TEST_CASE("Many pieces of work: each is done, and those that fail are told of") {
+TEST_CASE("Pieces of work: each is done, and crashes and errors are reported per piece, with 1 and 8 threads") {
     constexpr std::size_t kCount = 100;
     std::vector<Piece> pieces;
     for (std::size_t n = 0; n < kCount; ++n)
@@ -76,7 +76,7 @@ TEST_CASE("Many pieces of work: each is done, and those that fail are told of") 
     CHECK(run_pieces(COVOL_ODD_READER, kTask, {}, SharedMemory(0), 10, RunContext()).empty());
 }
 
-TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancelled does not wait for it") {
+TEST_CASE("A hanging piece of work does not affect the others, and a cancelled run does not wait for it") {
     const std::vector<Piece> pieces{{"write"}, {"hang"}, {"write"}};
     const std::vector<PieceOutcome> trials =
         run_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 0.2, RunContext());
@@ -100,7 +100,7 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
     later.join();
 }
 
-TEST_CASE("An error in the program is told of") {
+TEST_CASE("An error in the child process is reported with its code and message") {
     const PieceOutcome trial = try_one({"refuse", "a.h5: sheared"});
     CHECK_FALSE(trial.crashed);
     REQUIRE(trial.refused);
@@ -117,14 +117,14 @@ TEST_CASE("An error in the program is told of") {
     CHECK_THROWS_AS(try_one({"no memory"}), std::bad_alloc);
 }
 
-TEST_CASE("Work that crashes, leaves or hangs is told of") {
+TEST_CASE("A child process that crashes, exits or exceeds its time is reported as crashed") {
     CHECK(try_one({"segv"}).crashed);
     CHECK(try_one({"leave"}).crashed);
     CHECK(try_one({"hang"}, 0.2).crashed);
     CHECK(try_one({"compute"}, 0.2).crashed);
 }
 
-TEST_CASE("The program gets no variable and no open file of this process") {
+TEST_CASE("A child process inherits no environment variables, and no open files except standard streams") {
     setenv("COVOL_TEST_VARIABLE", "1", 1);
     CHECK(std::string(try_one({"variable", "COVOL_TEST_VARIABLE"}).answer.data()).empty());
     CHECK(std::string(try_one({"variable", "LC_ALL"}).answer.data()) == "set");
@@ -135,7 +135,7 @@ TEST_CASE("The program gets no variable and no open file of this process") {
     close(open);
 }
 
-TEST_CASE("A program that is not there is an error that says so") {
+TEST_CASE("A missing program is an I/O error with its path") {
     try {
         run_pieces("/none/covol-reader", kTask, {{"write"}}, SharedMemory(0), 10, RunContext());
         FAIL("started");
@@ -145,7 +145,7 @@ TEST_CASE("A program that is not there is an error that says so") {
     }
 }
 
-TEST_CASE("A file that crashes its library is damaged") {
+TEST_CASE("A file that crashes the reading library is reported as damaged") {
     CHECK_FALSE(reading_error(try_one({"write"}), "a.dcm", "GDCM"));
     const auto error = reading_error(try_one({"abort"}), "a.dcm", "GDCM");
     REQUIRE(error);

@@ -46,13 +46,13 @@ public:
         const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const std::vector<T>& values,
         const std::function<void(hid_t)>& edit = [](hid_t) {}) const {
         const hid_t space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
-        const hid_t how = H5Pcreate(H5P_DATASET_CREATE);
-        edit(how);
-        const hid_t data = H5Dcreate2(file_, name.c_str(), type, space, links_, how, H5P_DEFAULT);
+        const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+        edit(properties);
+        const hid_t data = H5Dcreate2(file_, name.c_str(), type, space, links_, properties, H5P_DEFAULT);
         REQUIRE(data >= 0);
         if (!values.empty()) REQUIRE(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
         H5Dclose(data);
-        H5Pclose(how);
+        H5Pclose(properties);
         H5Sclose(space);
     }
     void image(const std::string& name, std::uint16_t first = 0,
@@ -107,9 +107,9 @@ void is_refused(const std::string& path, const std::string& part) {
 }
 
 std::function<void(hid_t)> in_chunks(const std::function<void(hid_t)>& filters = [](hid_t) {}) {
-    return [filters](hid_t how) {
-        H5Pset_chunk(how, 3, kChunk.data());
-        filters(how);
+    return [filters](hid_t properties) {
+        H5Pset_chunk(properties, 3, kChunk.data());
+        filters(properties);
     };
 }
 
@@ -183,7 +183,7 @@ TEST_CASE("Imaris: levels, channels, extent and names", "[hdf5]") {
     is_refused(path + ":/DataSet/ResolutionLevel 9", "no such dataset");
 }
 
-TEST_CASE("BigDataViewer: setups, levels and the sizes of the XML beside it", "[hdf5]") {
+TEST_CASE("BigDataViewer: setups, levels, and voxel sizes from the XML file beside it", "[hdf5]") {
     const Scratch scratch;
     const std::string path = big_data_viewer(scratch);
     const ImageInfo info = read_image_info(path);
@@ -206,22 +206,22 @@ TEST_CASE("BigDataViewer: setups, levels and the sizes of the XML beside it", "[
     CHECK(read_image_info(path).spacing_known == std::array<bool, 3>{false, false, false});
 }
 
-TEST_CASE("datasets of their own: types, filters, chunks that are missing", "[hdf5]") {
+TEST_CASE("HDF5 datasets: all types, layouts and filters are read, and missing chunks have the fill value", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const std::vector<hsize_t> shape{kShape.begin(), kShape.end()};
     const auto with = [](auto call) { return in_chunks(call); };
     const std::vector<std::pair<std::string, std::function<void(hid_t)>>> kinds{
         {"whole", [](hid_t) {}},
-        {"compact", [](hid_t how) { H5Pset_layout(how, H5D_COMPACT); }},
+        {"compact", [](hid_t properties) { H5Pset_layout(properties, H5D_COMPACT); }},
         {"chunks", in_chunks()},
-        {"gzip", with([](hid_t how) { H5Pset_deflate(how, 4); })},
-        {"shuffled", with([](hid_t how) {
-             H5Pset_shuffle(how);
-             H5Pset_deflate(how, 4);
+        {"gzip", with([](hid_t properties) { H5Pset_deflate(properties, 4); })},
+        {"shuffled", with([](hid_t properties) {
+             H5Pset_shuffle(properties);
+             H5Pset_deflate(properties, 4);
          })},
-        {"checked", with([](hid_t how) { H5Pset_fletcher32(how); })},
-        {"offset", with([](hid_t how) { H5Pset_scaleoffset(how, H5Z_SO_INT, 0); })},
+        {"checked", with([](hid_t properties) { H5Pset_fletcher32(properties); })},
+        {"offset", with([](hid_t properties) { H5Pset_scaleoffset(properties, H5Z_SO_INT, 0); })},
     };
     {
         const Writer file(path);
@@ -236,8 +236,9 @@ TEST_CASE("datasets of their own: types, filters, chunks that are missing", "[hd
             H5Sclose(space);
         }
         const std::uint16_t seven = 7;
-        file.dataset<std::uint16_t>("missing", shape, H5T_STD_U16LE, {},
-                                    in_chunks([&](hid_t how) { H5Pset_fill_value(how, H5T_STD_U16LE, &seven); }));
+        file.dataset<std::uint16_t>("missing", shape, H5T_STD_U16LE, {}, in_chunks([&](hid_t properties) {
+                                        H5Pset_fill_value(properties, H5T_STD_U16LE, &seven);
+                                    }));
     }
     for (const auto& [name, edit] : kinds) check_ramp(path + ":/" + name, 0);
     for (const char* name : {"be16", "be32", "be64", "f32", "f64"}) check_ramp(path + ":/" + name, 0);
@@ -245,13 +246,14 @@ TEST_CASE("datasets of their own: types, filters, chunks that are missing", "[hd
     CHECK(read_image_info(path + ":/gzip").chunk_size == Index3{4, 2, 2});
 }
 
-TEST_CASE("chunks that a damaged index hides are not taken for missing ones", "[hdf5]") {
+TEST_CASE("HDF5 datasets: a damaged chunk index is an error, and its chunks are not taken for missing ones", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const std::vector<hsize_t> shape{kShape.begin(), kShape.end()};
     {
         const Writer file(path);
-        file.dataset("a", shape, H5T_STD_U16LE, ramp(shape), in_chunks([](hid_t how) { H5Pset_deflate(how, 4); }));
+        file.dataset("a", shape, H5T_STD_U16LE, ramp(shape),
+                     in_chunks([](hid_t properties) { H5Pset_deflate(properties, 4); }));
     }
     check_ramp(path, 0);
     std::string bytes = bytes_of(path);
@@ -263,7 +265,8 @@ TEST_CASE("chunks that a damaged index hides are not taken for missing ones", "[
     is_refused(scratch.path("b.h5"), "the index of its chunks cannot be read");
 }
 
-TEST_CASE("filters that the library knows by number alone are undone here", "[hdf5]") {
+TEST_CASE("HDF5 datasets: LZ4, LZF and Zstandard are decoded, damaged chunks and other filters are rejected",
+          "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const std::vector<hsize_t> shape{2, 2, 4};  // one chunk
@@ -285,9 +288,9 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
     {
         const Writer file(path);
         for (const auto& [name, filter, content] : packed) {
-            file.dataset<std::uint16_t>(name, shape, H5T_STD_U16LE, {}, [filter = filter](hid_t how) {
-                H5Pset_chunk(how, 3, kChunk.data());
-                H5Pset_filter(how, filter, H5Z_FLAG_OPTIONAL, 0, nullptr);
+            file.dataset<std::uint16_t>(name, shape, H5T_STD_U16LE, {}, [filter = filter](hid_t properties) {
+                H5Pset_chunk(properties, 3, kChunk.data());
+                H5Pset_filter(properties, filter, H5Z_FLAG_OPTIONAL, 0, nullptr);
             });
             const hid_t data = H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT);
             const std::array<hsize_t, 3> first{0, 0, 0};
@@ -301,7 +304,7 @@ TEST_CASE("filters that the library knows by number alone are undone here", "[hd
     is_refused(path + ":/bitshuffle", "filter 32008");
 }
 
-TEST_CASE("axes and spacing come from the attributes of several programs", "[hdf5]") {
+TEST_CASE("HDF5 datasets: axes and spacing are read from the attributes of several programs", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const auto tags = [](const std::string& order) {
@@ -342,7 +345,7 @@ TEST_CASE("axes and spacing come from the attributes of several programs", "[hdf
     CHECK_FALSE(read_image_geometry(path + ":/odd").spacing_known);
 }
 
-TEST_CASE("one dataset is found, several are listed, what is no image is refused", "[hdf5]") {
+TEST_CASE("HDF5 datasets: a single one is found, several are listed, and anything but an image is rejected", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const std::vector<hsize_t> shape{kShape.begin(), kShape.end()};

@@ -27,7 +27,7 @@ bool same_tree(const FloatGrid& a, const FloatGrid& b) {
 
 }  // namespace
 
-TEST_CASE("the same grids make the same bytes, others another number of the file") {
+TEST_CASE("VDB: equal grids give equal bytes, and other grids or metadata give another UUID") {
     const Scratch scratch;
     const auto bytes_of = [&](const char* name, float radius, const char* fact) {
         const std::string path = scratch.path(name);
@@ -45,7 +45,7 @@ TEST_CASE("the same grids make the same bytes, others another number of the file
     CHECK(file.getUniqueTag() == one.substr(kUuid, kLength));
 }
 
-TEST_CASE("grids come back as they were written, by name or as the first") {
+TEST_CASE("VDB: grids are read back as written, by name or the first one") {
     const Scratch scratch;
     const std::string path = scratch.path("two.vdb");
     const FloatGridPtr first = sphere("surface");
@@ -64,7 +64,7 @@ TEST_CASE("grids come back as they were written, by name or as the first") {
     CHECK_FALSE(first->getMetadata<openvdb::StringMetadata>("covol_delta"));
 }
 
-TEST_CASE("a listing has statistics, creator and provenance") {
+TEST_CASE("VDB: the listing contains statistics, creator and provenance") {
     const Scratch scratch;
     const std::string path = scratch.path("one.vdb");
     const FloatGridPtr grid = sphere("surface");
@@ -84,7 +84,7 @@ TEST_CASE("a listing has statistics, creator and provenance") {
     CHECK(list[0].metadata.at("creator").rfind("covol ", 0) == 0);
 }
 
-TEST_CASE("files without statistics are counted") {
+TEST_CASE("VDB: active voxels are counted if the file has no statistics") {
     const Scratch scratch;
     const std::string path = scratch.path("bare.vdb");
     const FloatGridPtr grid = sphere("d");
@@ -95,7 +95,7 @@ TEST_CASE("files without statistics are counted") {
     CHECK(list_vdb(path).at(0).active_voxels == grid->activeVoxelCount());
 }
 
-TEST_CASE("half floats are half as exact and come back as float grids") {
+TEST_CASE("VDB: half floats are read as float grids, with the error of half precision") {
     const Scratch scratch;
     const std::string path = scratch.path("half.vdb");
     const FloatGridPtr grid = sphere("surface");
@@ -110,7 +110,7 @@ TEST_CASE("half floats are half as exact and come back as float grids") {
     CHECK(largest < 0.3 / 2048);
 }
 
-TEST_CASE("grids that share one tree are read alike") {
+TEST_CASE("VDB: grids that share one tree are read as equal grids") {
     const Scratch scratch;
     const std::string path = scratch.path("shared.vdb");
     const FloatGridPtr grid = sphere("a");
@@ -122,7 +122,7 @@ TEST_CASE("grids that share one tree are read alike") {
     CHECK(list_vdb(path).at(1).active_voxels == grid->activeVoxelCount());
 }
 
-TEST_CASE("an empty grid is a grid") {
+TEST_CASE("VDB: an empty grid is written and read") {
     const Scratch scratch;
     const std::string path = scratch.path("empty.vdb");
     const auto grid = FloatGrid::create(2.0F);
@@ -132,7 +132,7 @@ TEST_CASE("an empty grid is a grid") {
     CHECK(list_vdb(path).at(0).active_voxels == 0);
 }
 
-TEST_CASE("a grid of another type is named, and passed over when any will do") {
+TEST_CASE("VDB: a grid of another type is skipped, or rejected with its type if requested by name") {
     const Scratch scratch;
     const std::string path = scratch.path("mixed.vdb");
     const auto colour = openvdb::Vec3SGrid::create();
@@ -147,7 +147,7 @@ TEST_CASE("a grid of another type is named, and passed over when any will do") {
     CHECK(message_of([&] { (void)read_vdb(path, "u"); }).find("expected a grid named 'u'") != std::string::npos);
 }
 
-TEST_CASE("unusable names and paths are refused and leave no file") {
+TEST_CASE("VDB: unusable names and paths are rejected, and no file remains") {
     const Scratch scratch;
     const FloatGridPtr grid = sphere("a");
     CHECK(message_of([&] { write_vdb(scratch.path("x.vdb"), {grid, grid}); }).find("'a' twice") != std::string::npos);
@@ -162,7 +162,7 @@ TEST_CASE("unusable names and paths are refused and leave no file") {
     CHECK_THROWS_AS(list_vdb(scratch.write("text.vdb", std::string(5000, 'x'))), Error);
 }
 
-TEST_CASE("damaged .vdb files end in an Error, never in a crash") {
+TEST_CASE("VDB: damaged files never crash the reader, and truncated ones are rejected") {
     const Scratch scratch;
     const std::string path = scratch.path("good.vdb");
     write_vdb(path, {sphere("surface", 0.5F)});
@@ -176,7 +176,7 @@ TEST_CASE("damaged .vdb files end in an Error, never in a crash") {
     CHECK(counts.truncated_accepted == 0);
 }
 
-TEST_CASE("every compression gives the same grid, and a listing names it") {
+TEST_CASE("VDB: each compression preserves the grid, and the listing states it") {
     const Scratch scratch;
     const FloatGridPtr level_set = sphere("surface"), other = sphere("u", 1.5F);
     other->setGridClass(openvdb::GRID_UNKNOWN);
@@ -195,7 +195,7 @@ TEST_CASE("every compression gives the same grid, and a listing names it") {
     CHECK(names_of(VdbCompression::Blosc) == std::vector<std::string>{"blosc", "blosc"});
 }
 
-TEST_CASE("a file of NanoVDB is whole or not there") {
+TEST_CASE("NanoVDB: a file is written completely or not at all") {
     const Scratch scratch;
     const std::string path = scratch.path("a.nvdb");
     CHECK_THROWS_AS(write_nvdb(path, {sphere("a"), sphere("a")}), Error);

@@ -62,7 +62,7 @@ SegmentOptions with_voxels_of(double h) {
 
 }  // namespace
 
-TEST_CASE("Clouds with and without normals and sensors become one list with a hint for each point") {
+TEST_CASE("Clouds with and without normals and sensors are joined, with one hint for each point") {
     Marks marks;
     add_points(marks, cloud({{1, 0, 0}}), {});
     PointCloud scan = cloud({{2, 0, 0}, {3, 0, 0}});
@@ -97,7 +97,7 @@ TEST_CASE("Points are thinned together with their hints") {
     CHECK(marks.points.size() == 10);
 }
 
-TEST_CASE("Painted labels go to the structures of their names, a single one to marks without a name") {
+TEST_CASE("Painted labels are assigned to structures by name, and a single label to unnamed marks") {
     const Image two = labels([](int i, int j, int k) { return in_ball(i, j, k, 11.5, 8) ? (i < 12 ? 7 : 3) : 0; });
     std::vector<Marks> structures{named("label7")};
     add_paint(structures, {painted(two)});
@@ -124,7 +124,7 @@ TEST_CASE("Painted labels go to the structures of their names, a single one to m
     CHECK(other[0].label == 2);  // the first free one
 }
 
-TEST_CASE("A guess is one label of a mask") {
+TEST_CASE("A guess is one label of a mask, and ambiguous or missing labels are rejected") {
     const Image two = labels([](int i, int j, int k) { return in_ball(i, j, k, 11.5, 8) ? (i < 12 ? 7 : 3) : 0; });
     const GivenGuess guess = make_guess(two, 3, lattice());
     CHECK(guess.label == 3);
@@ -137,7 +137,7 @@ TEST_CASE("A guess is one label of a mask") {
     CHECK(make_guess(labels(discs), 0, {}).label == 1);
 }
 
-TEST_CASE("Painted slices become contours, other paint seeds that are counted as such") {
+TEST_CASE("Painted slices become contours, and other paint becomes seeds that are counted separately") {
     std::vector<Marks> structures(1);
     structures[0].inside.push_back(cloud({{11, 11, 11}}));
     add_paint(structures, {painted(labels(discs))});
@@ -152,7 +152,7 @@ TEST_CASE("Painted slices become contours, other paint seeds that are counted as
     CHECK(input.contour_rules.empty());  // the rules are empty because the contours are not written to any file
 }
 
-TEST_CASE("Paint of one structure is outside of the others, and the outside label of all") {
+TEST_CASE("Paint of one structure is outside of the others, and the outside label is outside of all") {
     const Image scribbles = labels([](int i, int j, int k) {
         return in_ball(i, j, k, 5, 3) ? 1 : in_ball(i, j, k, 18, 3) ? 2 : k == 22 && j < 4 && i < 4 ? 9 : 0;
     });
@@ -171,7 +171,7 @@ TEST_CASE("Paint of one structure is outside of the others, and the outside labe
     }
 }
 
-TEST_CASE("What a structure adds to the options of all") {
+TEST_CASE("Structures add exterior seeds and delta to the common options, and large tag distances are rejected") {
     Marks marks;
     add_points(marks, cloud({{1, 1, 1}, {5, 5, 5}}), lattice());
     marks.exterior_seeds = {{2, 2, 2}};
@@ -190,7 +190,7 @@ TEST_CASE("What a structure adds to the options of all") {
                       Catch::Contains("`tag_distance`: expected at most") && Catch::Contains(", got 7"));
 }
 
-TEST_CASE("Structures have names of their own") {
+TEST_CASE("An empty list of structures, equal names, and an empty name among several are rejected") {
     const auto prepare = [](const std::vector<Marks>& structures) {
         return prepare_marks(structures, lattice(), with_voxels_of(1));
     };

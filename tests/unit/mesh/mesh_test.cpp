@@ -42,7 +42,7 @@ TriangleMesh torus(int n, int m) {
 
 }  // namespace
 
-TEST_CASE("a cube has its volume and area, is closed and of genus 0") {
+TEST_CASE("Measures of a cube: volume, area, closed, manifold, genus 0") {
     const MeshMeasures m = measure(cube(2, 100));
     CHECK(m.volume == Approx(8));
     CHECK(m.area == Approx(24));
@@ -52,21 +52,21 @@ TEST_CASE("a cube has its volume and area, is closed and of genus 0") {
     CHECK(m.manifold);
 }
 
-TEST_CASE("inside out, the volume is negative") {
+TEST_CASE("The volume of an inside-out mesh is negative") {
     TriangleMesh mesh = cube(1);
     for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
     CHECK(measure(mesh).volume == Approx(-1));
     CHECK(measure(mesh).closed);
 }
 
-TEST_CASE("a torus has genus 1, with a cube beside it there are two components") {
+TEST_CASE("A torus has genus 1, and with a separate cube there are two components") {
     const MeshMeasures m = measure(joined(torus(24, 12), cube(1, 50)));
     CHECK(m.genus == 1);
     CHECK(m.components == 2);
     CHECK(measure(torus(200, 100)).volume == Approx(4 * std::pow(std::acos(-1.0), 2)).epsilon(0.002));
 }
 
-TEST_CASE("holes, flipped triangles, common edges and common corners are noticed") {
+TEST_CASE("Measures detect holes, flipped and degenerate triangles, and shared edges and corners") {
     TriangleMesh open = cube(1);
     open.triangles.pop_back();
     CHECK_FALSE(measure(open).closed);
@@ -97,7 +97,7 @@ TEST_CASE("holes, flipped triangles, common edges and common corners are noticed
     CHECK(measure(TriangleMesh{}).components == 0);
 }
 
-TEST_CASE("normals are unit length, weighted by angle and point outward") {
+TEST_CASE("Vertex normals have unit length, are weighted by angle and point outwards") {
     const TriangleMesh mesh = cube(1);
     const auto normals = compute_vertex_normals(mesh);
     REQUIRE(normals.size() == 8);
@@ -107,7 +107,7 @@ TEST_CASE("normals are unit length, weighted by angle and point outward") {
             CHECK(normals[c][a] == Approx((c >> (2 - a) & 1 ? 1 : -1) / std::sqrt(3.0)).epsilon(1e-6));
 }
 
-TEST_CASE("components below a volume and unused vertices go") {
+TEST_CASE("Components below the minimum volume and unused vertices are removed") {
     TriangleMesh mesh = joined(joined(cube(0.5F, 10), cube(2)), cube(1, 20));
     mesh.vertices.push_back({9, 9, 9});
     remove_small_components(mesh, 0.5);
@@ -119,16 +119,16 @@ TEST_CASE("components below a volume and unused vertices go") {
     CHECK(mesh.vertices.empty());
 }
 
-TEST_CASE("sets united by many threads are those united one by one, known by their least members") {
+TEST_CASE("Disjoint sets united by many threads have the minimum member as root, as by a flood fill") {
     constexpr std::uint32_t kCount = 200000;
     std::mt19937 random(3);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs(kCount * 3 / 4);
     for (auto& [a, b] : pairs) a = std::uint32_t(random() % kCount), b = std::uint32_t(random() % kCount);
     // The expected result, by a flood fill from each number in ascending order: a set is known by its minimum member.
-    std::vector<std::vector<std::uint32_t>> beside(kCount);
+    std::vector<std::vector<std::uint32_t>> adjacent(kCount);
     for (const auto& [a, b] : pairs) {
-        beside[a].push_back(b);
-        beside[b].push_back(a);
+        adjacent[a].push_back(b);
+        adjacent[b].push_back(a);
     }
     std::vector<std::uint32_t> expected(kCount, kCount), work;
     for (std::uint32_t n = 0; n < kCount; ++n)
@@ -137,7 +137,7 @@ TEST_CASE("sets united by many threads are those united one by one, known by the
             work.pop_back();
             if (expected[at] != kCount) continue;
             expected[at] = n;
-            work.insert(work.end(), beside[at].begin(), beside[at].end());
+            work.insert(work.end(), adjacent[at].begin(), adjacent[at].end());
         }
     for (int repeat = 0; repeat < 5; ++repeat) {
         detail::DisjointSets sets(kCount);

@@ -12,7 +12,7 @@
 
 using namespace covol;
 
-TEST_CASE("distances to a level set beyond its band: of a few points those of many, and the sphere's") {
+TEST_CASE("Distances beyond the band are equal for few and many points, and within 0.12 voxels of a sphere's") {
     const double h = 0.25, radius = 4;
     const Domain domain = make_domain({{-6, -6, -6}, {6, 6, 6}}, h);
     const FloatGridPtr surface = extract_surface(*start_from_sphere(domain, {0.1, -0.2, 0.05}, radius));
@@ -32,7 +32,7 @@ TEST_CASE("distances to a level set beyond its band: of a few points those of ma
     }
 }
 
-TEST_CASE("a change of sign that is no cut edge does not stand for the surface") {
+TEST_CASE("A change of sign that is not a cut edge does not count as the surface") {
     const double h = 0.25;
     const Domain domain = make_domain({{-6, -6, -6}, {6, 6, 6}}, h);
     const FloatGridPtr surface = extract_surface(*start_from_sphere(domain, {0, 0, 0}, 4));

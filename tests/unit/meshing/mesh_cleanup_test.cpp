@@ -54,7 +54,7 @@ void check_proper(const TriangleMesh& mesh, const CleanupReport& report) {
 
 }  // namespace
 
-TEST_CASE("self-intersections are counted in pairs, contact in shared corners and sides is none") {
+TEST_CASE("Self-intersections are counted in pairs, and contact at shared corners or edges does not count") {
     CHECK(count_self_intersections(sphere(8, 1)) == 0);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, -1}, {0.5F, 0.6F, 1}, {0.6F, 0.5F, 1})) == 1);
     CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, 1}, {0.5F, 0.6F, 2}, {0.6F, 0.5F, 2})) == 0);
@@ -75,7 +75,7 @@ TEST_CASE("self-intersections are counted in pairs, contact in shared corners an
     CHECK_THROWS_AS(count_self_intersections(side), Error);
 }
 
-TEST_CASE("crossings of pieces with each other are told from those with themselves") {
+TEST_CASE("Crossings between components are distinguished from crossings within a component") {
     const Crossings apart = count_crossings(joined(sphere(8, 1), sphere(8, 1, 3)));
     CHECK((apart.within == 0 && apart.between == 0));
     const TriangleMesh both = joined(sphere(8, 1), sphere(8, 1, 1));
@@ -92,7 +92,7 @@ TEST_CASE("crossings of pieces with each other are told from those with themselv
     CHECK(all.between == crossed.between);
 }
 
-TEST_CASE("a proper mesh stays as it is") {
+TEST_CASE("Cleaning leaves a valid mesh unchanged") {
     const TriangleMesh before = sphere(10, 1);
     TriangleMesh mesh = before;
     const CleanupReport report = clean_mesh(mesh);
@@ -103,7 +103,7 @@ TEST_CASE("a proper mesh stays as it is") {
     CHECK(mesh.triangles == before.triangles);
 }
 
-TEST_CASE("holes are filled, and an inside-out mesh is turned") {
+TEST_CASE("Cleaning fills holes and reorients an inside-out mesh") {
     TriangleMesh mesh = sphere(10, 1);
     mesh.triangles.erase(mesh.triangles.begin() + 70);
     mesh.triangles.erase(mesh.triangles.begin(), mesh.triangles.begin() + 15);
@@ -119,7 +119,7 @@ TEST_CASE("holes are filled, and an inside-out mesh is turned") {
     CHECK(measure(mesh).volume == Approx(volume));
 }
 
-TEST_CASE("vertices that two surfaces share are taken apart") {
+TEST_CASE("Cleaning makes two surfaces that share a vertex manifold") {
     TriangleMesh mesh = joined(sphere(6, 1), sphere(6, 1, 2));
     // Vertex 0 of the second sphere becomes vertex 0 of the first, moved to the middle.
     const auto half = std::uint32_t(mesh.vertices.size() / 2);
@@ -132,7 +132,7 @@ TEST_CASE("vertices that two surfaces share are taken apart") {
     CHECK(report.manifold);
 }
 
-TEST_CASE("a local fold is removed") {
+TEST_CASE("Cleaning removes a local fold") {
     TriangleMesh mesh = sphere(16, 1);
     // One vertex is pushed through the opposite side of its neighbourhood.
     mesh.vertices[200] = {mesh.vertices[203][0] * 1.02F, mesh.vertices[203][1] * 1.02F, mesh.vertices[203][2] * 0.98F};
@@ -143,7 +143,7 @@ TEST_CASE("a local fold is removed") {
     CHECK(measure(mesh).volume == Approx(4.0 / 3 * kPi).epsilon(0.05));
 }
 
-TEST_CASE("decimation reaches the edge length and keeps the volume") {
+TEST_CASE("Decimation reaches the target edge length and preserves the volume") {
     TriangleMesh mesh = sphere(50, 1);
     const double volume = measure(mesh).volume;
     CleanupOptions options;
@@ -156,7 +156,7 @@ TEST_CASE("decimation reaches the edge length and keeps the volume") {
     CHECK(edge == Approx(0.2).epsilon(0.1));
 }
 
-TEST_CASE("smoothing takes noise away and keeps the volume") {
+TEST_CASE("Smoothing reduces noise and preserves the volume") {
     TriangleMesh mesh = sphere(24, 1);
     const double volume = measure(mesh).volume;
     std::mt19937 random(5);
@@ -176,7 +176,7 @@ TEST_CASE("smoothing takes noise away and keeps the volume") {
     CHECK(measure(mesh).volume == Approx(volume).epsilon(0.01));
 }
 
-TEST_CASE("options out of range are refused") {
+TEST_CASE("Cleanup options out of range are rejected") {
     TriangleMesh mesh = sphere(4, 1);
     CleanupOptions options;
     options.target_edge = -1;
@@ -185,7 +185,7 @@ TEST_CASE("options out of range are refused") {
     CHECK_THROWS_AS(clean_mesh(mesh, options), Error);
 }
 
-TEST_CASE("a wall is as thick as the solid between two faces") {
+TEST_CASE("The wall of a slab is as thick as the distance of its faces, and negative without opposite faces") {
     // A slab of 4 x 4 x 0.25, its large faces in two triangles each.
     TriangleMesh slab;
     for (const float z : {0.0F, 0.25F})

@@ -37,14 +37,14 @@ void check_table(const CornerTable& table, std::vector<Triangle> triangles) {
         wrong += table.opposite(std::uint32_t(3 * numbers[c / 3] + c % 3)) != expected;
     }
     CHECK(wrong == 0);
-    std::size_t astray = 0;
+    std::size_t inconsistent = 0;
     for (std::uint32_t v = 0; v < table.vertices(); ++v) {
-        astray +=
+        inconsistent +=
             table.valence(v) != fresh.valence(v) || (fresh.valence(v) > 0 && table.vertex(table.corner_of(v)) != v);
-        astray += table.is_boundary(v) && fresh.valence(v) > 0 &&
-                  table.opposite(CornerTable::previous(table.corner_of(v))) != CornerTable::kNone;
+        inconsistent += table.is_boundary(v) && fresh.valence(v) > 0 &&
+                        table.opposite(CornerTable::previous(table.corner_of(v))) != CornerTable::kNone;
     }
-    CHECK(astray == 0);
+    CHECK(inconsistent == 0);
 }
 
 TriangleMesh open_mesh() {
@@ -59,22 +59,22 @@ TriangleMesh open_mesh() {
 
 }  // namespace
 
-TEST_CASE("flips, flips undone and collapses leave who is next to whom right, with a boundary too") {
+TEST_CASE("Corner table: flips, undone flips and collapses keep the adjacency consistent, also with a boundary") {
     for (TriangleMesh mesh : {solid_mesh(0), open_mesh()}) {
         REQUIRE(measure(mesh).manifold);
         CornerTable table(mesh.triangles, mesh.vertices.size());
         const std::vector<Triangle> before = mesh.triangles;
         std::mt19937 random(3);
         std::uniform_int_distribution<std::uint32_t> any(0, std::uint32_t(3 * mesh.triangles.size() - 1));
-        std::vector<std::uint32_t> turned;
+        std::vector<std::uint32_t> flipped;
         for (int n = 0; n < 2000; ++n)
             if (const std::uint32_t c = any(random); table.can_flip(c)) {
                 table.flip(c);
-                turned.push_back(c);
+                flipped.push_back(c);
             }
-        REQUIRE(turned.size() > 500);
+        REQUIRE(flipped.size() > 500);
         check_table(table, mesh.triangles);
-        for (std::size_t n = turned.size(); n-- > 0;) table.unflip(turned[n]);
+        for (std::size_t n = flipped.size(); n-- > 0;) table.unflip(flipped[n]);
         CHECK(mesh.triangles == before);
         check_table(table, mesh.triangles);
         const int genus = measure(mesh).genus, components = measure(mesh).components;
@@ -94,15 +94,15 @@ TEST_CASE("flips, flips undone and collapses leave who is next to whom right, wi
     }
 }
 
-TEST_CASE("an edge with three triangles, or two on one side, is refused") {
+TEST_CASE("Corner table: an edge with three triangles is rejected") {
     std::vector<Triangle> fan{{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
     CHECK_THROWS_AS(CornerTable(fan, 5), Error);
 }
 
-TEST_CASE("no contact of random triangles is missed, and few are seen where there is none") {
+TEST_CASE("Contact test: no contact of random triangles is missed, and none is reported for separate ones") {
     std::mt19937 random(11);
     std::uniform_real_distribution<float> uniform(0, 1);
-    int touching = 0, doubted = 0;
+    int touching = 0, false_alarms = 0;
     for (int n = 0; n < 4000; ++n) {
         // Two triangles that share 0, 1 or 2 corners, every third pair in one plane.
         TriangleMesh pair;
@@ -117,13 +117,13 @@ TEST_CASE("no contact of random triangles is missed, and few are seen where ther
         INFO("pair " << n);
         REQUIRE_FALSE((touch && apart));
         touching += touch;
-        doubted += !touch && !apart;
+        false_alarms += !touch && !apart;
     }
     CHECK(touching > 500);
-    CHECK(doubted == 0);
+    CHECK(false_alarms == 0);
 }
 
-TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
+TEST_CASE("Contacts of a tangled mesh: more than 99 percent are confirmed by exact predicates") {
     for (const unsigned seed : {0U, 1U, 7U}) {
         TriangleMesh mesh = solid_mesh(seed);
         INFO("seed " << seed);
@@ -149,7 +149,7 @@ TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
     }
 }
 
-TEST_CASE("moves are taken back where triangles would touch, and only there") {
+TEST_CASE("Moves that would make triangles touch are undone, and the other moves are kept") {
     TriangleMesh mesh = solid_mesh(4);
     const Positions before = mesh.vertices;
     Positions goal = before;
@@ -161,16 +161,16 @@ TEST_CASE("moves are taken back where triangles would touch, and only there") {
     TriangleMesh tangled = mesh;
     tangled.vertices = goal;
     REQUIRE(count_self_intersections(tangled) > 10);
-    const std::size_t stay = move_where_free(mesh, goal);
+    const std::size_t undone = move_where_free(mesh, goal);
     CHECK(count_self_intersections(mesh) == 0);
     CHECK(measure(mesh).closed);
-    CHECK(stay > 0);
-    CHECK(stay < before.size());
+    CHECK(undone > 0);
+    CHECK(undone < before.size());
     for (std::size_t v = 0; v < before.size(); ++v)
         CHECK((mesh.vertices[v] == before[v] || mesh.vertices[v] == goal[v]));
 }
 
-TEST_CASE("a mesh with a boundary keeps it, and relaxes within") {
+TEST_CASE("Relaxation of an open mesh keeps its boundary and increases the smallest angle") {
     const auto solid = test::random_solid(1);
     TriangleMesh mesh = open_mesh();
     REQUIRE(measure(mesh).manifold);
@@ -185,14 +185,14 @@ TEST_CASE("a mesh with a boundary keeps it, and relaxes within") {
     CHECK(measure(mesh).manifold);
     CHECK(count_self_intersections(mesh) == 0);
     const CornerTable after(mesh.triangles, mesh.vertices.size());
-    std::vector<Position> left;
+    std::vector<Position> rim_after;
     for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v)
-        if (after.is_boundary(v)) left.push_back(mesh.vertices[v]);
-    std::sort(left.begin(), left.end());
-    CHECK(left == rim);
+        if (after.is_boundary(v)) rim_after.push_back(mesh.vertices[v]);
+    std::sort(rim_after.begin(), rim_after.end());
+    CHECK(rim_after == rim);
 }
 
-TEST_CASE("options of the relaxation are checked, none round leaves the mesh") {
+TEST_CASE("Relaxation: invalid options are rejected, and zero rounds leave the mesh unchanged") {
     const auto solid = test::random_solid(0);
     TriangleMesh mesh = extract_mesh(*solid.level_set);
     const TriangleMesh before = mesh;

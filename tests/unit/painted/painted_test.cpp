@@ -64,13 +64,13 @@ bool in_ball(int i, int j, int k, double middle, double r) {
     return std::hypot(i - middle, std::hypot(j - middle, k - middle)) < r;
 }
 
-Painted understood(const Image& image, const PaintedOptions& options = {}) {
+Painted interpreted(const Image& image, const PaintedOptions& options = {}) {
     return understand_painted(image, find_painted_labels(image), options);
 }
 
 }  // namespace
 
-TEST_CASE("the outline of a disc lies on its circle", "[painted]") {
+TEST_CASE("The outline of a painted disc lies on its circle", "[painted]") {
     for (const double r : {2.0, 3.0, 5.0, 10.0, 30.0}) {
         double mean = 0, square = 0, worst = 0;
         int count = 0;
@@ -94,7 +94,7 @@ TEST_CASE("the outline of a disc lies on its circle", "[painted]") {
     }
 }
 
-TEST_CASE("a staircase becomes a straight line", "[painted]") {
+TEST_CASE("The outline of a staircase of voxels becomes a straight line", "[painted]") {
     for (const double slope : {0.0, 0.2, 0.5, 1.0}) {
         const Slice half = slice_of(60, 90, [&](int i, int j) { return j < 20.3 + slope * i; });
         double worst = 0;
@@ -108,7 +108,7 @@ TEST_CASE("a staircase becomes a straight line", "[painted]") {
     }
 }
 
-TEST_CASE("no vertex of an outline moves by more than half a voxel", "[painted]") {
+TEST_CASE("Smoothing moves no vertex of an outline by more than half a voxel along each axis", "[painted]") {
     const Slice comb = slice_of(
         40, 40, [](int i, int j) { return j > 3 && j < 36 && i > 3 && i < 36 && ((i / 3) % 2 == 0 || j < 8); });
     for (const Polygon& rough : painted::pixel_outlines(comb)) {
@@ -119,7 +119,8 @@ TEST_CASE("no vertex of an outline moves by more than half a voxel", "[painted]"
     }
 }
 
-TEST_CASE("outlines run around the inside, holes the other way, corners apart", "[painted]") {
+TEST_CASE("Outlines are counterclockwise, those of holes clockwise, and voxels at a corner are not joined",
+          "[painted]") {
     const auto ring = painted::pixel_outlines(slice_of(20, 20, [](int i, int j) {
         const double d = std::hypot(i - 9.5, j - 9.5);
         return d < 8 && d > 3;
@@ -133,7 +134,7 @@ TEST_CASE("outlines run around the inside, holes the other way, corners apart", 
     CHECK(painted::pixel_outlines(slice_of(3, 3, [](int, int) { return false; })).empty());
 }
 
-TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last centres", "[painted]") {
+TEST_CASE("An outline is cut at the image's end, half a voxel beyond the last voxel centres", "[painted]") {
     const Slice half = slice_of(30, 30, [](int i, int j) { return std::hypot(i + 0.5, j - 14.5) < 10; });
     const auto cut = painted::outlines(half, {true, false, false, false});
     REQUIRE(cut.size() == 1);
@@ -145,7 +146,7 @@ TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last ce
     CHECK(signed_area(painted::outlines(half, {})[0]) < kPi * 50 * 0.998);
 }
 
-TEST_CASE("strokes are long and thin", "[painted]") {
+TEST_CASE("Long patches up to 4 voxels wide are strokes, and short or wide ones are not", "[painted]") {
     const auto bar = [](int width, int length) {
         return painted::patches(
                    slice_of(length + 4, width + 4,
@@ -163,13 +164,13 @@ TEST_CASE("strokes are long and thin", "[painted]") {
     CHECK(painted::patches(slice_of(9, 3, [](int i, int j) { return j == 1 && i != 4; })).size() == 2);
 }
 
-TEST_CASE("slices that lie apart were painted as a whole", "[painted]") {
+TEST_CASE("Separate painted slices are recognised as whole cross-sections, across any axis", "[painted]") {
     const int axis = GENERATE(0, 1, 2);
     const Image image = painting(lattice({40, 40, 40}), [&](int i, int j, int k) {
         const int n = axis == 0 ? i : axis == 1 ? j : k;
         return n % 5 == 0 && in_ball(i, j, k, 19.5, 14) ? 7 : 0;
     });
-    const Painted result = understood(image);
+    const Painted result = interpreted(image);
     REQUIRE(result.labels.size() == 1);
     const PaintedLabel& label = result.labels[0];
     CHECK(label.label == 7);
@@ -186,65 +187,68 @@ TEST_CASE("slices that lie apart were painted as a whole", "[painted]") {
     CHECK(contours.solid->level({19.5, 19.5, 19.5}) < -10);
 }
 
-TEST_CASE("slices of several axes, and runs that are thin", "[painted]") {
+TEST_CASE("Painted slices across two axes, and pairs of adjacent slices, are recognised as cross-sections",
+          "[painted]") {
     const Label cross = [](int i, int j, int k) {
         return (k % 6 == 2 || j == 20) && in_ball(i, j, k, 19.5, 15) ? 1 : 0;
     };
-    const Painted crossed = understood(painting(lattice({40, 40, 40}), cross));
+    const Painted crossed = interpreted(painting(lattice({40, 40, 40}), cross));
     REQUIRE(crossed.labels[0].views.size() == 2);
     CHECK(crossed.labels[0].views[0].axis == 2);
     CHECK(crossed.labels[0].views[1].axis == 1);
     CHECK(crossed.labels[0].views[1].slices == std::vector<int>{20});
     CHECK(crossed.labels[0].inside.empty());
-    const Painted runs = understood(painting(
+    const Painted runs = interpreted(painting(
         lattice({40, 40, 40}), [](int i, int j, int k) { return k % 8 < 2 && in_ball(i, j, k, 19.5, 15) ? 1 : 0; }));
     REQUIRE(runs.labels[0].views.size() == 1);
     CHECK(runs.labels[0].views[0].slices.size() == 8);
 }
 
-TEST_CASE("paint in places is a scribble", "[painted]") {
+TEST_CASE("A painted ball or stroke is a scribble, unless slices are chosen in the options", "[painted]") {
     const Label ball = [](int i, int j, int k) { return in_ball(i, j, k, 19.5, 5) ? 1 : 0; };
     const Label stroke = [](int i, int j, int k) {
         return k == 12 && std::abs(j - 10 - i / 4) <= 1 && i > 3 && i < 36 ? 1 : 0;
     };
     for (const Label& label : {ball, stroke}) {
         const Image image = painting(lattice({40, 40, 40}), label);
-        const Painted result = understood(image);
+        const Painted result = interpreted(image);
         CHECK(result.labels[0].views.empty());
         CHECK_FALSE(result.labels[0].inside.empty());
         for (const Vec3& p : result.labels[0].inside) CHECK(image.at(int(p[0]), int(p[1]), int(p[2])) == 1);
         CHECK(result.labels[0].summary.find("scribbles") != std::string::npos);
         PaintedOptions slices;
         slices.as = PaintedAs::Slices;
-        CHECK(understood(image, slices).labels[0].views.size() == 1);
+        CHECK(interpreted(image, slices).labels[0].views.size() == 1);
     }
     // Only voxels in a shell of the ball become seeds, because those deeper inside add no information.
-    CHECK(understood(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
+    CHECK(interpreted(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
     PaintedOptions scribbles;
     scribbles.as = PaintedAs::Scribbles;
-    CHECK(understood(painting(lattice({40, 40, 40}),
-                              [](int i, int j, int k) { return k == 20 && in_ball(i, j, k, 19.5, 9) ? 1 : 0; }),
-                     scribbles)
+    CHECK(interpreted(painting(lattice({40, 40, 40}),
+                               [](int i, int j, int k) { return k == 20 && in_ball(i, j, k, 19.5, 9) ? 1 : 0; }),
+                      scribbles)
               .labels[0]
               .views.empty());
 }
 
-TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
+TEST_CASE("Adjacent painted slices of a body are recognised as cross-sections, across any axis", "[painted]") {
     const int axis = GENERATE(0, 1, 2);
-    const auto of = [&](int i, int j, int k) { return axis == 0 ? i : axis == 1 ? j : k; };
+    const auto along_axis = [&](int i, int j, int k) { return axis == 0 ? i : axis == 1 ? j : k; };
     const auto views = [](const Label& label, const ImageGeometry& geometry = lattice({40, 40, 40})) {
-        return understood(painting(geometry, label)).labels[0].views;
+        return interpreted(painting(geometry, label)).labels[0].views;
     };
     // The middle eight slices of a ball 14 slices across, half of a ball 20 slices across, and an oblique tube.
-    const Label both = [&](int i, int j, int k) {
-        return of(i, j, k) > 15 && of(i, j, k) < 24 && in_ball(i, j, k, 19.5, 7) ? 1 : 0;
+    const Label slab = [&](int i, int j, int k) {
+        return along_axis(i, j, k) > 15 && along_axis(i, j, k) < 24 && in_ball(i, j, k, 19.5, 7) ? 1 : 0;
     };
-    const Label half = [&](int i, int j, int k) { return of(i, j, k) > 19 && in_ball(i, j, k, 19.5, 10) ? 1 : 0; };
+    const Label half = [&](int i, int j, int k) {
+        return along_axis(i, j, k) > 19 && in_ball(i, j, k, 19.5, 10) ? 1 : 0;
+    };
     const Label tube = [&](int i, int j, int k) {
-        const double w = of(i, j, k), x = axis == 0 ? j : i, y = axis == 2 ? j : k;
+        const double w = along_axis(i, j, k), x = axis == 0 ? j : i, y = axis == 2 ? j : k;
         return w > 8 && w < 30 && std::hypot(x - 14 - 0.3 * w, y - 20) < 6 ? 1 : 0;
     };
-    for (const Label& label : {both, half, tube}) {
+    for (const Label& label : {slab, half, tube}) {
         const std::vector<PaintedView> found = views(label);
         REQUIRE(found.size() == 1);
         CHECK(found[0].axis == axis);
@@ -253,11 +257,11 @@ TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
     CHECK(views([](int i, int j, int) { return std::hypot(i - 19.5, j - 19.5) < 8 ? 1 : 0; }).size() == 1);
 }
 
-TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
+TEST_CASE("Balls, boxes and strokes of a brush are not taken for cross-sections", "[painted]") {
     const auto is_scribble = [](const Label& label) {
-        return understood(painting(lattice({60, 60, 60}), label)).labels[0].views.empty();
+        return interpreted(painting(lattice({60, 60, 60}), label)).labels[0].views.empty();
     };
-    const auto beside = [](int i, int j, int k, const Vec3& from, const Vec3& to) {
+    const auto distance_to_segment = [](int i, int j, int k, const Vec3& from, const Vec3& to) {
         double along = 0, length = 0;
         const Vec3 p{double(i), double(j), double(k)};
         for (int a = 0; a < 3; ++a) {
@@ -265,24 +269,24 @@ TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
             length += (to[a] - from[a]) * (to[a] - from[a]);
         }
         const double t = length > 0 ? std::clamp(along / length, 0.0, 1.0) : 0;
-        double away = 0;
-        for (int a = 0; a < 3; ++a) away = std::hypot(away, from[a] + t * (to[a] - from[a]) - p[a]);
-        return away;
+        double distance = 0;
+        for (int a = 0; a < 3; ++a) distance = std::hypot(distance, from[a] + t * (to[a] - from[a]) - p[a]);
+        return distance;
     };
     for (const double r : {2.5, 3.5, 5.0, 6.2, 8.0, 11.0}) {
         INFO("radius " << r);
         CHECK(is_scribble([&](int i, int j, int k) {
-            return beside(i, j, k, {30, 30, 30}, {30, 30, 30}) < r ? 1 : 0;
+            return distance_to_segment(i, j, k, {30, 30, 30}, {30, 30, 30}) < r ? 1 : 0;
         }));
         CHECK(is_scribble([&](int i, int j, int k) {
-            return beside(i, j, k, {30.5, 30.5, 30.5}, {30.5, 30.5, 30.5}) < r ? 1 : 0;
+            return distance_to_segment(i, j, k, {30.5, 30.5, 30.5}, {30.5, 30.5, 30.5}) < r ? 1 : 0;
         }));
         // A brush that is dragged along a slice, and along its normal.
         CHECK(is_scribble([&](int i, int j, int k) {
-            return beside(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0;
+            return distance_to_segment(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0;
         }));
         CHECK(is_scribble([&](int i, int j, int k) {
-            return beside(i, j, k, {30, 30, 15}, {30, 30, 44}) < r ? 1 : 0;
+            return distance_to_segment(i, j, k, {30, 30, 15}, {30, 30, 44}) < r ? 1 : 0;
         }));
     }
     CHECK(is_scribble([](int i, int j, int k) {
@@ -293,8 +297,8 @@ TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
         [](int i, int j, int k) { return k > 20 && k < 27 && std::abs(j - 30) <= 1 && i > 22 && i < 36 ? 1 : 0; }));
 }
 
-TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {
-    const Painted result = understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) {
+TEST_CASE("A stroke between whole painted slices becomes seeds, and the slices become cross-sections", "[painted]") {
+    const Painted result = interpreted(painting(lattice({40, 40, 40}), [](int i, int j, int k) {
         if (k % 10 == 0) return in_ball(i, j, k, 19.5, 16) ? 1 : 0;
         return k == 25 && j == 18 && i > 8 && i < 34 ? 1 : 0;
     }));
@@ -304,25 +308,25 @@ TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {
     CHECK(result.labels[0].inside[0] == Vec3{9, 18, 25});
 }
 
-TEST_CASE("several labels, and one for the outside", "[painted]") {
+TEST_CASE("Several painted labels are kept apart, and the outside label becomes outside positions", "[painted]") {
     const Image image = painting(lattice({40, 40, 40}), [](int i, int j, int k) {
         if (k % 10 != 0) return 0;
         return in_ball(i, j, k, 19.5, 15) ? (i < 20 ? 3 : 5) : i < 2 ? 9 : 0;
     });
     PaintedOptions options;
     options.outside_label = 9;
-    const Painted result = understood(image, options);
+    const Painted result = interpreted(image, options);
     REQUIRE(result.labels.size() == 2);
     CHECK(result.labels[0].label == 3);
     CHECK(result.labels[1].label == 5);
     CHECK(result.outside.size() == 4 * 2 * 40);
     options.outside_label = 4;
     CHECK(message_of([&] {
-              (void)understood(image, options);
+              (void)interpreted(image, options);
           }).find("expected the outside label 4 among its labels, got 3, 5, 9") != std::string::npos);
 }
 
-TEST_CASE("label images that say nothing", "[painted]") {
+TEST_CASE("Label images that are empty or have fractional values are rejected", "[painted]") {
     CHECK(message_of([] {
               (void)find_painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; }));
           }).find("expected painted voxels, got 0 everywhere in 4 x 5 x 6") != std::string::npos);
@@ -333,7 +337,7 @@ TEST_CASE("label images that say nothing", "[painted]") {
           }).find("expected whole numbers >= 0, got 0.5 at voxel (1, 1, 1)") != std::string::npos);
 }
 
-TEST_CASE("paint lies on the image", "[painted]") {
+TEST_CASE("Paint of unknown spacing takes that of the image, and paint that does not fit is rejected", "[painted]") {
     const ImageGeometry image = lattice({10, 10, 10}, {1, 1, 2});
     ImageGeometry unknown = lattice({10, 10, 10});
     unknown.spacing_known = false;
@@ -352,7 +356,7 @@ TEST_CASE("paint lies on the image", "[painted]") {
           }).find("100 of 100 painted voxels lie outside the image, the first at (9, 0, 0)") != std::string::npos);
 }
 
-TEST_CASE("names of 3D Slicer's segments", "[painted]") {
+TEST_CASE("Segment names of 3D Slicer are read from the header of a .seg.nrrd file", "[painted]") {
     const Scratch scratch;
     const std::string path = scratch.write(
         "a.seg.nrrd",

@@ -46,7 +46,7 @@ CloudCleanupOptions with_smoothing(CloudSmoothing smooth) {
 
 }  // namespace
 
-TEST_CASE("far points go, points of the surface stay in their order") {
+TEST_CASE("Outliers far from the surface are removed, and the other points keep their order") {
     const std::vector<Vec3> good = sphere(5000, 0, 1);
     std::vector<Vec3> points = good;
     std::mt19937 random(2);
@@ -63,7 +63,7 @@ TEST_CASE("far points go, points of the surface stay in their order") {
     CHECK(clean_cloud(good, with_outliers(3)) == good);
 }
 
-TEST_CASE("marks that lie apart from all others go, however few there are") {
+TEST_CASE("Outliers are removed also from a cloud of only 30 points") {
     const std::vector<Vec3> good = sphere(30, 0, 4);
     std::vector<Vec3> points = good;
     points.insert(points.begin() + 7, {9, 0, 0});
@@ -73,7 +73,7 @@ TEST_CASE("marks that lie apart from all others go, however few there are") {
     CHECK(report.outliers == 2);
 }
 
-TEST_CASE("one point stays in each cell") {
+TEST_CASE("Simplification keeps one point in each cell") {
     std::vector<Vec3> points;
     for (int n = 0; n < 3000; ++n)
         points.push_back({0.01 * (n % 30) + 0.005, 0.01 * (n / 30 % 10) + 0.005, 0.01 * (n / 300) + 0.005});
@@ -85,7 +85,7 @@ TEST_CASE("one point stays in each cell") {
     CHECK(report.simplified == 2997);
 }
 
-TEST_CASE("exact duplicates become one, alone or before the rest") {
+TEST_CASE("Exact duplicates are removed, unless the option is off") {
     std::vector<Vec3> points = sphere(100, 0, 3);
     const std::vector<Vec3> once = points;
     points.insert(points.end(), once.begin(), once.begin() + 40);
@@ -97,7 +97,7 @@ TEST_CASE("exact duplicates become one, alone or before the rest") {
     CHECK(clean_cloud(points, none).size() == 140);
 }
 
-TEST_CASE("jets and WLOP bring noisy points closer to the sphere") {
+TEST_CASE("Smoothing by jets and WLOP halves the error of noisy points on a sphere") {
     const std::vector<Vec3> noisy = sphere(2000, 0.05, 4);
     const double before = mean_error(noisy);
     CHECK(before == Approx(0.025).epsilon(0.1));
@@ -114,7 +114,7 @@ TEST_CASE("jets and WLOP bring noisy points closer to the sphere") {
     CHECK(mean_error(wlop) < 0.5 * before);
 }
 
-TEST_CASE("cleaning gives the same bits on any number of threads") {
+TEST_CASE("Cloud cleanup is bitwise identical for 1 and 8 threads") {
     const std::vector<Vec3> noisy = sphere(600, 0.1, 5);
     for (const CloudSmoothing smooth : {CloudSmoothing::Jets, CloudSmoothing::Wlop}) {
         CloudCleanupOptions options = with_outliers(1.5);
@@ -127,7 +127,7 @@ TEST_CASE("cleaning gives the same bits on any number of threads") {
     }
 }
 
-TEST_CASE("clouds too small or flat for a step pass through it") {
+TEST_CASE("Clouds that are too small or lie on a line pass through all cleanup steps") {
     CloudCleanupOptions all = with_outliers(3);
     all.simplify = 1e-3;
     for (const CloudSmoothing smooth : {CloudSmoothing::Jets, CloudSmoothing::Wlop}) {
@@ -140,7 +140,7 @@ TEST_CASE("clouds too small or flat for a step pass through it") {
     }
 }
 
-TEST_CASE("bad options and values are refused, a cancelled run ends") {
+TEST_CASE("Cloud cleanup: invalid options and values are rejected, and a cancelled run ends") {
     const std::vector<Vec3> points = sphere(100, 0, 6);
     CHECK_THROWS_AS(clean_cloud(points, with_outliers(0.5)), Error);
     CloudCleanupOptions options;

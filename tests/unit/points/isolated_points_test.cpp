@@ -37,7 +37,7 @@ TEST_CASE("Marks on a body are not isolated") {
     CHECK(find_isolated_points(std::vector<Vec3>(50, Vec3{1, 2, 3})).empty());
 }
 
-TEST_CASE("Marks that are given twice are not isolated, and count once") {
+TEST_CASE("Duplicate marks are not isolated, and a distant mark is isolated although it occurs four times") {
     for (const int count : {20, 60, 300})
         for (const double apart : {0.0, 1e-6, 1e-3})
             for (unsigned seed = 0; seed < 10; ++seed) {
@@ -67,7 +67,7 @@ TEST_CASE("Marks of two bodies are not isolated") {
     CHECK(find_isolated_points(marks).empty());
 }
 
-TEST_CASE("Marks far from all others are found, the farthest first") {
+TEST_CASE("Marks far from all others are isolated, and the farthest is listed first") {
     for (const int count : {20, 60, 300})
         for (unsigned seed = 0; seed < 10; ++seed) {
             CAPTURE(count, seed);
@@ -83,7 +83,7 @@ TEST_CASE("Marks far from all others are found, the farthest first") {
         }
 }
 
-TEST_CASE("Many marks anywhere in an image are found where the body is small") {
+TEST_CASE("Many marks scattered over an image are isolated if the body is small") {
     for (unsigned seed = 0; seed < 10; ++seed) {
         CAPTURE(seed);
         std::vector<Vec3> marks = sphere(285, seed);
@@ -98,7 +98,7 @@ TEST_CASE("Many marks anywhere in an image are found where the body is small") {
     }
 }
 
-TEST_CASE("The order of marks says nothing") {
+TEST_CASE("An isolated mark is found also in reversed order of the marks") {
     std::vector<Vec3> marks = sphere(80, 3);
     marks.push_back({0, 50, 0});
     std::reverse(marks.begin(), marks.end());

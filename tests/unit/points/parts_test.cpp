@@ -19,13 +19,13 @@ std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& more
 
 }  // namespace
 
-TEST_CASE("A cloud in one piece is one part") {
+TEST_CASE("A cloud without gaps is one part") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 1);
     CHECK(largest_part_side(ball, 10, kEdge) == longest_side(bounding_box(ball)));
     CHECK(largest_part_side({{1, 2, 3}}, 10, kEdge) == 0);
 }
 
-TEST_CASE("Parts that are far apart are measured one by one, by repeated division") {
+TEST_CASE("Distant parts of a cloud are measured one by one, by repeated division") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 2);
     const double side = longest_side(bounding_box(ball));
     // Two pairs of balls. After the first division, each pair is one part; it is divided into its balls later.
@@ -35,7 +35,7 @@ TEST_CASE("Parts that are far apart are measured one by one, by repeated divisio
     CHECK(largest_part_side(cloud, 192, kEdge) == side);
 }
 
-TEST_CASE("Parts whose gaps are narrower than a cell, or that are hardly smaller than the whole, are one") {
+TEST_CASE("Parts are not separated if the gap is narrower than a cell or a part is over half of the whole") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 2);
     const std::vector<Vec3> beside = joined(ball, test::sphere_cloud(3000, 1, 3, {3, 0, 0}));
     CHECK(largest_part_side(beside, 192, kEdge) == longest_side(bounding_box(beside)));

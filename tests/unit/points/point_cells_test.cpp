@@ -69,7 +69,7 @@ WorldBox random_box(const std::vector<Vec3>& points, std::mt19937& random) {
 
 }  // namespace
 
-TEST_CASE("cells hold every point once, under its own index") {
+TEST_CASE("Point cells: every point is in exactly one cell, under its own index") {
     for (const auto& [name, points] : clouds(500, 1))
         for (const double edge : {0.01, 0.25, 10.0}) {
             INFO(name << ", edge " << edge);
@@ -95,7 +95,7 @@ TEST_CASE("cells hold every point once, under its own index") {
         }
 }
 
-TEST_CASE("the ranges of a box hold all of its points, and each at most once") {
+TEST_CASE("Point cells: the ranges of a box contain all of its points, each at most once") {
     std::mt19937 random(2);
     for (const auto& [name, points] : clouds(500, 3))
         for (const double edge : {0.02, 0.25, 10.0}) {
@@ -121,7 +121,7 @@ TEST_CASE("the ranges of a box hold all of its points, and each at most once") {
         }
 }
 
-TEST_CASE("the ranges around a place are those of the box around it") {
+TEST_CASE("Point cells: the ranges around a position equal those of the box around it") {
     const std::vector<Vec3> points = test::box_cloud(300, {{-1, -1, -1}, {1, 1, 1}}, 6);
     const PointCells cells(points, 0.25);
     std::vector<PointCells::Range> around, in_box;
@@ -136,7 +136,7 @@ TEST_CASE("the ranges around a place are those of the box around it") {
         }
 }
 
-TEST_CASE("cells grow where the box is long beside them; no point makes no cell") {
+TEST_CASE("Point cells: cells are enlarged if the box is too long for them, and no points give no cells") {
     std::vector<Vec3> points = test::box_cloud(300, {{-1, -1, -1}, {1, 1, 1}}, 4);
     points.push_back({1e9, -1e9, 0});
     const PointCells cells(points, 1e-3);
@@ -154,7 +154,7 @@ TEST_CASE("cells grow where the box is long beside them; no point makes no cell"
     CHECK(ranges.empty());
 }
 
-TEST_CASE("the nearest neighbours are brute force's") {
+TEST_CASE("Point cells: the nearest neighbours equal those of brute force") {
     for (const auto& [name, points] : clouds(400, 5))
         for (const std::size_t count : {1, 8, 20}) {
             const double spacing = 0.15;
@@ -183,7 +183,7 @@ TEST_CASE("the nearest neighbours are brute force's") {
         }
 }
 
-TEST_CASE("neighbours are looked for within 40 spacings at least, not without end") {
+TEST_CASE("Point cells: neighbours are found up to 39 spacings away, but not at 10000 spacings") {
     std::vector<Vec3> points;
     for (int n = 0; n < 20; ++n) points.push_back({0.1 * n, 0, 0});
     points.push_back({1.9 + 3.9, 0, 0});  // 39 spacings from the last of the points above

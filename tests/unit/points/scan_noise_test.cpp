@@ -19,7 +19,7 @@ double mean_off_sphere(const std::vector<Vec3>& points, double radius) {
 
 }  // namespace
 
-TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points fill space") {
+TEST_CASE("measure_layer_thickness: 0 for a plane, up to 3/8 of the radius for points that fill space") {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> x(0, 1);
     std::vector<Vec3> plane(2000);
@@ -35,7 +35,7 @@ TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points
     CHECK_THROWS_AS(average_layers(block, -1), Error);
 }
 
-TEST_CASE("average_layers brings two layers of one sphere together between them, and keeps a thin one") {
+TEST_CASE("average_layers moves two layers of a sphere to their middle, and keeps a single layer") {
     // The radii are 0.98 and 1.02, so that the layers are 0.04 apart, more than twice the spacing of their points.
     std::vector<Vec3> points = test::sphere_cloud(40000, 0.98, 1);
     const std::vector<Vec3> outer = test::sphere_cloud(40000, 1.02, 2);
@@ -51,7 +51,7 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
     CHECK(mean_off_sphere(average_layers(thin, 0.15), 1) == Approx(sag).epsilon(0.15));
 }
 
-TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
+TEST_CASE("choose_scan_voxel_size: curvature is not taken for noise, also with few points") {
     // With voxels of 4 spacings, the largest candidates, neighbourhoods with a radius of 2.5 voxels would contain
     // the whole sphere of 50 points. Its bend must not be taken for noise.
     for (const int count : {50, 100, 300, 1000}) {
@@ -62,7 +62,7 @@ TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points ar
     }
 }
 
-TEST_CASE("choose_scan_voxel_size: two sides of a plate are no noise, points that fill it are") {
+TEST_CASE("choose_scan_voxel_size: two sides of a plate are not noise, but points that fill it are") {
     std::vector<Vec3> plate = test::box_cloud(8000, {{0, 0, 0}, {100, 100, 0}}, 5);
     const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
     plate.insert(plate.end(), above.begin(), above.end());

@@ -83,7 +83,7 @@ RenderOptions sized(int width, int height, FigureKind kind) {
 
 }  // namespace
 
-TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
+TEST_CASE("A coarse ball is shaded like an exact sphere, without visible voxels") {
     // The radius is ten voxels. If normals were constant in each voxel, they would be off by up to 0.05 rad, and the
     // shading by 0.03.
     const double h = 0.1, radius = 1 - h * h / 3;  // radius of the smoothed field
@@ -122,7 +122,7 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
     CHECK(off_disc < 0.35);  // pixels by which the outline differs from a circle
 }
 
-TEST_CASE("a scale bar is as long as it says") {
+TEST_CASE("A scale bar has a round length, and its label states that length") {
     figure::Canvas canvas(300, 100, figure::gray(1));
     // The bar may take 0.32 of 250 pixels of 0.5 um, that is 40 um. The next smaller round length is 20 um, 40 pixels.
     figure::draw_scale_bar(canvas, 280, 90, 250, 0.5, "um", {figure::gray(0), 14, 0});
@@ -140,7 +140,7 @@ TEST_CASE("a scale bar is as long as it says") {
     CHECK(figure::short_number(1234.5) == "1234");
 }
 
-TEST_CASE("in a figure the bar and the surface have one scale") {
+TEST_CASE("In a figure, the scale bar has the scale of the surface") {
     const FloatGridPtr ball = make_ball({100, 50, 20}, 5, 0.5);
     RenderScene scene;
     scene.structures = {structure(ball)};
@@ -153,7 +153,7 @@ TEST_CASE("in a figure the bar and the surface have one scale") {
     CHECK(shown == Approx(figure::round_length(shown * 1.02)).epsilon(0.02));
 }
 
-TEST_CASE("outlines lie on the circle that a plane cuts out, also where voxels are longer than wide") {
+TEST_CASE("Outlines lie on the circle in which a plane cuts a ball, also with anisotropic voxels") {
     const double radius = 10;
     const Vec3 center{15, 14, 16};
     const FloatGridPtr ball = make_ball(center, radius, 0.5);
@@ -179,8 +179,8 @@ TEST_CASE("outlines lie on the circle that a plane cuts out, also where voxels a
         const auto [x0, y0] = figure::place_on(canvas.whole(), plane, region, 0.1, middle, geometry);
         Vec3 cut = middle;
         cut[axis] = plane.index;
-        const double away = (cut[axis] - middle[axis]) * geometry.spacing[axis];
-        const double expected = std::sqrt(radius * radius - away * away) / 0.1;
+        const double plane_offset = (cut[axis] - middle[axis]) * geometry.spacing[axis];
+        const double expected = std::sqrt(radius * radius - plane_offset * plane_offset) / 0.1;
         double sum = 0, worst = 0;
         int count = 0;
         for (int y = 0; y < height; ++y)
@@ -198,7 +198,7 @@ TEST_CASE("outlines lie on the circle that a plane cuts out, also where voxels a
     }
 }
 
-TEST_CASE("slices of patients lie as radiologists have them, and letters say so") {
+TEST_CASE("Anatomical slices have radiological orientation and the matching letters") {
     // The first index runs to the right of the patient, the second to the back, the third to the head.
     ImageGeometry geometry;
     geometry.size = {20, 24, 16};
@@ -251,7 +251,7 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     CHECK(top_right(l) == 0);
 }
 
-TEST_CASE("marked slices are found and chosen") {
+TEST_CASE("Slices with marks are found and preferred for figures") {
     ImageGeometry geometry;
     geometry.size = {100, 80, 30};
     geometry.spacing = {1, 1, 3};
@@ -277,7 +277,7 @@ TEST_CASE("marked slices are found and chosen") {
     CHECK(figure::find_marked_slices(marks, geometry).axis == -1);
 }
 
-TEST_CASE("structures have their own colours, and those around others let them be seen") {
+TEST_CASE("Structures have their own colours, and a structure around another one is transparent by default") {
     const FloatGridPtr a = make_ball({-6, 0, 0}, 4, 0.4), b = make_ball({6, 0, 0}, 4, 0.4);
     RenderScene scene;
     scene.structures = {structure(a, "one"), structure(b, "two")};
@@ -308,7 +308,7 @@ TEST_CASE("structures have their own colours, and those around others let them b
     CHECK_THROWS_AS(render(scene, options), Error);
 }
 
-TEST_CASE("frames of a turn differ and have one scale") {
+TEST_CASE("Frames of a rotation differ and have the same scale") {
     const FloatGridPtr a = make_ball({-8, 0, 0}, 3, 0.5), b = make_ball({5, 2, 3}, 4, 0.5);
     RenderScene scene;
     scene.structures = {structure(a, "one"), structure(b, "two")};
@@ -333,7 +333,7 @@ TEST_CASE("frames of a turn differ and have one scale") {
     CHECK(bars.size() == 1);
 }
 
-TEST_CASE("a composed figure is filled, shows slices with marks, and is the same on any number of threads") {
+TEST_CASE("A composed figure has no empty quarter, shows marks, and is identical for any number of threads") {
     const Vec3 center{20, 18, 22};
     const FloatGridPtr ball = make_ball(center, 9, 1);
     ImageGeometry geometry;
@@ -372,7 +372,7 @@ TEST_CASE("a composed figure is filled, shows slices with marks, and is the same
     CHECK(is_ink(pixel(render(scene, options), 300, 1)));
 }
 
-TEST_CASE("layouts keep proportions and do not overlap") {
+TEST_CASE("Layouts preserve proportions and do not overlap") {
     const std::vector<figure::Tiling> ways = figure::ways_for_three({{{40, 30}, {12, 30}, {40, 12}}});
     for (const double aspect : {0.5, 1.0, 2.5}) {
         const figure::Split found = figure::split({10, 10, 600, 400}, aspect, 30, ways, 6);
@@ -390,7 +390,7 @@ TEST_CASE("layouts keep proportions and do not overlap") {
     }
 }
 
-TEST_CASE("text stands where it is asked to, and what the font lacks is shown as such") {
+TEST_CASE("Text is drawn at its position, and missing characters are drawn as a replacement") {
     figure::Canvas canvas(120, 40, figure::gray(1));
     figure::draw_text(canvas, 100, 30, "HH", {20, figure::gray(0), figure::Align::Right, 0, {}});
     const Bounds ink = find(canvas.picture(), canvas.whole(), is_ink);
@@ -404,7 +404,7 @@ TEST_CASE("text stands where it is asked to, and what the font lacks is shown as
     CHECK(figure::text_width("\xe4\xb8\xad", 20) == figure::text_width("\xff", 20));
 }
 
-TEST_CASE("views by name and by angles") {
+TEST_CASE("Views are parsed by name and by angles, and invalid ones are rejected") {
     CHECK(parse_view("right", false).azimuth == 90);
     CHECK(parse_view("left", true).azimuth == 90);  // for patients, the left is in the direction +x
     CHECK(parse_view("-30,45.5", false).elevation == 45.5);
@@ -420,7 +420,7 @@ TEST_CASE("views by name and by angles") {
     CHECK(right.right[1] == Approx(1));
 }
 
-TEST_CASE("pictures are written whole, and what cannot be drawn is refused") {
+TEST_CASE("Invalid render options and scenes are rejected, and pictures are written as PNG") {
     RenderOptions options;
     options.width = 1;
     options.zoom = 0;

@@ -32,7 +32,7 @@ TriangleMesh sphere() {
     return extract_mesh(*extract_surface(*start_from_sphere(domain, kCenter, kRadius)));
 }
 
-double away(const std::array<float, 3>& v) {
+double distance_to_center(const std::array<float, 3>& v) {
     return std::hypot(v[0] - kCenter[0], v[1] - kCenter[1], v[2] - kCenter[2]);
 }
 
@@ -74,7 +74,7 @@ json data_of(const std::string& page) {
 
 }  // namespace
 
-TEST_CASE("base64 is that of RFC 4648, section 10") {
+TEST_CASE("Base64 encoding matches the test vectors of RFC 4648, section 10") {
     const auto coded = [](const std::string& text) {
         return detail::to_base64(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
     };
@@ -85,7 +85,7 @@ TEST_CASE("base64 is that of RFC 4648, section 10") {
     CHECK(coded("foobar") == "Zm9vYmFy");
 }
 
-TEST_CASE("packed bytes come back through zlib") {
+TEST_CASE("Packed bytes are restored by zlib") {
     std::vector<std::uint8_t> bytes(1000);
     for (std::size_t n = 0; n < bytes.size(); ++n) bytes[n] = std::uint8_t(n * n / 7);
     const std::vector<std::uint8_t> packed = from_base64(detail::pack(bytes));
@@ -96,7 +96,7 @@ TEST_CASE("packed bytes come back through zlib") {
     CHECK(back == bytes);
 }
 
-TEST_CASE("a coded mesh is the mesh, within half a step of its lattice") {
+TEST_CASE("An encoded mesh has the same triangles, and vertices within half a quantization step") {
     const TriangleMesh mesh = sphere();
     const detail::CodedMesh coded = detail::encode(mesh);
     const TriangleMesh back = detail::decode(coded);
@@ -114,7 +114,7 @@ TEST_CASE("a coded mesh is the mesh, within half a step of its lattice") {
     CHECK(coded.corners.size() < 6 * mesh.triangles.size());
 }
 
-TEST_CASE("a flat mesh, and one of vertices that no triangle uses, are coded") {
+TEST_CASE("Flat meshes, unused vertices and empty meshes are encoded") {
     const TriangleMesh flat{{{9, 9, 9}, {0, 0, 5}, {1, 0, 5}, {0, 1, 5}}, {{1, 2, 3}}};
     const detail::CodedMesh coded = detail::encode(flat);
     CHECK(coded.vertex_count == 3);
@@ -122,7 +122,7 @@ TEST_CASE("a flat mesh, and one of vertices that no triangle uses, are coded") {
     CHECK(detail::decode(detail::encode(TriangleMesh{})).triangles.empty());
 }
 
-TEST_CASE("coded values are within half a step, and what is not finite is the largest") {
+TEST_CASE("Encoded values are within half a quantization step, and infinity becomes the maximum") {
     const std::vector<float> values{2, 4, 3.1F, std::numeric_limits<float>::infinity(), 2.5F};
     const std::vector<std::uint32_t> from{4, 3, 2, 1, 0};
     const detail::CodedValues coded = detail::encode(values, from);
@@ -138,7 +138,7 @@ TEST_CASE("coded values are within half a step, and what is not finite is the la
     for (std::size_t n = 0; n < back.size(); ++n) CHECK(back[n] == Approx(expected[n]).margin(1.0 / 255));
 }
 
-TEST_CASE("a clustered sphere has few triangles, vertices of the sphere, and nearly its volume") {
+TEST_CASE("Clustering a sphere respects the triangle limit and preserves its volume within 3 percent") {
     const TriangleMesh mesh = sphere();
     std::vector<float> heights;
     for (const auto& v : mesh.vertices) heights.push_back(v[2]);
@@ -153,12 +153,12 @@ TEST_CASE("a clustered sphere has few triangles, vertices of the sphere, and nea
     REQUIRE(small.values[0].second.size() == small.mesh.vertices.size());
     for (std::size_t v = 0; v < small.mesh.vertices.size(); ++v)
         REQUIRE(small.values[0].second[v] == Approx(small.mesh.vertices[v][2]).margin(2.5));
-    for (const auto& v : small.mesh.vertices) REQUIRE(away(v) == Approx(kRadius).margin(0.05));
+    for (const auto& v : small.mesh.vertices) REQUIRE(distance_to_center(v) == Approx(kRadius).margin(0.05));
     // A mesh that is small enough is unchanged.
     CHECK(detail::cluster({mesh, {}}, std::int64_t(mesh.triangles.size())).mesh.triangles == mesh.triangles);
 }
 
-TEST_CASE("slices: all of a small image, the part around the places of a large one, thinned at last") {
+TEST_CASE("Slice plan: a small image whole, of a large one the part around the positions, thinned if necessary") {
     const ImageGeometry geometry = ramp({60, 40, 20}).geometry();
     const VoxelBox all{{0, 0, 0}, {59, 39, 19}};
     const std::vector<Vec3> places{{20, 20, 35}, {30, 25, 40}};
@@ -174,7 +174,7 @@ TEST_CASE("slices: all of a small image, the part around the places of a large o
     CHECK(thin.size == Index3{30, 20, 20});
 }
 
-TEST_CASE("coded slices know where their voxels lie in the world") {
+TEST_CASE("Encoded slices have the world positions and the intensity range of their voxels") {
     const Image image = ramp({16, 8, 9});
     detail::SlicePlan plan;
     plan.region = {{0, 0, 0}, {15, 7, 8}};
@@ -191,7 +191,7 @@ TEST_CASE("coded slices know where their voxels lie in the world") {
     CHECK((jpeg[0] == 0xFF && jpeg[1] == 0xD8));
 }
 
-TEST_CASE("no name, path or fact ends the script it stands in") {
+TEST_CASE("Names, paths and facts cannot terminate the script of a page") {
     const std::string evil = "</script><script>alert(1)</script><!--<img src=x onerror=alert(1)>&amp;\xff\x1b[31m\"'";
     const TriangleMesh mesh = sphere();
     ReportPage page;
@@ -211,7 +211,7 @@ TEST_CASE("no name, path or fact ends the script it stands in") {
     CHECK(scratch.file_count() == 1);
 }
 
-TEST_CASE("a page holds slices, marks and what it was asked for, and the same bits each time") {
+TEST_CASE("A page contains slices and marks, respects the triangle limit, and is identical with one thread") {
     const TriangleMesh mesh = sphere();
     const Image image = ramp({40, 30, 40});
     ReportPage page;
@@ -235,7 +235,7 @@ TEST_CASE("a page holds slices, marks and what it was asked for, and the same bi
     CHECK(bytes_of(scratch.path("b.html")) == text);
 }
 
-TEST_CASE("a page without a surface, or with facts that are none, is refused and leaves no file") {
+TEST_CASE("A page without a surface, or with invalid facts or options, is rejected and leaves no file") {
     const TriangleMesh mesh = sphere(), empty;
     const Scratch scratch;
     ReportPage page;

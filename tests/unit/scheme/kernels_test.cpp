@@ -98,7 +98,7 @@ const SchemeConstants kConstants{1.0F, 0.9F, 0.7F, 5.0F, 1e-4F, 1e-4F};
 
 }  // namespace
 
-TEST_CASE("coefficients are those of the scheme, on every instruction set") {
+TEST_CASE("Coefficients equal those of the scheme, on every instruction set") {
     const Padded u = random_field(1, -3, 3), phi = random_field(2, 0, 6), g = random_field(3, 0.1, 1);
     for (const SchemeKernels* set : available_kernels()) {
         INFO(set->name);
@@ -116,7 +116,7 @@ TEST_CASE("coefficients are those of the scheme, on every instruction set") {
     }
 }
 
-TEST_CASE("coefficients are never negative and a row adds up to less than one") {
+TEST_CASE("Coefficients are not negative, and each row sums to less than one") {
     const Padded u = random_field(4, -3, 3), phi = random_field(5, 0, 6), g = random_field(6, 0.1, 1);
     for (const SchemeKernels* set : available_kernels())
         for (const float tau : {1e-3F, 1.0F, 100.0F}) {
@@ -135,7 +135,7 @@ TEST_CASE("coefficients are never negative and a row adds up to less than one") 
         }
 }
 
-TEST_CASE("the mean gradient of a linear function is exact") {
+TEST_CASE("The mean gradient of a linear function is exact") {
     const Padded u = fill([](int i, int j, int k) { return 0.3 * i - 0.2 * j + 0.6 * k + 1.0; });
     for (const SchemeKernels* set : available_kernels()) {
         std::vector<float> slope(512);
@@ -144,7 +144,7 @@ TEST_CASE("the mean gradient of a linear function is exact") {
     }
 }
 
-TEST_CASE("no pull acts where a field is unknown") {
+TEST_CASE("The attraction to points is zero at voxels with unknown distance") {
     const Padded u = fill([](int i, int, int) { return i; });
     Padded phi = fill([](int i, int, int) { return 8.0 - i; });
     for (int j = -1; j <= 8; ++j)
@@ -162,7 +162,7 @@ TEST_CASE("no pull acts where a field is unknown") {
     }
 }
 
-TEST_CASE("inactive voxels and closed faces stay out of the system") {
+TEST_CASE("Inactive voxels and closed faces have zero coefficients") {
     const Padded u = random_field(7, -3, 3);
     std::array<unsigned long long, 8> active = kAllActive;
     active[2] = 0xff00ff00ff00ff00ULL;
@@ -218,7 +218,7 @@ struct Blocks {
 
 }  // namespace
 
-TEST_CASE("beyond the domain a leaf has the values at its edge, corners and neighbours' voxels included") {
+TEST_CASE("Beyond the domain, a padded leaf has the values at the domain's end, corners included") {
     std::vector<float> before(kPaddedSize);
     for (std::size_t n = 0; n < before.size(); ++n) before[n] = float(n);
     const std::array<std::array<int, 2>, 5> ends{{{-9, 99}, {0, 99}, {-9, 7}, {0, 7}, {3, 5}}};
@@ -240,7 +240,7 @@ TEST_CASE("beyond the domain a leaf has the values at its edge, corners and neig
             }
 }
 
-TEST_CASE("relaxation converges to the solution of the rows") {
+TEST_CASE("Relaxation converges to the solution of the linear system") {
     const Padded u = random_field(8, -3, 3);
     for (const SchemeKernels* set : available_kernels()) {
         LeafRows c;
@@ -267,7 +267,7 @@ TEST_CASE("relaxation converges to the solution of the rows") {
     }
 }
 
-TEST_CASE("assembly tells the residual at the values before") {
+TEST_CASE("Assembly returns the residual at the previous values") {
     const Padded u = random_field(9, -3, 3);
     std::array<unsigned long long, 8> active = kAllActive;
     active[3] = 0x00ff12ff00ff34ffULL;
@@ -279,17 +279,17 @@ TEST_CASE("assembly tells the residual at the values before") {
         for (int n = 0; n < 512; ++n) {
             if ((active[n >> 6] >> (n & 63) & 1) == 0) continue;
             const int i = n >> 6, j = n >> 3 & 7, k = n & 7;
-            double pull = 0.0;
+            double row_residual = 0.0;
             for (int f = 0; f < 6; ++f)
-                pull += c(f, n) *
-                        (double(u[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - u[padded(i, j, k)]);
-            squares += pull * pull;
+                row_residual += c(f, n) * (double(u[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) -
+                                           u[padded(i, j, k)]);
+            squares += row_residual * row_residual;
         }
         CHECK(reported == Approx(squares).epsilon(1e-3));
     }
 }
 
-TEST_CASE("the mean of a wave's neighbours is its exact multiple") {
+TEST_CASE("The mean of a wave's six neighbours is the wave times its exact eigenvalue") {
     // cos(q i) is an eigenvector of the six neighbours' mean with eigenvalue (4 + 2 cos q) / 6.
     const double q = 0.7, mean = (4 + 2 * std::cos(q)) / 6;
     const Padded wave = fill([q](int i, int, int) { return std::cos(q * i); });
@@ -303,7 +303,7 @@ TEST_CASE("the mean of a wave's neighbours is its exact multiple") {
     }
 }
 
-TEST_CASE("a plane's distance is found exactly from where it comes") {
+TEST_CASE("Eikonal kernel: the distance to a plane is exact for every direction") {
     // The distance to a plane is linear, so its differences are exact, whether the front arrives along one, two or
     // three axes.
     const std::array<double, 3> normals[] = {{1, 0, 0},

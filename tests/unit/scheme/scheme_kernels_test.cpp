@@ -109,7 +109,7 @@ DenseOptions everything_on() {
 
 }  // namespace
 
-TEST_CASE("the mean gradient is the reference's") {
+TEST_CASE("The mean gradient equals that of the reference") {
     const DenseField u = rounded(sample(cube_domain(10, 1.0), random_waves(11, 4.0)));
     alignas(64) std::array<float, kLeafSize> out;
     const Buffer padded = padded_copy(u);
@@ -127,7 +127,7 @@ TEST_CASE("the mean gradient is the reference's") {
     }
 }
 
-TEST_CASE("a leaf's rows are the reference's") {
+TEST_CASE("The rows of a leaf equal those of the reference") {
     const Domain d = cube_domain(10, 1.0);
     const DenseField u = rounded(sample(d, random_waves(12, 4.0)));
     const DenseField distance = rounded(sample(d, [](const Vec3& x) {
@@ -166,7 +166,7 @@ TEST_CASE("a leaf's rows are the reference's") {
     };
     DenseOptions o = everything_on();
     SECTION("all terms") { compare(&distance, &g, o, every_voxel()); }
-    SECTION("all terms, some voxels") { compare(&distance, &g, o, some); }
+    SECTION("all terms, some voxels inactive") { compare(&distance, &g, o, some); }
     SECTION("points alone") {
         o.rho = o.delta = 0;
         compare(&distance, nullptr, o, every_voxel());
@@ -179,7 +179,7 @@ TEST_CASE("a leaf's rows are the reference's") {
         o.theta = o.rho = 0;
         compare(nullptr, nullptr, o, some);
     }
-    SECTION("fields not known everywhere") {
+    SECTION("fields unknown in some voxels") {
         DenseField part_d = distance, part_g = g;
         for_each_voxel(d, [&](int i, int j, int k, const Vec3& x) {
             if (x[0] + x[1] > 2) part_d.at(i, j, k) = NAN;
@@ -187,7 +187,7 @@ TEST_CASE("a leaf's rows are the reference's") {
         });
         compare(&part_d, &part_g, o, every_voxel());
     }
-    SECTION("a flat u") {
+    SECTION("a constant u") {
         const DenseField flat(10, 10, 10, 1.0, -3.0);
         const double s = o.tau * o.delta;  // since M W = ε / ε = 1 for a flat u
         for (const detail::SchemeKernels* kernels : detail::available_kernels())

@@ -38,7 +38,7 @@ double mirror_defect(const Problem& p, const Solver& solver, int axis) {
 
 }  // namespace
 
-TEST_CASE("a linear function has its exact gradient on all 24 tetrahedra") {
+TEST_CASE("The gradients of a linear function are exact on all 24 tetrahedra") {
     const Domain d = cube_domain(3, kH);
     const DenseField u = [&] {  // ghosts, too, have the values of the linear function, not mirrored ones
         DenseField f(3, 3, 3, kH);
@@ -56,7 +56,7 @@ TEST_CASE("a linear function has its exact gradient on all 24 tetrahedra") {
     });
 }
 
-TEST_CASE("the tetrahedra's gradients are those of the formulas on the +x face") {
+TEST_CASE("The gradients of the four tetrahedra on the +x face equal the formulas") {
     const Domain d = cube_domain(3, kH);
     const DenseField u = sample(d, random_waves(3, 1.0));
     const auto z = [&](int s, int t) {
@@ -84,7 +84,7 @@ TEST_CASE("the tetrahedra's gradients are those of the formulas on the +x face")
     CHECK(found == 4);
 }
 
-TEST_CASE("neighbours share a face's gradients") {
+TEST_CASE("Neighbouring voxels have equal squared gradients on their common face") {
     const DenseField u = sample(cube_domain(5, kH), random_waves(4, 1.0));
     for (int face = 0; face < 6; ++face) {
         const auto& q = kFaces[face];
@@ -100,7 +100,7 @@ TEST_CASE("neighbours share a face's gradients") {
     }
 }
 
-TEST_CASE("a row has no positive off-diagonal, and the matrix keeps constants") {
+TEST_CASE("Off-diagonal coefficients are not positive, and constants solve the system") {
     Problem p = whole_cube(8, kH, random_waves(5, 1.5));
     set_distance(p, [](const Vec3& x) { return length(x); });
     set_edge(p, [](const Vec3& x) { return 0.6 + 0.4 * std::sin(3 * x[0] + x[1]); });
@@ -118,7 +118,7 @@ TEST_CASE("a row has no positive off-diagonal, and the matrix keeps constants") 
     CHECK(max_difference(constant, DenseField(8, 8, 8, kH, 2.0)) == 0);
 }
 
-TEST_CASE("the taper is smooth and the potential is its integral") {
+TEST_CASE("The taper falls from 1 at half the range to 0 at the range, and the potential is its integral") {
     const double r = 3.0;
     CHECK(attraction_taper(1.4, r) == 1);
     CHECK(attraction_taper(1.5, r) == 1);
@@ -133,7 +133,7 @@ TEST_CASE("the taper is smooth and the potential is its integral") {
     }
 }
 
-TEST_CASE("v_pq: points that are not known do not pull, a frozen voxel keeps its value") {
+TEST_CASE("v_pq: unknown distances to the points do not attract, and an inactive voxel keeps its value") {
     Problem p = whole_cube(8, kH, [](const Vec3& x) { return x[0]; });
     set_distance(p, [](const Vec3& x) { return x[0] > 0 ? NAN : 5 - x[0]; });
     p.active[p.u.index(1, 1, 1)] = 0;
@@ -152,7 +152,7 @@ TEST_CASE("v_pq: points that are not known do not pull, a frozen voxel keeps its
     CHECK(after.at(2, 2, 2) != p.u.at(2, 2, 2));
 }
 
-TEST_CASE("the image term has unit speed on a slope and fades where the slope is below epsilon") {
+TEST_CASE("The image term has unit speed on a slope of g, and fades if the slope is below epsilon") {
     for (const double slope : {0.2, 1e-3, 1e-6}) {  // slope of g per voxel
         Problem p = whole_cube(8, kH, [](const Vec3& x) { return x[1]; });
         p.edge = sample(p.domain, [&](const Vec3& x) { return 0.5 + slope * x[1] / kH; });
@@ -166,7 +166,7 @@ TEST_CASE("the image term has unit speed on a slope and fades where the slope is
     }
 }
 
-TEST_CASE("near marks the image yields to them") {
+TEST_CASE("Near marks the image term is reduced in proportion to the taper") {
     Problem p = whole_cube(8, kH, [](const Vec3& x) { return x[1]; });
     p.distance = sample(p.domain, [](const Vec3& x) { return x[0] + 2; });
     p.edge = sample(p.domain, [](const Vec3& x) { return 0.5 + 0.1 * x[1]; });
@@ -181,7 +181,7 @@ TEST_CASE("near marks the image yields to them") {
     }
 }
 
-TEST_CASE("the implicit heat equation damps a cosine as backward Euler does") {
+TEST_CASE("The implicit heat equation damps a cosine by the exact factor of backward Euler") {
     const int n = 16;
     const Domain d = cube_domain(n, kH);
     // Neumann: half a wave over the box, sampled at centres, is an eigenvector of the discrete operator.
@@ -195,13 +195,13 @@ TEST_CASE("the implicit heat equation damps a cosine as backward Euler does") {
     });
 }
 
-TEST_CASE("g of a linear image is 1/(1 + K s^2)") {
+TEST_CASE("The edge detector g of a linear image is 1/(1 + K s^2)") {
     const DenseField g = dense_edge(
         sample(cube_domain(6, kH), [](const Vec3& x) { return 0.1 * x[0] - 0.2 * x[1] + 0.2 * x[2]; }), 40.0);
     CHECK(g.at(2, 3, 2) == Approx(1 / (1 + 40.0 * 0.09)));
 }
 
-TEST_CASE("one dense step shrinks a sphere at 2 delta / r") {
+TEST_CASE("One step of the reference shrinks a sphere at the speed 2 delta / r") {
     Problem p = whole_cube(24, 0.125, [](const Vec3& x) { return signed_sphere(x, 1.0); });
     p.options.delta = 1;
     p.options.tau = 0.01;
@@ -215,7 +215,7 @@ TEST_CASE("one dense step shrinks a sphere at 2 delta / r") {
 // --- Errata of the printed paper. Each identity holds for the corrected form and evolve(), and fails for the printed
 // form.
 
-TEST_CASE("erratum 1: with v^b as printed a mirrored cloud does not give the mirrored surface") {
+TEST_CASE("Erratum 1: with v^b as printed, a mirrored cloud does not give the mirrored surface") {
     Problem p = whole_cube(12, kH, lopsided);
     set_distance(p, [](const Vec3& x) { return distance(x, {0.4, -0.3, 1.1}); });
     for (int axis = 0; axis < 3; ++axis) {
@@ -226,7 +226,7 @@ TEST_CASE("erratum 1: with v^b as printed a mirrored cloud does not give the mir
     CHECK(mirror_defect(p, run_dense, 2) > 0.1);
 }
 
-TEST_CASE("erratum 2: with the root as printed the motion depends on the scale of u") {
+TEST_CASE("Erratum 2: with the root as printed, the motion depends on the scale of u") {
     Problem p = whole_cube(12, kH, lopsided);
     p.options.delta = kH;
     p.options.epsilon = 1e-6;
@@ -243,7 +243,7 @@ TEST_CASE("erratum 2: with the root as printed the motion depends on the scale o
     CHECK(scale_defect(p, run_dense) > 0.05);
 }
 
-TEST_CASE("erratum 3: with the last sum as printed curvature prefers one side") {
+TEST_CASE("Erratum 3: with the last sum as printed, the curvature term is not mirror symmetric") {
     Problem p = whole_cube(12, kH, lopsided);
     p.options.delta = kH;
     p.options.tau = 3 * kH;
@@ -255,7 +255,7 @@ TEST_CASE("erratum 3: with the last sum as printed curvature prefers one side") 
     CHECK(mirror_defect(p, run_dense, 2) > 0.01);
 }
 
-TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outruns its speed") {
+TEST_CASE("Erratum 4: with a sum over more than the six neighbours, a plane moves at more than twice its speed") {
     // u = x moves along parallel rays towards points at x = +5: after two steps the plane has moved by 2 tau.
     Problem p = whole_cube(16, kH, [](const Vec3& x) { return x[0]; });
     set_distance(p, [](const Vec3& x) { return 5 - x[0]; });
@@ -278,7 +278,7 @@ TEST_CASE("erratum 4: with a sum over more than the six neighbours a plane outru
     CHECK(travelled(p, run_dense) > 4 * p.options.tau);
 }
 
-TEST_CASE("erratum 5: with epsilon twice a nearly flat u does not follow the heat equation") {
+TEST_CASE("Erratum 5: with epsilon counted twice, a nearly constant u does not follow the heat equation") {
     // As |∇u| is far below ε, M W = ε / ε = 1, and one step is a step of backward Euler for u_t = δ Δu.
     constexpr double amplitude = 0.01;
     Problem p = whole_cube(12, kH, [](const Vec3& x) { return amplitude * std::cos(M_PI * (x[2] / (12 * kH) + 0.5)); });

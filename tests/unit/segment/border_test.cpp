@@ -42,7 +42,7 @@ std::vector<Vec3> marks_around(const Vec3& center, double radius) {
 
 }  // namespace
 
-TEST_CASE("a surface that is inside out is refused unless something says so") {
+TEST_CASE("A surface that is inside out is rejected, unless marks, seeds or the start put the border inside") {
     const Image image = blank_image();
     const RunContext run;
     const Vec3 center{6, 25, 24};

@@ -54,7 +54,7 @@ double mean_radius(const TriangleMesh& mesh) {
 
 }  // namespace
 
-TEST_CASE("segment: points alone give a closed sphere and record what was chosen") {
+TEST_CASE("segment: points alone give a closed sphere, and automatic choices are recorded") {
     constexpr double h = 0.8;
     SegmentOptions options;
     options.voxel_size = h;
@@ -72,7 +72,7 @@ TEST_CASE("segment: points alone give a closed sphere and record what was chosen
     CHECK(result.report.point_count == 1200);
 }
 
-TEST_CASE("segment: image and points agree on the ball") {
+TEST_CASE("segment: image and points of a ball give its radius, and only a tagged start detects edges") {
     const Image image = ball_image(1.0);
     const SegmentResult result = segment(image, sphere_points(800));
     CHECK(result.report.domain.voxel_size == 1.0);
@@ -89,7 +89,7 @@ TEST_CASE("segment: image and points agree on the ball") {
     CHECK(flowed.report.resolved.edge.edge_k.value() > 0);
 }
 
-TEST_CASE("segment: a sphere as start follows the image edge, without points") {
+TEST_CASE("segment: a start from a sphere evolves to the image edges without points") {
     const Image image = ball_image(1.0);
     SegmentOptions options;
     options.start = SphereStart{{0, 0, 0}, kRadius + 2};
@@ -101,7 +101,7 @@ TEST_CASE("segment: a sphere as start follows the image edge, without points") {
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.4);
 }
 
-TEST_CASE("segment: an unlimited attraction reaches from a far start to the points") {
+TEST_CASE("segment: with unlimited attraction, a distant start reaches the points") {
     constexpr double h = 0.8;
     SegmentOptions options;
     options.voxel_size = h;
@@ -149,7 +149,7 @@ SegmentResult from_sphere(const Image& image, double radius, std::optional<int> 
 
 }  // namespace
 
-TEST_CASE("segment: a coarse level first gives the same surface in fewer steps") {
+TEST_CASE("segment: with a coarse level, the surface is the same in less than half of the steps") {
     const Image image = ellipsoid_image({26, 18, 22});
     const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, {});
     REQUIRE(both.report.coarse.size() == 1);
@@ -163,7 +163,7 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
     CHECK(fit.p95 < 0.2);
 }
 
-TEST_CASE("segment: without mesh and fields the surface is the same") {
+TEST_CASE("segment: without mesh and fields the surface is the same, and open holes are rejected") {
     const Image image = ellipsoid_image({26, 18, 22});
     SegmentOptions options;
     options.start = SphereStart{{0, 0, 0}, 32};
@@ -182,7 +182,7 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
     CHECK_THROWS_WITH(segment(image, options), Catch::Contains("without_mesh"));
 }
 
-TEST_CASE("segment: what a coarse level cannot hold is not lost") {
+TEST_CASE("segment: a body too thin for the coarse level is not lost") {
     // A flat ellipsoid, four voxels thick at its centre, which is two voxels at the coarse level.
     const Image image = ellipsoid_image({24, 24, 2});
     const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
@@ -190,7 +190,7 @@ TEST_CASE("segment: what a coarse level cannot hold is not lost") {
     CHECK(both.report.surface.volume == Approx(fine.report.surface.volume).epsilon(0.05));
 }
 
-TEST_CASE("segment: what is missing is an error that says so") {
+TEST_CASE("segment: missing points and invalid options are errors") {
     CHECK(code_of([] { (void)reconstruct({}); }) == Errc::InvalidInput);
     const Image image = ball_image(2.0);
     CHECK(code_of([&] { (void)segment(image); }) == Errc::InvalidInput);  // tagging without points
@@ -210,7 +210,7 @@ TEST_CASE("segment: what is missing is an error that says so") {
     CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
 }
 
-TEST_CASE("segment: parts of an image and of a cloud have the whole's lattice") {
+TEST_CASE("segment: a region of the image, and another cloud, give a surface on the same lattice") {
     const Image image = ball_image(1.0);
     SegmentOptions options;
     const SegmentResult whole = segment(image, sphere_points(300), options);
@@ -230,14 +230,14 @@ TEST_CASE("segment: parts of an image and of a cloud have the whole's lattice") 
           openvdb::Vec3d(0.1, 0.2, 0.3));
 }
 
-TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
+TEST_CASE("segment: a set cancel flag ends the run with the error Cancelled") {
     const std::atomic<bool> cancel = true;
     RunContext run;
     run.cancel = &cancel;
     CHECK(code_of([&] { (void)reconstruct(sphere_points(1200), {}, run); }) == Errc::Cancelled);
 }
 
-TEST_CASE("points are tagged, or guessed from") {
+TEST_CASE("Points are tagged if a tag distance, the paper's model or a start other than a guess is given") {
     SegmentOptions options;
     CHECK_FALSE(options.tags_points());
     options.start = GuessStart{};
@@ -252,7 +252,7 @@ TEST_CASE("points are tagged, or guessed from") {
     CHECK(options.tags_points());
 }
 
-TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
+TEST_CASE("choose_voxel_size: the spacing of the image, or that of distinct points scaled by their number") {
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(image).voxel_size == 2.0);
     // The voxel size for three distinct points with a spacing of 3 is that of 4,000 points on the same surface, or of a

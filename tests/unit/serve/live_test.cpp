@@ -48,7 +48,7 @@ private:
 
 }  // namespace
 
-TEST_CASE("a client is greeted, and gets back what it sends") {
+TEST_CASE("WebSocket: a client is greeted and receives the echo of its messages") {
     Echo echo;
     {
         Live live(echo.site());
@@ -71,7 +71,7 @@ TEST_CASE("a client is greeted, and gets back what it sends") {
     CHECK(echo.last() == Client{2});
 }
 
-TEST_CASE("texts to a client keep their order, and those of a client theirs") {
+TEST_CASE("WebSocket: messages keep their order in both directions") {
     CallRecorder log;
     Handlers handlers;
     handlers.message = [&](Client, std::string_view text) { log.add(std::string(text)); };
@@ -85,7 +85,7 @@ TEST_CASE("texts to a client keep their order, and those of a client theirs") {
     for (std::size_t n = 0; n < 300; ++n) CHECK(log.lines()[n] == std::to_string(n));
 }
 
-TEST_CASE("broadcasts reach all clients in one order") {
+TEST_CASE("WebSocket: broadcasts reach all clients in the same order") {
     Echo echo;
     Live one(echo.site()), two(echo.site());
     CHECK(one.receive() == "hello");
@@ -100,15 +100,15 @@ TEST_CASE("broadcasts reach all clients in one order") {
     for (int n = 0; n < 400; ++n) CHECK(one.receive() == two.receive());
 }
 
-TEST_CASE("what opened sends comes before any broadcast") {
-    std::promise<void> go;
-    std::shared_future<void> gone(go.get_future());
+TEST_CASE("WebSocket: messages that the opened handler sends arrive before any broadcast") {
+    std::promise<void> release;
+    std::shared_future<void> released(release.get_future());
     std::atomic<bool> is_inside{false};
     Site* site = nullptr;
     Handlers handlers;
     handlers.opened = [&](Client client) {
         is_inside = true;
-        gone.wait();
+        released.wait();
         site->server.send(client, "state");
         site->server.broadcast("after");
     };
@@ -117,12 +117,12 @@ TEST_CASE("what opened sends comes before any broadcast") {
     Live live(made);
     REQUIRE(becomes_true([&] { return is_inside.load(); }));
     made.server.broadcast("before");
-    go.set_value();
+    release.set_value();
     CHECK(live.receive() == "state");
     CHECK(live.receive() == "after");
 }
 
-TEST_CASE("messages that are too large, too many or no text end a client") {
+TEST_CASE("WebSocket: messages that are too large, too frequent or not text close the client") {
     Options options;
     options.max_message_bytes = 1000;
     options.messages_per_second = 10;
@@ -159,13 +159,13 @@ TEST_CASE("messages that are too large, too many or no text end a client") {
     CHECK(echo.log().count("error") == 0);
 }
 
-TEST_CASE("a client that is sent texts all the while is told, too, why it is closed") {
+TEST_CASE("WebSocket: the close reason arrives also while the server is sending messages") {
     Options options;
     options.max_message_bytes = 1000;
     Echo echo(options);
     Live live(echo.site());
     CHECK(live.receive() == "hello");
-    std::jthread talker([&] {
+    std::jthread writer([&] {
         for (int n = 0; n < 50; ++n) {  // some texts before the server has sent its reason for closing, and some after
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
             (void)echo.site().server.send(echo.last(), "x");
@@ -173,25 +173,25 @@ TEST_CASE("a client that is sent texts all the while is told, too, why it is clo
     });
     live.send(std::string(20'000'000, 'x'));
     CHECK(live.closed_with() == 1009);
-    talker.join();
+    writer.join();
     CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
 }
 
-TEST_CASE("a client that closes while it is sent texts gets an answer") {
+TEST_CASE("WebSocket: a client can close while the server is sending messages") {
     Echo echo;
     for (int n = 0; n < 20; ++n) {
         Live live(echo.site());
         CHECK(live.receive() == "hello");
-        std::jthread talker([&] {
+        std::jthread writer([&] {
             for (int k = 0; k < 2000; ++k) (void)echo.site().server.send(echo.last(), "x");
         });
         CHECK(live.receive() == "x");
         CHECK_NOTHROW(live.close());
-        talker.join();
+        writer.join();
     }
 }
 
-TEST_CASE("a flood that does not stop is cut off") {
+TEST_CASE("WebSocket: a client that floods the server with messages is disconnected") {
     Options options;
     options.message_burst = 50;
     Echo echo(options);
@@ -205,7 +205,7 @@ TEST_CASE("a flood that does not stop is cut off") {
     CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
 }
 
-TEST_CASE("an allowed burst is answered") {
+TEST_CASE("WebSocket: all messages of an allowed burst are answered") {
     Echo echo;
     Live live(echo.site());
     CHECK(live.receive() == "hello");
@@ -213,7 +213,7 @@ TEST_CASE("an allowed burst is answered") {
     for (int n = 0; n < 390; ++n) CHECK(live.receive() == std::to_string(n));
 }
 
-TEST_CASE("a handler that throws ends its client, and is told to the log") {
+TEST_CASE("WebSocket: an exception in a handler closes the client and is logged") {
     Handlers handlers;
     handlers.message = [](Client, std::string_view) { throw std::runtime_error("detail"); };
     Echo echo({}, handlers);
@@ -224,7 +224,7 @@ TEST_CASE("a handler that throws ends its client, and is told to the log") {
     CHECK(echo.log().count("error message: detail") == 1);
 }
 
-TEST_CASE("no more clients than are allowed") {
+TEST_CASE("WebSocket: clients beyond the maximum are rejected until another one leaves") {
     Options options;
     options.max_clients = 2;
     Echo echo(options);
@@ -237,7 +237,7 @@ TEST_CASE("no more clients than are allowed") {
     CHECK(three.receive() == "hello");
 }
 
-TEST_CASE("handshakes that are no good") {
+TEST_CASE("WebSocket: invalid handshakes are rejected") {
     Echo echo;
     Fields fields = echo.site().upgrade();
     fields[4] = {"Sec-WebSocket-Key", "-"};
@@ -251,7 +251,7 @@ TEST_CASE("handshakes that are no good") {
     CHECK(echo.log().lines().empty());
 }
 
-TEST_CASE("a client that does not read is closed, and the others are not") {
+TEST_CASE("WebSocket: a client that does not read is closed, and other clients are not") {
     Options options;
     options.max_waiting_bytes = std::size_t(8) << 20;
     Echo echo(options);
@@ -271,48 +271,48 @@ TEST_CASE("a client that does not read is closed, and the others are not") {
     CHECK(slow.closed_with() == 0);
 }
 
-TEST_CASE("a client that does not answer is closed after a while") {
+TEST_CASE("WebSocket: a client that does not answer pings is closed after the idle time") {
     Options options;
     options.live_idle = std::chrono::milliseconds(400);
     Echo echo(options);
     Live silent(echo.site());  // it never reads, and therefore answers no pings
     CHECK(becomes_true([&] { return echo.log().count("closed 1") == 1; }));
-    Live there(echo.site());
-    CHECK(there.receive() == "hello");
+    Live responsive(echo.site());
+    CHECK(responsive.receive() == "hello");
     std::thread sender([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(1200));
         echo.site().server.broadcast("after a while");
     });
-    CHECK(there.receive() == "after a while");
+    CHECK(responsive.receive() == "after a while");
     sender.join();
 }
 
-TEST_CASE("slow pictures do not delay messages") {
-    std::promise<void> go;
-    std::shared_future<void> gone(go.get_future());
+TEST_CASE("WebSocket: slow HTTP requests do not delay messages") {
+    std::promise<void> release;
+    std::shared_future<void> released(release.get_future());
     std::atomic<int> waiting{0};
     Handlers handlers;
     handlers.get = [&](const Request&) {
         ++waiting;
-        gone.wait();
+        released.wait();
         return Response();
     };
     Echo echo({}, handlers);
-    std::vector<std::unique_ptr<HttpConnection>> wires;
+    std::vector<std::unique_ptr<HttpConnection>> connections;
     for (int n = 0; n < 6; ++n) {
-        wires.push_back(std::make_unique<HttpConnection>(echo.site().port));
-        wires.back()->send(echo.site().head("/slice"));
+        connections.push_back(std::make_unique<HttpConnection>(echo.site().port));
+        connections.back()->send(echo.site().head("/slice"));
     }
     REQUIRE(becomes_true([&] { return waiting == 4; }));
     Live live(echo.site());
     CHECK(live.receive() == "hello");
     live.send("now");
     CHECK(live.receive() == "now");
-    go.set_value();
-    for (auto& wire : wires) CHECK(wire->receive().result_int() == 200);
+    release.set_value();
+    for (auto& connection : connections) CHECK(connection->receive().result_int() == 200);
 }
 
-TEST_CASE("a handler that is slow gets all messages, and little is kept for it") {
+TEST_CASE("WebSocket: a slow handler receives all messages") {
     std::atomic<int> handled{0};
     Handlers handlers;
     handlers.message = [&](Client, std::string_view) {
@@ -327,7 +327,7 @@ TEST_CASE("a handler that is slow gets all messages, and little is kept for it")
     CHECK(becomes_true([&] { return handled == 500; }));
 }
 
-TEST_CASE("the end is told to clients, and takes less than a second") {
+TEST_CASE("WebSocket: stopping the server informs the clients and takes less than a second") {
     CallRecorder log;
     Handlers handlers;
     handlers.opened = [&](Client client) { log.add("opened " + std::to_string(client.number)); };
@@ -346,7 +346,7 @@ TEST_CASE("the end is told to clients, and takes less than a second") {
     site.reset();
 }
 
-TEST_CASE("clients come and go while all talk") {
+TEST_CASE("WebSocket: clients connect and disconnect during broadcasts and requests") {
     Echo echo;
     std::atomic<bool> is_over{false};
     std::vector<std::thread> threads;

@@ -99,9 +99,9 @@ public:
         : server(std::move(options), std::move(handlers)), port(server.port()) {
         host = "127.0.0.1:" + std::to_string(port);
         token = server.url().substr(server.url().find('=') + 1);
-        HttpConnection wire(port);
-        wire.send("GET /?token=" + token + " HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
-        const std::string set(wire.receive()[http::field::set_cookie]);
+        HttpConnection connection(port);
+        connection.send("GET /?token=" + token + " HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
+        const std::string set(connection.receive()[http::field::set_cookie]);
         cookie = set.substr(0, set.find(';'));
     }
 
@@ -119,9 +119,9 @@ public:
     }
     [[nodiscard]] Answer get(const std::string& target, const Fields& changes = {},
                              const std::string& method = "GET") const {
-        HttpConnection wire(port);
-        wire.send(head(target, changes, method));
-        return wire.receive(method == "HEAD");
+        HttpConnection connection(port);
+        connection.send(head(target, changes, method));
+        return connection.receive(method == "HEAD");
     }
     [[nodiscard]] Fields upgrade() const {
         return {{"Origin", "http://" + host},

@@ -57,7 +57,7 @@ int status_of(const RequestHead& head) {
 
 }  // namespace
 
-TEST_CASE("requests that browsers make are answered") {
+TEST_CASE("Rules: requests as browsers send them are accepted") {
     CHECK(judge(good_head(), rules()).kind == Kind::Get);
     CHECK(judge(good_upgrade(), rules()).kind == Kind::Live);
     for (const std::string_view host : {"localhost:8000", "box.example:9000"}) {
@@ -78,7 +78,7 @@ TEST_CASE("requests that browsers make are answered") {
     CHECK(status_of(head) == 0);
 }
 
-TEST_CASE("a handler gets the decoded path and query") {
+TEST_CASE("Rules: path and query are decoded for the handler") {
     const Decision judgement = judge(good_head("/sl%69ce?axis=1&name=K%C3%B6rper+2&empty=&sum=1=2"), rules());
     REQUIRE(judgement.kind == Kind::Get);
     CHECK(judgement.request.path == "/slice");
@@ -86,7 +86,7 @@ TEST_CASE("a handler gets the decoded path and query") {
           std::map<std::string, std::string>{{"axis", "1"}, {"name", "K\u00f6rper 2"}, {"empty", ""}, {"sum", "1=2"}});
 }
 
-TEST_CASE("the token sets the cookie, and nothing else does") {
+TEST_CASE("Rules: only the exact link with the token sets the cookie") {
     const std::string right = "/?token=" + kToken, wrong = "/?token=" + std::string(64, 'c');
     CHECK(judge(without(good_head(right), "Cookie"), rules()).kind == Kind::SetCookie);
     CHECK(judge(good_head(right), rules()).kind == Kind::SetCookie);
@@ -100,7 +100,7 @@ TEST_CASE("the token sets the cookie, and nothing else does") {
     CHECK(status_of(good_head(right + "&more=1")) == 400);
 }
 
-TEST_CASE("without the cookie nothing is answered") {
+TEST_CASE("Rules: requests without the exact cookie are rejected") {
     CHECK(status_of(without(good_head(), "Cookie")) == 403);
     CHECK(status_of(without(good_upgrade(), "Cookie")) == 403);
     for (const std::string& cookie :
@@ -116,7 +116,7 @@ TEST_CASE("without the cookie nothing is answered") {
     CHECK(status_of(without(good_head("/live"), "Cookie")) == 403);
 }
 
-TEST_CASE("a cookie of the same name from another port does not keep out the right one") {
+TEST_CASE("Rules: a second cookie of the same name does not hide the valid one") {
     CHECK(has_cookie("covol_mark_8000=other; covol_mark_8000=" + kCookie, "covol_mark_8000", kCookie));
     CHECK(has_cookie(";; covol_mark_8000=" + kCookie + " ;covol_mark_8000=", "covol_mark_8000", kCookie));
     CHECK_FALSE(has_cookie("", "covol_mark_8000", kCookie));
@@ -125,7 +125,7 @@ TEST_CASE("a cookie of the same name from another port does not keep out the rig
     CHECK(status_of(two) == 0);
 }
 
-TEST_CASE("Host is one of the allowed names, exactly") {
+TEST_CASE("Rules: Host must be exactly one of the allowed names") {
     for (const std::string_view host :
          {"127.0.0.1", "127.0.0.1:80", "127.0.0.1:80000", "127.0.0.1:8000.evil.example", "evil.example:8000",
           "localhost:8000@evil.example", "localhost.:8000", "LOCALHOST:8000", "[::1]:8000", "", "box.example",
@@ -139,7 +139,7 @@ TEST_CASE("Host is one of the allowed names, exactly") {
     CHECK(status_of(two) == 400);
 }
 
-TEST_CASE("Origin is the page's own, and WebSockets have one") {
+TEST_CASE("Rules: Origin must be the page's own, and is required for WebSockets") {
     for (const std::string_view origin :
          {"https://127.0.0.1:8000", "http://127.0.0.1:8001", "http://127.0.0.1", "http://evil.example", "null", "",
           "http://127.0.0.1:8000/", "http://127.0.0.1:8000.evil.example", "http://localhost:8000",
@@ -154,7 +154,7 @@ TEST_CASE("Origin is the page's own, and WebSockets have one") {
     CHECK(status_of(two) == 403);
 }
 
-TEST_CASE("pages of other sites do not lead here") {
+TEST_CASE("Rules: requests from other sites are rejected, except for navigation to the link with the token") {
     for (const std::string_view site : {"cross-site", "same-site", "", "None", "none, none"}) {
         CAPTURE(site);
         CHECK(status_of(with(good_head(), "Sec-Fetch-Site", site)) == 403);
@@ -180,7 +180,7 @@ TEST_CASE("pages of other sites do not lead here") {
     CHECK(status_of(link("/image", "navigate", "document")) == 403);
 }
 
-TEST_CASE("a frame of a page on the same host leads here where frames are allowed, and to the link alone") {
+TEST_CASE("Rules: frames are accepted only if allowed, from the same site, and for the link with the token") {
     Rules own = rules();
     const std::string target = "/?token=" + kToken;
     const auto framed = [&](std::string_view to, std::string_view site, std::string_view dest = "iframe") {
@@ -208,7 +208,7 @@ TEST_CASE("a frame of a page on the same host leads here where frames are allowe
     }
 }
 
-TEST_CASE("only GET and HEAD, without a body, of an address that is not too long") {
+TEST_CASE("Rules: only GET and HEAD without a body and with an address of at most 4096 bytes are accepted") {
     for (const std::string_view method : {"POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "get", ""}) {
         RequestHead head = good_head();
         head.method = method;
@@ -229,7 +229,7 @@ TEST_CASE("only GET and HEAD, without a body, of an address that is not too long
     CHECK(status_of(good_head(longest + "x")) == 414);
 }
 
-TEST_CASE("a POST is answered where files are taken, from the page itself, and with a length that is not too large") {
+TEST_CASE("Rules: a POST is accepted only if uploads are enabled, from the page itself and within the limit") {
     const auto judged = [](const RequestHead& head, std::size_t maximum = 1000) {
         Rules own = rules();
         own.max_body_bytes = maximum;
@@ -275,7 +275,7 @@ TEST_CASE("a POST is answered where files are taken, from the page itself, and w
               .body_bytes == 1000);
 }
 
-TEST_CASE("addresses that are not understood") {
+TEST_CASE("Rules: invalid addresses are rejected") {
     for (const std::string_view target : {"",           "image",      "*",           "http://127.0.0.1:8000/image",
                                           "/%",         "/%4",        "/%4g",        "/a%",
                                           "/%00",       "/a%0Ab",     "/a%7f",       "/%ff",
@@ -293,7 +293,7 @@ TEST_CASE("addresses that are not understood") {
     CHECK(parse_target("/?a=?&b=/")->query.at("a") == "?");
 }
 
-TEST_CASE("WebSockets are opened at one address") {
+TEST_CASE("Rules: WebSockets are opened at one address only") {
     RequestHead head = good_upgrade();
     head.target = "/image";
     CHECK(status_of(head) == 404);
@@ -301,7 +301,7 @@ TEST_CASE("WebSockets are opened at one address") {
     CHECK(judge(good_upgrade(), rules()).request.path == "/live");
 }
 
-TEST_CASE("authorities") {
+TEST_CASE("Rules: authorities are a valid name with an optional port") {
     for (const std::string_view good :
          {"localhost", "a.b:1", "127.0.0.1:65535", "[::1]:80", "[fe80::1]", "my_box:22"}) {
         CAPTURE(good);
@@ -315,7 +315,7 @@ TEST_CASE("authorities") {
     CHECK(allowed_authorities(80, {"A:80"}) == std::vector<std::string>{"127.0.0.1", "localhost", "a"});
 }
 
-TEST_CASE("UTF-8") {
+TEST_CASE("is_utf8: overlong forms, surrogates and truncated sequences are rejected") {
     for (const std::string_view good : {"", "a", "\u00e9", "\uffff", "\U0010ffff", "\ud7ff"}) CHECK(is_utf8(good));
     for (const std::string_view bad : {"\x80", "\xc3", "\xc1\xbf", "\xe0\x9f\xbf", "\xed\xa0\x80", "\xf0\x8f\xbf\xbf",
                                        "\xf4\x90\x80\x80", "\xf8\x88\x80\x80\x80", "\xe2\x82", "\xe2\x82x", "\xff"}) {
@@ -323,7 +323,7 @@ TEST_CASE("UTF-8") {
     }
 }
 
-TEST_CASE("secrets") {
+TEST_CASE("Secrets are 64 random hexadecimal digits and are compared exactly") {
     std::set<std::string> all;
     for (int n = 0; n < 100; ++n) {
         const std::string secret = random_secret();
@@ -341,7 +341,7 @@ TEST_CASE("secrets") {
     }
 }
 
-TEST_CASE("names of files are coded") {
+TEST_CASE("attachment: file names are escaped in the header") {
     CHECK(attachment("mesh.ply") == "attachment; filename=\"mesh.ply\"; filename*=UTF-8''mesh.ply");
     CHECK(attachment("K\u00f6rper 1.ply") ==
           "attachment; filename=\"K__rper 1.ply\"; filename*=UTF-8''K%C3%B6rper%201.ply");
@@ -350,7 +350,7 @@ TEST_CASE("names of files are coded") {
           "attachment; filename=\"a_b___X_ y___\"; filename*=UTF-8''a%22b%3B__X%3A%20y%27%25%2A");
 }
 
-TEST_CASE("what a handler may not answer") {
+TEST_CASE("why_unsendable: responses with an invalid status, type or header are rejected") {
     CHECK(why_unsendable({}).empty());
     Response response;
     for (const int status : {0, 101, 199, 600, -1}) {
@@ -380,7 +380,7 @@ TEST_CASE("what a handler may not answer") {
     CHECK(why_unsendable(response).empty());
 }
 
-TEST_CASE("the page alone has the page's policy") {
+TEST_CASE("Content-Security-Policy: only HTML responses get the policy of the page") {
     const auto policy = [](const std::string& type) {
         Response response;
         response.type = type;
@@ -396,7 +396,7 @@ TEST_CASE("the page alone has the page's policy") {
     }
 }
 
-TEST_CASE("rates of messages") {
+TEST_CASE("MessageRate: a burst is allowed, then the rate, and no more than the burst accumulates") {
     using std::chrono::milliseconds;
     MessageRate rate(10, 5);
     MessageRate::Time now = std::chrono::steady_clock::now();
@@ -410,7 +410,7 @@ TEST_CASE("rates of messages") {
     CHECK_FALSE(rate.allows_one(now));
 }
 
-TEST_CASE("texts wait in order, up to a limit") {
+TEST_CASE("Outbox: messages wait in order, up to a limit in bytes") {
     const auto text = [](std::size_t size) { return std::make_shared<const std::string>(size, 'x'); };
     Outbox box(100);
     CHECK(box.add(text(1), true) == Outbox::Added::Refused);  // not before the greeting
@@ -433,7 +433,7 @@ TEST_CASE("texts wait in order, up to a limit") {
     CHECK(silent.add(text(1), true) == Outbox::Added::First);
 }
 
-TEST_CASE("options that are not usable are named") {
+TEST_CASE("Server options: an invalid option is reported by name") {
     CHECK(Options().why_invalid().empty());
     const auto starts = [](const Options& options, const std::string& name) {
         return options.why_invalid().starts_with(name + ": ");

@@ -73,7 +73,7 @@ void check_protection(const http::fields& answer, const std::string& policy = "d
 
 }  // namespace
 
-TEST_CASE("the link sets the cookie and leads to the page") {
+TEST_CASE("Server: the link sets the cookie and redirects to the page") {
     Options options;
     options.page_policy = "default-src 'none'; script-src 'sha256-x'";
     const Site site(pages(), options);
@@ -94,7 +94,7 @@ TEST_CASE("the link sets the cookie and leads to the page") {
     CHECK(site.get("/a?b=%20c&d=e").body() == "/a b= c d=e");
 }
 
-TEST_CASE("a request that breaks a rule gets no more than the rule, and the end of its connection") {
+TEST_CASE("Server: a rejected request gets its status, reaches no handler, and its connection is closed") {
     std::atomic<int> calls{0};
     Handlers handlers;
     handlers.get = [&](const Request& request) { return ++calls, page(request); };
@@ -143,21 +143,21 @@ TEST_CASE("a request that breaks a rule gets no more than the rule, and the end 
     };
     for (const Case& one : cases) {
         CAPTURE(one.what);
-        HttpConnection wire(site.port);
-        wire.send(one.text);
-        const Answer answer = wire.receive();
+        HttpConnection connection(site.port);
+        connection.send(one.text);
+        const Answer answer = connection.receive();
         CHECK(int(answer.result_int()) == one.status);
         CHECK(answer["Content-Type"] == "text/plain; charset=utf-8");
         CHECK(answer.count("Set-Cookie") == 0);
         CHECK_FALSE(answer.keep_alive());
         check_protection(answer);
-        CHECK(wire.is_at_end());
+        CHECK(connection.is_at_end());
     }
     CHECK(calls == 0);
     CHECK(site.get("/image", {}, "DELETE")["Allow"] == "GET, HEAD");
 }
 
-TEST_CASE("further names that a page may have") {
+TEST_CASE("Server: further authorities are accepted, and invalid ones are rejected") {
     Options options;
     options.authorities = {"localhost:9999"};
     const Site site(pages(), options);
@@ -168,28 +168,28 @@ TEST_CASE("further names that a page may have") {
     CHECK_THROWS_WITH(WebServer(options, {}), Catch::Contains("authorities: expected name:port"));
 }
 
-TEST_CASE("one connection has many requests, also when they come together") {
+TEST_CASE("Server: a connection serves many requests, also if they are pipelined") {
     const Site site(pages());
-    HttpConnection wire(site.port);
+    HttpConnection connection(site.port);
     for (int n = 0; n < 3; ++n) {
-        wire.send(site.head("/" + std::to_string(n)));
-        CHECK(wire.receive().body() == "/" + std::to_string(n));
+        connection.send(site.head("/" + std::to_string(n)));
+        CHECK(connection.receive().body() == "/" + std::to_string(n));
     }
-    wire.send(site.head("/3") + site.head("/4") + site.head("/5", {}, "HEAD") + site.head("/6"));
-    CHECK(wire.receive().body() == "/3");
-    CHECK(wire.receive().body() == "/4");
-    CHECK(wire.receive(true)["Content-Length"] == "2");
-    CHECK(wire.receive().body() == "/6");
-    wire.send(site.head("/7", {{"Connection", "close"}}));
-    CHECK(wire.receive().body() == "/7");
-    CHECK(wire.is_at_end());
+    connection.send(site.head("/3") + site.head("/4") + site.head("/5", {}, "HEAD") + site.head("/6"));
+    CHECK(connection.receive().body() == "/3");
+    CHECK(connection.receive().body() == "/4");
+    CHECK(connection.receive(true)["Content-Length"] == "2");
+    CHECK(connection.receive().body() == "/6");
+    connection.send(site.head("/7", {{"Connection", "close"}}));
+    CHECK(connection.receive().body() == "/7");
+    CHECK(connection.is_at_end());
     HttpConnection old(site.port);
     old.send("GET /8 HTTP/1.0\r\nHost: " + site.host + "\r\nCookie: " + site.cookie + "\r\n\r\n");
     CHECK(old.receive().body() == "/8");
     CHECK(old.is_at_end());
 }
 
-TEST_CASE("HEAD has the header of GET") {
+TEST_CASE("Server: HEAD returns the header fields of GET without the body") {
     const Site site(pages());
     const Answer whole = site.get("/abc"), head = site.get("/abc", {}, "HEAD");
     CHECK(head.result_int() == 200);
@@ -198,7 +198,7 @@ TEST_CASE("HEAD has the header of GET") {
     for (const auto& field : whole) CHECK(head[field.name_string()] == field.value());
 }
 
-TEST_CASE("bodies that are deflated, large or files") {
+TEST_CASE("Server: deflated bodies, large bodies and files are sent with their header fields") {
     std::string large(30 << 20, 'x');
     for (std::size_t n = 0; n < large.size(); n += 1000) large[n] = char('a' + n / 1000 % 26);
     Handlers handlers;
@@ -221,13 +221,13 @@ TEST_CASE("bodies that are deflated, large or files") {
     CHECK(site.get("/large").count("Content-Encoding") == 0);
     CHECK(site.get("/file")["Content-Disposition"] ==
           "attachment; filename=\"K__rper.ply\"; filename*=UTF-8''K%C3%B6rper.ply");
-    HttpConnection wire(site.port);
-    wire.send(site.head("/none") + site.head("/deflated"));
-    CHECK(wire.receive().result_int() == 204);
-    CHECK(wire.receive().body().size() == 6);
+    HttpConnection connection(site.port);
+    connection.send(site.head("/none") + site.head("/deflated"));
+    CHECK(connection.receive().result_int() == 204);
+    CHECK(connection.receive().body().size() == 6);
 }
 
-TEST_CASE("the body of a POST comes whole, one at a time, and its connection goes on") {
+TEST_CASE("Server: POST bodies arrive complete, one at a time, and the connection stays open") {
     CallRecorder log;
     std::atomic<bool> may_answer{true};
     Handlers handlers;
@@ -247,18 +247,18 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
     };
     const std::string body = std::string(2'999'997, 'x') + "end";
     {
-        HttpConnection wire(site.port);
+        HttpConnection connection(site.port);
         for (int n = 0; n < 2; ++n) {
-            wire.send(head(body.size()) + body);
-            const Answer answer = wire.receive();
+            connection.send(head(body.size()) + body);
+            const Answer answer = connection.receive();
             CHECK(answer.result_int() == 200);
             CHECK(answer.body() == "end");
         }
-        wire.send(site.head("/image"));
-        CHECK(wire.receive().result_int() == 404);
-        wire.send(head(body.size() + 1));
-        CHECK(wire.receive().result_int() == 413);
-        CHECK(wire.is_at_end());
+        connection.send(site.head("/image"));
+        CHECK(connection.receive().result_int() == 404);
+        connection.send(head(body.size() + 1));
+        CHECK(connection.receive().result_int() == 413);
+        CHECK(connection.is_at_end());
     }
     may_answer = false;
     HttpConnection first(site.port), second(site.port);
@@ -281,7 +281,7 @@ TEST_CASE("the body of a POST comes whole, one at a time, and its connection goe
     CHECK(log.count("/import") == 4);
 }
 
-TEST_CASE("what goes wrong in a handler is told to the log alone") {
+TEST_CASE("Server: errors in a handler are logged, and the client gets a generic error 500") {
     CallRecorder log;
     Handlers handlers;
     handlers.get = [](const Request& request) -> Response {
@@ -307,7 +307,7 @@ TEST_CASE("what goes wrong in a handler is told to the log alone") {
     CHECK(silent.get("/").result_int() == 404);
 }
 
-TEST_CASE("connections that wait make room, those at work do not") {
+TEST_CASE("Server: at the connection limit an idle connection is closed, and without one the status is 503") {
     Gate gate;
     Handlers handlers;
     handlers.get = [&](const Request& request) {
@@ -317,26 +317,26 @@ TEST_CASE("connections that wait make room, those at work do not") {
     Options options;
     options.max_connections = 4;
     const Site site(handlers, options);
-    std::vector<std::unique_ptr<HttpConnection>> wires;
+    std::vector<std::unique_ptr<HttpConnection>> connections;
     for (int n = 0; n < 4; ++n) {
-        wires.push_back(std::make_unique<HttpConnection>(site.port));
-        wires.back()->send(site.head("/" + std::to_string(n)));
-        CHECK(wires.back()->receive().result_int() == 200);
+        connections.push_back(std::make_unique<HttpConnection>(site.port));
+        connections.back()->send(site.head("/" + std::to_string(n)));
+        CHECK(connections.back()->receive().result_int() == 200);
     }
     CHECK(site.get("/more").result_int() == 200);
-    CHECK(wires[0]->is_at_end());
-    wires.erase(wires.begin());
-    for (auto& wire : wires) wire->send(site.head("/slow"));
-    wires.push_back(std::make_unique<HttpConnection>(site.port));
-    wires.back()->send(site.head("/slow"));
+    CHECK(connections[0]->is_at_end());
+    connections.erase(connections.begin());
+    for (auto& connection : connections) connection->send(site.head("/slow"));
+    connections.push_back(std::make_unique<HttpConnection>(site.port));
+    connections.back()->send(site.head("/slow"));
     REQUIRE(becomes_true([&] { return gate.waiting() == 4; }));
     CHECK(site.get("/more").result_int() == 503);
     gate.open();
-    for (auto& wire : wires) CHECK(wire->receive().body() == "/slow");
+    for (auto& connection : connections) CHECK(connection->receive().body() == "/slow");
     CHECK(becomes_true([&] { return site.get("/more").result_int() == 200; }));
 }
 
-TEST_CASE("connections without a request are closed after a while") {
+TEST_CASE("Server: connections without a complete request are closed after the idle time") {
     Options options;
     options.idle = std::chrono::milliseconds(200);
     const Site site(pages(), options);
@@ -349,7 +349,7 @@ TEST_CASE("connections without a request are closed after a while") {
     CHECK(kept.is_at_end());
 }
 
-TEST_CASE("a handler learns that nobody waits for its answer any more") {
+TEST_CASE("Server: a handler is notified if its client has disconnected") {
     std::atomic<int> left{0}, stayed{0};
     Gate gate;
     Handlers handlers;
@@ -373,7 +373,7 @@ TEST_CASE("a handler learns that nobody waits for its answer any more") {
     CHECK(stayed == 1);
 }
 
-TEST_CASE("two servers do not know each other's browsers") {
+TEST_CASE("Server: cookies and tokens of another server are rejected") {
     const Site one(pages()), two(pages());
     CHECK(one.port != two.port);
     CHECK(one.token != two.token);
@@ -384,7 +384,7 @@ TEST_CASE("two servers do not know each other's browsers") {
     CHECK(two.get("/?token=" + one.token).result_int() == 403);
 }
 
-TEST_CASE("a port that is taken is said to be, and is free after the end") {
+TEST_CASE("Server: a port in use is an error with its number, and is free after the server has stopped") {
     auto first = std::make_unique<WebServer>(Options(), pages());
     Options options;
     options.port = first->port();
@@ -396,14 +396,14 @@ TEST_CASE("a port that is taken is said to be, and is free after the end") {
         CHECK(error.option() == "port");
         CHECK_THAT(error.what(), Catch::Contains("port " + std::to_string(options.port) + " of 127.0.0.1: another"));
     }
-    HttpConnection wire(options.port);
+    HttpConnection connection(options.port);
     first.reset();
-    CHECK(wire.is_at_end());
+    CHECK(connection.is_at_end());
     const WebServer third(options, pages());
     CHECK(third.port() == options.port);
 }
 
-TEST_CASE("it listens on one address, and programs that are started do not inherit its sockets") {
+TEST_CASE("Server: it listens on 127.0.0.1 alone, and its sockets are close-on-exec") {
     const Site site(pages());
     asio::io_context io;
     asio::ip::tcp::socket other(io);
@@ -414,9 +414,9 @@ TEST_CASE("it listens on one address, and programs that are started do not inher
         CHECK(status);
         other.close(status);
     }
-    HttpConnection wire(site.port);
-    wire.send(site.head("/"));
-    CHECK(wire.receive().result_int() == 200);
+    HttpConnection connection(site.port);
+    connection.send(site.head("/"));
+    CHECK(connection.receive().result_int() == 200);
     int found = 0;
     for (int fd = 3; fd < 256; ++fd) {
         sockaddr_in local{};
@@ -430,7 +430,7 @@ TEST_CASE("it listens on one address, and programs that are started do not inher
     CHECK(found >= 2);
 }
 
-TEST_CASE("the end waits for a handler that runs, and drops requests that wait") {
+TEST_CASE("Server: stopping waits for a running handler and drops queued requests") {
     Gate gate;
     std::atomic<int> calls{0};
     Handlers handlers;

@@ -47,7 +47,7 @@ std::function<double(const Vec3&)> ellipsoid(const Vec3& center, const Vec3& rad
 
 }  // namespace
 
-TEST_CASE("a sphere inside a clean object, bright or dark, grows to its edges wherever it lies") {
+TEST_CASE("A sphere inside a bright or dark object grows to its edges, from several positions and with noise") {
     const Vec3 center{24.3, 23.6, 24.9}, radii{14, 11, 15};
     const double truth = 4.0 / 3 * M_PI * radii[0] * radii[1] * radii[2];
     for (const double inside : {180.0, 20.0})
@@ -66,7 +66,7 @@ TEST_CASE("a sphere inside a clean object, bright or dark, grows to its edges wh
             }
 }
 
-TEST_CASE("a start around an object, at an edge or in an empty image stays as it is") {
+TEST_CASE("A start around an object, at its edge or in an empty image does not grow") {
     const Vec3 center{24, 24, 24};
     const Image image = image_of(50, ellipsoid(center, {10, 10, 10}), 180, 5, 1);
     const Domain domain = make_domain(image.geometry().world_box(), 1);

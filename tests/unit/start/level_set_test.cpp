@@ -31,7 +31,7 @@ double lens(double radius, double apart) {
 
 }  // namespace
 
-TEST_CASE("LevelSet: samples are the distance, clamped at the band's half width") {
+TEST_CASE("LevelSet: samples are signed distances, clamped to the half width of the band") {
     const LevelSet surface = ball({0.1, 0, -0.2}, 3);
     const std::vector<Vec3> places{{3.1, 0, -0.2}, {0.1, 3.3, -0.2}, {0.1, 0, 2.5}, {0.1, 0, -0.2}, {5.5, 5.5, 5.5}};
     const std::vector<double> expected{0, 0.3, -0.3, -kHalfWidthVoxels * kH, kHalfWidthVoxels * kH},
@@ -42,7 +42,7 @@ TEST_CASE("LevelSet: samples are the distance, clamped at the band's half width"
     }
 }
 
-TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the band too") {
+TEST_CASE("LevelSet: the offset of a ball is a ball of the new radius, also for offsets beyond the band") {
     const LevelSet surface = ball({0.1, 0, -0.2}, 3);
     for (const double distance : {-2.0, -0.4, 0.0, 0.4, 2.0}) {
         const LevelSet moved = surface.offset(distance);
@@ -56,7 +56,7 @@ TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the 
     CHECK_THROWS_AS(surface.offset(std::nan("")), Error);
 }
 
-TEST_CASE("LevelSet: unions, intersections and differences have their volumes, and are distances") {
+TEST_CASE("LevelSet: unions, intersections and differences have the expected volumes and distances") {
     const double apart = 3;
     const LevelSet a = ball({-1.5, 0, 0}, 2.5), b = ball({1.5, 0, 0}, 2.5);
     // The second ball on another lattice, so that its level set must be resampled.
@@ -77,7 +77,7 @@ TEST_CASE("LevelSet: unions, intersections and differences have their volumes, a
     CHECK_THROWS_AS(ball({-4, 0, 0}, 1).intersected(ball({4, 0, 0}, 1)), Error);
 }
 
-TEST_CASE("LevelSet: a grid that is none is refused") {
+TEST_CASE("LevelSet: a null grid, another grid class and another background are rejected") {
     CHECK(message_of([] { LevelSet(nullptr); }) == "LevelSet: expected a grid, got none");
     const FloatGridPtr fog = make_grid(kDomain, 0.0F, "fog");
     CHECK(message_of([&] { LevelSet{fog}; }).find("expected a grid of class level set") != std::string::npos);

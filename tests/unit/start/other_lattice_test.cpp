@@ -19,7 +19,7 @@ FloatGridPtr sphere_on(const openvdb::math::Transform::Ptr& transform) {
 
 }  // namespace
 
-TEST_CASE("between lattices values are trilinear, whatever the scale and the turn") {
+TEST_CASE("Resampling to another lattice is trilinear for any scale and rotation") {
     const Domain domain = make_domain({{-14, -14, -14}, {14, 14, 14}}, 1.0);
     const openvdb::math::Transform::Ptr turned = openvdb::math::Transform::createLinearTransform(0.9);
     turned->postRotate(0.4, openvdb::math::X_AXIS);
@@ -44,7 +44,7 @@ TEST_CASE("between lattices values are trilinear, whatever the scale and the tur
     }
 }
 
-TEST_CASE("where the lattices coincide values are the grid's") {
+TEST_CASE("Resampling to a lattice shifted by whole voxels copies the values") {
     const Domain domain = make_domain({{-14, -14, -14}, {14, 14, 14}}, 1.0);
     const openvdb::math::Transform::Ptr shifted = openvdb::math::Transform::createLinearTransform(1.0);
     shifted->postTranslate(openvdb::Vec3d(domain.origin[0] + 3, domain.origin[1] - 2, domain.origin[2]));
@@ -58,7 +58,7 @@ TEST_CASE("where the lattices coincide values are the grid's") {
         REQUIRE(values[std::size_t(n)] == accessor.getValue(Coord((n >> 6) - 3, (n >> 3 & 7) + 2, n & 7)));
 }
 
-TEST_CASE("blocks of one sign cross nothing") {
+TEST_CASE("may_cross: blocks of one sign have no crossing, and large blocks are not examined") {
     const FloatGridPtr grid = sphere_on(openvdb::math::Transform::createLinearTransform(1.0));
     CHECK_FALSE(detail::may_cross(*grid, {Coord(-2, -2, -2), Coord(4, 4, 4)}));
     CHECK_FALSE(detail::may_cross(*grid, {Coord(20, 20, 20), Coord(26, 26, 26)}));

@@ -90,7 +90,7 @@ LevelRow row_of(const Level& level, std::atomic<int>& rows) {
 
 }  // namespace
 
-TEST_CASE("a start from a function asked on parts of leaves is that from all its values") {
+TEST_CASE("A start from a function evaluated on parts of leaves equals the start from all its values") {
     const Body body = GENERATE(from_range(bodies()));
     INFO(body.name);
     std::atomic<int> rows{0};
@@ -98,7 +98,7 @@ TEST_CASE("a start from a function asked on parts of leaves is that from all its
     CHECK(identical(*start, *start_from_all(body.level)));
 }
 
-TEST_CASE("a distance reads nothing that was not asked, where no leaf but the crossed ones was looked at") {
+TEST_CASE("Signed distances computed from sampled parts of the crossed leaves equal those from all values") {
     using namespace covol::detail;
     const Body body = GENERATE(from_range(bodies()));
     INFO(body.name);
@@ -108,12 +108,12 @@ TEST_CASE("a distance reads nothing that was not asked, where no leaf but the cr
     };
     std::vector<Coord> all;
     for (int n = 0; n < 6 * 6 * 6; ++n) all.emplace_back(n / 36 * kLeafDim, n / 6 % 6 * kLeafDim, n % 6 * kLeafDim);
-    SampledLeaves every(sample), few(sample);
-    const std::vector<Coord> crossed = every.crossed_by(all);
-    REQUIRE(few.crossed_by(crossed) == crossed);
+    SampledLeaves all_leaves(sample), crossed_leaves(sample);
+    const std::vector<Coord> crossed = all_leaves.crossed_by(all);
+    REQUIRE(crossed_leaves.crossed_by(crossed) == crossed);
 
     const std::vector<Coord> beside = dilate_leaves(crossed, 1, kDomain);
-    const Sampler parts = few.sampler(beside);
+    const Sampler parts = crossed_leaves.sampler(beside);
     const LeafBand band(beside);
     const CoordBBox box = box_of(kDomain);
     const auto distance = [&](const Sampler& values) {
@@ -125,13 +125,13 @@ TEST_CASE("a distance reads nothing that was not asked, where no leaf but the cr
         }
         return signed_distance(band, phi, inside, box, 3, {});
     };
-    const LeafArray<float> expected = distance(sample), got = distance(parts);
+    const LeafArray<float> expected = distance(sample), found = distance(parts);
     int wrong = 0;
-    for (std::size_t n = 0; n < band.size() * kLeafSize; ++n) wrong += expected.leaf(0)[n] != got.leaf(0)[n];
+    for (std::size_t n = 0; n < band.size() * kLeafSize; ++n) wrong += expected.leaf(0)[n] != found.leaf(0)[n];
     CHECK(wrong == 0);
 }
 
-TEST_CASE("beside a surface a function is not asked for whole leaves") {
+TEST_CASE("Near a surface, a function is evaluated in less than two thirds of the rows of its leaves") {
     const Domain domain = make_domain({{0, 0, 0}, {96, 96, 96}}, 1.0);
     std::atomic<int> rows{0};
     const FloatGridPtr start = start_from_level(domain, {{78, 48, 48}},

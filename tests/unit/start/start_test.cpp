@@ -49,7 +49,7 @@ TriangleMesh tetrahedron(float size) {
 
 }  // namespace
 
-TEST_CASE("a sphere's start is its clamped distance") {
+TEST_CASE("The start from a sphere is its signed distance, clamped to the band") {
     const FloatGridPtr grid = start_from_sphere(kDomain, kCenter, kRadius);
     CHECK(worst_error(*grid, kDomain, sphere_distance) < 1e-5);
     CHECK(grid->getName() == "band");
@@ -57,7 +57,7 @@ TEST_CASE("a sphere's start is its clamped distance") {
     CHECK(domain_of(*grid) == kDomain);
 }
 
-TEST_CASE("a sphere that the domain cuts is filled up to its end and not beyond") {
+TEST_CASE("A sphere cut by the domain is filled up to the domain's end, but not beyond") {
     const Domain cut = make_domain({{-2, -2, -2}, {10, 3, 40}}, 0.25);
     const auto distance = [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 8; };
     const FloatGridPtr grid = start_from_sphere(cut, {0, 0, 0}, 8);
@@ -70,7 +70,7 @@ TEST_CASE("a sphere that the domain cuts is filled up to its end and not beyond"
     CHECK(negative_volume(*grid) == Approx(inside * std::pow(0.25, 3)));
 }
 
-TEST_CASE("a box's start is its clamped distance") {
+TEST_CASE("The start from a box is its signed distance, clamped to the band") {
     const WorldBox box{{-3.1, -4, -5}, {2, 6.2, 5}};
     const FloatGridPtr grid = start_from_box(kDomain, box);
     CHECK(value_at(*grid, {-0.25, 0.25, 0.25}) == -1.5F);
@@ -80,7 +80,7 @@ TEST_CASE("a box's start is its clamped distance") {
     CHECK(negative_volume(*grid) == Approx(5.0 * 10.0 * 10.0).epsilon(0.03));
 }
 
-TEST_CASE("a mesh's start is the distance to it") {
+TEST_CASE("The start from a mesh is its signed distance") {
     const FloatGridPtr grid = start_from_mesh(kDomain, tetrahedron(8));
     CHECK(value_at(*grid, {2.25, 2.25, 0.25}) == Approx(-0.25).margin(1e-4));
     CHECK(value_at(*grid, {2.25, 2.25, -0.75}) == Approx(0.75).margin(1e-4));
@@ -89,13 +89,13 @@ TEST_CASE("a mesh's start is the distance to it") {
     CHECK_THROWS_AS(start_from_mesh(kDomain, {}), Error);
 }
 
-TEST_CASE("another grid's surface is taken over on a finer lattice") {
+TEST_CASE("The start from a coarser grid has its surface, within the error of linear interpolation") {
     Domain coarse = make_domain({{-11, -12, -13}, {11, 12, 13}}, 0.8);
     const FloatGridPtr grid = start_from_grid(kDomain, *start_from_sphere(coarse, kCenter, kRadius));
     CHECK(worst_error(*grid, kDomain, sphere_distance) < 0.12);  // the error of the coarse grid's linear interpolation
 }
 
-TEST_CASE("redistancing keeps a plane exact, whatever the slope of the field") {
+TEST_CASE("Redistancing keeps a plane exact although the field has a slope of 7") {
     const Vec3 normal{0.6, 0.64, 0.48};
     const auto distance = [&](const Vec3& x) { return normal[0] * x[0] + normal[1] * x[1] + normal[2] * x[2] - 0.7; };
     FloatGridPtr steep = make_grid(kDomain, 100.0F, "u");
@@ -115,7 +115,7 @@ TEST_CASE("redistancing keeps a plane exact, whatever the slope of the field") {
     CHECK(worst < 1e-4);
 }
 
-TEST_CASE("a mask's start follows the mask") {
+TEST_CASE("The start from a mask follows the mask") {
     ImageGeometry geometry;
     geometry.size = {40, 40, 10};
     geometry.spacing = {0.5, 0.5, 2.0};
@@ -131,7 +131,7 @@ TEST_CASE("a mask's start follows the mask") {
     CHECK(negative_volume(*grid) == Approx(4.0 / 3.0 * 3.14159265 * 125).epsilon(0.04));
     CHECK(value_at(*grid, kCenter) == -1.5F);
 
-    SECTION("it ends where the image ends") {
+    SECTION("it ends at the image's end") {
         std::fill(values.begin(), values.end(), std::uint8_t(1));
         geometry.size = {20, 20, 5};
         const FloatGridPtr box = start_from_mask(kDomain, Image::from_values(geometry, values.data()));
@@ -140,7 +140,7 @@ TEST_CASE("a mask's start follows the mask") {
     }
 }
 
-TEST_CASE("a start without a surface in the domain is refused") {
+TEST_CASE("A start without a surface in the domain is rejected") {
     CHECK_THROWS_AS(start_from_sphere(kDomain, {0, 0, 0}, 100), Error);
     CHECK_THROWS_AS(start_from_sphere(kDomain, {100, 0, 0}, 5), Error);
     CHECK_THROWS_AS(start_from_sphere(kDomain, {0, 0, 0}, -1), Error);
@@ -152,7 +152,7 @@ TEST_CASE("a start without a surface in the domain is refused") {
     CHECK_THROWS_AS(start_from_mask(kDomain, Image::from_values(geometry, empty.data())), Error);
 }
 
-TEST_CASE("starts give the same bits for any number of threads") {
+TEST_CASE("The start from a grid is bitwise identical for 1 and 8 threads") {
     const FloatGridPtr source = start_from_sphere(kDomain, kCenter, kRadius);
     RunContext run;
     run.threads = 1;
@@ -161,7 +161,7 @@ TEST_CASE("starts give the same bits for any number of threads") {
     CHECK(identical(*one, *start_from_grid(kDomain, *source, run)));
 }
 
-TEST_CASE("a level set that its domain cuts off is inside where the solid is, whichever faces cut it") {
+TEST_CASE("A ball cut by faces of the domain has the correct sign everywhere, in each of eight octants") {
     // Large enough for tiles of both sizes below the root node.
     const Domain whole = make_domain({{-160, -160, -160}, {160, 160, 160}}, 1.0);
     const Vec3 center{3, -4, 5};

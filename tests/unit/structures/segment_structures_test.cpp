@@ -54,7 +54,7 @@ StructuresOptions points_alone() {
 
 }  // namespace
 
-TEST_CASE("Structures are measured as they are once they are separated") {
+TEST_CASE("Overlapping structures are separated first, and then measured") {
     RunContext run;
     std::vector<std::string> lines;
     run.log = [&](LogLevel, const std::string& line) { lines.push_back(line); };
@@ -92,7 +92,7 @@ TEST_CASE("Structures are measured as they are once they are separated") {
     }
 }
 
-TEST_CASE("One structure is what segment() makes of it") {
+TEST_CASE("A single structure gives the same result as segment()") {
     const Marks marks = ball("", kLeft);
     const StructuresResult found = segment_structures(scene(), {marks}, points_alone());
     SegmentOptions options = points_alone().segment;
@@ -105,7 +105,7 @@ TEST_CASE("One structure is what segment() makes of it") {
     CHECK_THROWS_AS(segment_structures({}, {ball("a", kLeft), ball("b", kRight)}), Error);
 }
 
-TEST_CASE("A frame of a time-lapse starts from the one before, and a failed one is passed over") {
+TEST_CASE("A frame of a time-lapse starts from the previous one, and a failed frame is skipped") {
     TimeLapse lapse;
     CHECK_THROWS_AS(lapse.segment(scene(), {Marks{}}), Error);  // neither marks nor a start
     CHECK_FALSE(lapse.started());

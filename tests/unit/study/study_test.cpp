@@ -107,7 +107,7 @@ StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
 
 }  // namespace
 
-TEST_CASE("Undo and redo give back every state, and a plain replay of what was done gives the same one") {
+TEST_CASE("Undo and redo restore every state, and a replay of all actions gives the same state") {
     const unsigned seed = GENERATE(1U, 2U, 3U);
     std::mt19937 rng(seed);
     StudyHistory history(image_of());
@@ -144,14 +144,15 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     }
     CHECK(refused > 100);
     CHECK(states.size() > 100);
-    StudyHistory again(image_of());
+    StudyHistory restored(image_of());
     for (const StudyAction& action : carried_out)
-        again.apply(parse_study_action(to_json({"", action})).action);  // written as text and parsed, as in the journal
-    CHECK(is_same(again.state(), history.state()));
-    CHECK(again.options() == history.options());
+        restored.apply(
+            parse_study_action(to_json({"", action})).action);  // written as text and parsed, as in the journal
+    CHECK(is_same(restored.state(), history.state()));
+    CHECK(restored.options() == history.options());
 }
 
-TEST_CASE("Options, guesses and labels are undone and done again") {
+TEST_CASE("Options, guesses and labels are undone and redone, and invalid ones are rejected") {
     StudyHistory history(image_of());
     CHECK(history.apply(act::SetOptions{{0.5, 0.25, {}, Model::Paper}}).options);
     (void)history.apply(act::SetOptions{{}});
@@ -205,7 +206,7 @@ double painted_volume(const StudyStructure& structure, const ImageGeometry& imag
 
 }  // namespace
 
-TEST_CASE("A brush paints balls, discs and what lies between two places, and an eraser takes it away") {
+TEST_CASE("A brush paints balls, discs and cylinders between positions, and an eraser removes them") {
     ImageGeometry image = image_of(60);
     image.spacing = {0.5, 0.5, 0.8};
     image.origin = {-4, 3, 1};
@@ -228,7 +229,7 @@ TEST_CASE("A brush paints balls, discs and what lies between two places, and an 
     CHECK(painted_volume(structure, image) == Approx(25 * M_PI * 0.8 - 10 * 0.5 * 0.8).epsilon(0.05));
 }
 
-TEST_CASE("A ball is round in the world where the image's axes are not perpendicular") {
+TEST_CASE("A painted ball is round in world coordinates also if the image's axes are not perpendicular") {
     ImageGeometry image = image_of(60);
     const double lean = 0.6, steep = std::sqrt(1 - lean * lean);
     image.direction = {{{1, lean, 0}, {0, steep, 0.28}, {0, 0, 0.96}}};
@@ -240,14 +241,14 @@ TEST_CASE("A ball is round in the world where the image's axes are not perpendic
     CHECK(painted_volume(structure, image) * steep == Approx(81 * M_PI).epsilon(0.04));
 }
 
-TEST_CASE("Marks of a file are one action, of every kind and with its lines") {
+TEST_CASE("Marks of a file are added by one action, with all kinds and lines") {
     StudyHistory history(image_of());
     (void)history.apply(act::AddStructure{"one", {}});
     const StudyOutline line{0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 6, 4}}};
     const act::AddMarks marks{1, MarkKind::Surface, {{1, 2, 3}}, {{4, 5, 6}}, {{7, 8, 9}, {1, 1, 1}}, {line}};
     // The action is written as its line in the journal, and parsed from it.
-    const KeyedAction again = parse_study_action(to_json({"k", marks}));
-    (void)history.apply(again.action);
+    const KeyedAction restored = parse_study_action(to_json({"k", marks}));
+    (void)history.apply(restored.action);
     const StudyStructure& one = *history.state().front();
     REQUIRE(one.marks.size() == 4);
     CHECK(one.marks[1].kind == MarkKind::Inside);
@@ -265,7 +266,7 @@ TEST_CASE("Marks of a file are one action, of every kind and with its lines") {
                     Error);
 }
 
-TEST_CASE("Strokes that would take too long or too much memory are refused, and nothing is painted") {
+TEST_CASE("Strokes that are invalid or need too much time or memory are rejected, and nothing is painted") {
     ImageGeometry image = image_of(2000);
     StudyHistory history(image);
     (void)history.apply(act::AddStructure{"one", {}});
@@ -288,7 +289,7 @@ TEST_CASE("Strokes that would take too long or too much memory are refused, and 
     CHECK_THROWS_WITH(history.apply(act::ClearPaint{1}), Catch::Matchers::Contains("has no paint"));
 }
 
-TEST_CASE("Paint becomes evidence of its own structure alone") {
+TEST_CASE("Paint becomes seeds of its own structure alone") {
     StudyHistory history(image_of(40));
     (void)history.apply(act::AddStructure{"one", {}});
     (void)history.apply(act::AddStructure{"two", {}});
@@ -306,7 +307,7 @@ TEST_CASE("Paint becomes evidence of its own structure alone") {
     CHECK(inputs[1].label == 2);
 }
 
-TEST_CASE("What could not be read again is not written") {
+TEST_CASE("Actions that could not be read back are rejected and not written") {
     const Folder folder;
     Study study(folder.text(), "stack.tif", image_of());
     (void)study.apply({"a", act::AddStructure{"one", {}}});
@@ -320,14 +321,14 @@ TEST_CASE("What could not be read again is not written") {
     CHECK(is_same(read_study(folder.text()), study.state()));
 }
 
-TEST_CASE("Only some actions name files") {
+TEST_CASE("names_file is true only for actions with a guess or labels") {
     CHECK(names_file(act::SetGuess{}));
     CHECK(names_file(act::AddLabels{}));
     CHECK_FALSE(names_file(act::AddMarks{}));
     CHECK_FALSE(names_file(act::RemoveGuess{}));
 }
 
-TEST_CASE("A study that is opened again is what it was") {
+TEST_CASE("A reopened study has the same state, and an open study cannot be opened again") {
     const Folder folder;
     std::mt19937 rng(7);
     StudyState state;
@@ -353,7 +354,7 @@ TEST_CASE("A study that is opened again is what it was") {
                       Catch::Matchers::Contains("image of another size"));
 }
 
-TEST_CASE("An action that is sent twice is applied once, also after the study was opened again") {
+TEST_CASE("An action sent twice is applied once, also after the study is reopened") {
     const Folder folder;
     const KeyedAction add{"page-1", act::AddStructure{"nucleus", {}}};
     {
@@ -368,7 +369,7 @@ TEST_CASE("An action that is sent twice is applied once, also after the study wa
     CHECK(study.sequence() == 1);
 }
 
-TEST_CASE("Wherever the journal is cut off, all whole lines are there, and the study goes on") {
+TEST_CASE("A truncated journal keeps all complete lines, and the study can be continued") {
     const Folder folder;
     {
         Study study(folder.text(), "stack.tif", image_of());
@@ -389,7 +390,7 @@ TEST_CASE("Wherever the journal is cut off, all whole lines are there, and the s
     }
 }
 
-TEST_CASE("Damage before the last line is an error that names the line") {
+TEST_CASE("Damage before the last line of a journal is an error with the line number") {
     const Folder folder;
     {
         Study study(folder.text(), "stack.tif", image_of());
@@ -415,14 +416,14 @@ TEST_CASE("Damage before the last line is an error that names the line") {
     CHECK_THROWS_WITH(read_study_image(folder.text() + "/none"), Catch::Matchers::Contains("it does not exist"));
 }
 
-TEST_CASE("A study says where its image is from its own folder") {
+TEST_CASE("A study stores the path of its image relative to its own folder") {
     const Folder folder;
     { const Study study(folder.text(), (folder.path.parent_path() / "scans/stack.tif").string(), image_of()); }
     CHECK(read_study_image(folder.text()).path == "../scans/stack.tif");
     CHECK(read_study_image(folder.text()).geometry.size == Index3{20, 20, 20});
 }
 
-TEST_CASE("Texts that are no action are refused") {
+TEST_CASE("Texts and actions that are not valid are rejected") {
     for (const std::string text :
          {"",
           "{",
@@ -464,7 +465,7 @@ TEST_CASE("Texts that are no action are refused") {
     CHECK(history.state().front()->marks.empty());
 }
 
-TEST_CASE("A structure becomes the marks that segment takes") {
+TEST_CASE("A structure of a study is converted to marks for segment_structures()") {
     StudyHistory history(image_of());
     (void)history.apply(act::AddStructure{"one", {}});
     (void)history.apply(act::AddStructure{"empty", {}});

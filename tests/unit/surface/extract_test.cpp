@@ -49,7 +49,7 @@ void check_solid(const TriangleMesh& mesh) {
 
 }  // namespace
 
-TEST_CASE("every cube case cuts each edge between unlike corners once, with loops around the inside") {
+TEST_CASE("Each cube case uses every edge between corners of different sign once, and no other edge") {
     for (int inside = 0; inside < 256; ++inside) {
         const auto& cube = detail::kCubeCases[inside];
         std::array<int, 12> uses{};
@@ -62,7 +62,7 @@ TEST_CASE("every cube case cuts each edge between unlike corners once, with loop
     }
 }
 
-TEST_CASE("all 256 cubes with random values give closed manifold surfaces without self-intersection") {
+TEST_CASE("All 255 cubes with inside corners give closed manifold surfaces without self-intersections") {
     std::mt19937 random(7);
     std::uniform_real_distribution<float> size(0.001F, 1.0F);
     for (int inside = 1; inside < 256; ++inside) {
@@ -77,7 +77,7 @@ TEST_CASE("all 256 cubes with random values give closed manifold surfaces withou
     }
 }
 
-TEST_CASE("random signs at all voxels, across leaves, still give a proper surface") {
+TEST_CASE("Random signs in all voxels give closed manifold surfaces without self-intersections") {
     for (const double probability : {0.05, 0.3, 0.5, 0.7, 0.95})
         for (const unsigned seed : {1U, 2U}) {
             std::mt19937 random(seed);
@@ -86,12 +86,12 @@ TEST_CASE("random signs at all voxels, across leaves, still give a proper surfac
                 const double size = std::pow(uniform(random), 4);
                 return uniform(random) < probability ? -size : size;
             });
-            INFO("seed " << seed << ", share inside " << probability);
+            INFO("seed " << seed << ", fraction inside " << probability);
             check_solid(extract_mesh(*grid));
         }
 }
 
-TEST_CASE("inside is 6-connected: voxels that touch in an edge or a corner stay apart") {
+TEST_CASE("The inside is 6-connected: voxels that touch at an edge or a corner stay separate") {
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     for (const openvdb::Coord& c : {openvdb::Coord(7, 7, 7), openvdb::Coord(8, 8, 7), openvdb::Coord(9, 9, 8)})
         grid->tree().setValue(c, -1.0F);
@@ -101,7 +101,7 @@ TEST_CASE("inside is 6-connected: voxels that touch in an edge or a corner stay 
 }
 
 // The edges of triangles are chords, which cut off a fraction of O((h/r)^2) of the volume.
-TEST_CASE("a sphere has its volume, area and genus, and its vertices lie on it") {
+TEST_CASE("The mesh of a sphere has its volume, area and genus, and its vertices lie on the sphere") {
     const double r = 1.0, h = 0.1;
     const Vec3 centre{5.03, -2.01, 0.02};
     const auto grid = dense_grid(14, h, {5, -2, 0}, [&](const Vec3& p) {
@@ -125,7 +125,7 @@ TEST_CASE("a sphere has its volume, area and genus, and its vertices lie on it")
           Approx(4.0 / 3 * kPi * std::pow(r + 0.5 * h, 3)).epsilon(0.01));
 }
 
-TEST_CASE("a torus has genus 1") {
+TEST_CASE("The mesh of a torus has genus 1 and the volume of the torus") {
     const auto grid = dense_grid(16, 0.1, {0, 0, 0},
                                  [](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - 1.0, p[2]) - 0.4; });
     const TriangleMesh mesh = extract_mesh(*grid);
@@ -134,7 +134,7 @@ TEST_CASE("a torus has genus 1") {
     CHECK(measure(mesh).volume == Approx(2 * kPi * kPi * 0.16).epsilon(0.015));
 }
 
-TEST_CASE("touching spheres and a sheet thinner than a voxel are proper surfaces") {
+TEST_CASE("Touching spheres and a sheet thinner than a voxel give closed manifold meshes") {
     const auto touching = dense_grid(16, 0.1, {0, 0, 0}, [](const Vec3& p) {
         return std::min(norm({p[0] - 0.7, p[1], p[2]}), norm({p[0] + 0.7, p[1], p[2]})) - 0.7;
     });
@@ -145,7 +145,7 @@ TEST_CASE("touching spheres and a sheet thinner than a voxel are proper surfaces
     check_solid(extract_mesh(*sheet));
 }
 
-TEST_CASE("small components are dropped on demand") {
+TEST_CASE("Components below the minimum volume are removed on request") {
     const auto grid = dense_grid(14, 0.1, {0, 0, 0}, [](const Vec3& p) {
         return std::min(norm({p[0] - 0.3, p[1], p[2]}) - 0.8, norm({p[0] + 1.0, p[1], p[2]}) - 0.2);
     });
@@ -157,7 +157,7 @@ TEST_CASE("small components are dropped on demand") {
     CHECK(measure(kept).components == 1);
 }
 
-TEST_CASE("inside tiles without a rim of leaves are closed too") {
+TEST_CASE("Inside tiles without adjacent leaves have closed surfaces") {
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     grid->tree().addTile(1, {0, 0, 0}, -1.0F, false);    // 8^3
     grid->tree().addTile(1, {8, 8, 0}, -1.0F, true);     // touches the first tile at an edge
@@ -171,7 +171,7 @@ TEST_CASE("inside tiles without a rim of leaves are closed too") {
     CHECK(m.volume == Approx(2 * 512.0 + 128.0 * 128 * 128).epsilon(0.01));
 }
 
-TEST_CASE("the mesh does not depend on the number of threads") {
+TEST_CASE("The mesh is independent of the number of threads") {
     const auto grid = dense_grid(
         20, 0.1, {0, 0, 0}, [](const Vec3& p) { return std::sin(4 * p[0]) + std::sin(5 * p[1]) + std::sin(6 * p[2]); });
     RunContext run;
@@ -186,7 +186,7 @@ TEST_CASE("the mesh does not depend on the number of threads") {
     }
 }
 
-TEST_CASE("grids that have no closed surface are refused, an empty one gives an empty mesh") {
+TEST_CASE("Grids without a closed surface are rejected, and an empty grid gives an empty mesh") {
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface")).empty());
     CHECK_THROWS_AS(extract_mesh(*make_grid({}, -1.0F, "surface")), Error);
     ExtractOptions options;
@@ -205,7 +205,7 @@ TEST_CASE("grids that have no closed surface are refused, an empty one gives an 
     CHECK_THROWS_AS(extract_mesh(*grid), Error);
 }
 
-TEST_CASE("a surface far from 0 is the same surface, moved") {
+TEST_CASE("A surface far from the origin is the same surface, translated") {
     const Domain near{0.1, {0, 0, 0}, {-20, -20, -20}, {20, 20, 20}};
     Domain far = near;
     far.origin = {500000.05, 5400000, -300};

@@ -46,7 +46,7 @@ const std::vector<Vec3> on_main = test::sphere_cloud(500, 0.8, 1);
 
 }  // namespace
 
-TEST_CASE("pieces and cavities that points lie on stay") {
+TEST_CASE("Pieces and cavities with points on them are kept") {
     for (const Vec3& second : {kBeside, kFar}) {
         const FloatGridPtr grid = solid(second), before = solid(second);
         REQUIRE(components(*grid) == 3);
@@ -55,7 +55,7 @@ TEST_CASE("pieces and cavities that points lie on stay") {
     }
 }
 
-TEST_CASE("pieces and cavities with fewer points than asked for go") {
+TEST_CASE("Pieces and cavities with fewer points than the minimum are removed") {
     for (const Vec3& second : {kBeside, kFar}) {
         INFO("second ball at " << second[0]);
         const std::vector<Vec3> in_cavity = on_small(kCavity), on_second = on_small(second);
@@ -75,7 +75,7 @@ TEST_CASE("pieces and cavities with fewer points than asked for go") {
     }
 }
 
-TEST_CASE("the right piece goes, the rest keeps its surface") {
+TEST_CASE("Only the piece without points is removed, and the other surfaces are kept") {
     for (const Vec3& second : {kBeside, kFar}) {
         INFO("second ball at " << second[0]);
         const FloatGridPtr grid = solid(second);
@@ -92,7 +92,7 @@ TEST_CASE("the right piece goes, the rest keeps its surface") {
     }
 }
 
-TEST_CASE("points a voxel off a piece lie on it, those three voxels off do not") {
+TEST_CASE("Points within a voxel of a piece count for it, and points three voxels away do not") {
     for (const auto& [off, stays] : {std::pair{0.9, true}, std::pair{-0.9, true}, std::pair{3.0, false}}) {
         const FloatGridPtr grid = solid(kBeside);
         detail::drop_bare_pieces(*grid, joined(joined(on_main, on_small(kCavity)), on_small(kBeside, off * kVoxel)),

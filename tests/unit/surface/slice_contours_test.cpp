@@ -53,7 +53,7 @@ std::vector<detail::PlanePoint> in_pixels(const SliceContour& contour, const Ima
 
 }  // namespace
 
-TEST_CASE("Contours of a ball lie on it, in each slice that it meets, whatever the voxels of the level set") {
+TEST_CASE("Contours of a ball lie on its surface, in each slice that it meets, for two voxel sizes") {
     openvdb::initialize();
     const ImageGeometry g = turned_lattice();
     const Vec3 center = g.index_to_world({24.3, 21.8, 9.4});
@@ -75,7 +75,7 @@ TEST_CASE("Contours of a ball lie on it, in each slice that it meets, whatever t
     }
 }
 
-TEST_CASE("Contours end half a voxel beyond the image's last centres") {
+TEST_CASE("Contours end half a voxel beyond the image's last voxel centres") {
     openvdb::initialize();
     const ImageGeometry g = turned_lattice();
     for (const double voxel : {0.5, 0.3, 0.24}) {  // one, two and three samples per pixel
@@ -93,7 +93,7 @@ TEST_CASE("A surface that no slice meets has no contours") {
     CHECK(outline_slices(*std::make_shared<openvdb::FloatGrid>(1.0F), g).empty());
 }
 
-TEST_CASE("A part with holes becomes one curve of the area that is left, which passes each channel twice") {
+TEST_CASE("A part with holes becomes one curve around the remaining area, with a channel to each hole") {
     using Curve = std::vector<detail::PlanePoint>;
     const auto square = [](double x, double y, double half, bool is_hole) {
         Curve curve{{x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};

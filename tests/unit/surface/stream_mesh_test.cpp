@@ -70,7 +70,7 @@ FloatGridPtr ring() {
 
 }  // namespace
 
-TEST_CASE("a mesh in pieces is the mesh made at once") {
+TEST_CASE("A mesh streamed in pieces equals the mesh extracted at once") {
     const FloatGridPtr grid = ring();
     check_same(*grid, 0);
     check_same(*grid, 0.7);
@@ -82,21 +82,21 @@ TEST_CASE("a mesh in pieces is the mesh made at once") {
     CHECK(stream_mesh(Scratch().path("a.ply"), *grid).measures.genus == 1);
 }
 
-TEST_CASE("a mesh in pieces of a solid that the image's faces cut") {
+TEST_CASE("A mesh streamed in pieces equals the extracted mesh, also for a solid cut by the image's faces") {
     const WorldBox box{{-30, -70, -35}, {70, 75, 14.4}};
     const FloatGridPtr grid = ring();
     set_clip(*grid, make_clip(box));
     check_same(*extract_surface(*grid), 0);
 }
 
-TEST_CASE("meshes of many layers of leaves go in more than one piece") {
+TEST_CASE("A mesh of more than 9000 leaves, which needs several pieces, is streamed correctly") {
     // 8192 leaves are processed as one piece, so that this sphere takes several pieces.
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(150.F, {0.3F, -0.4F, 0.1F}, 1.F);
     REQUIRE(grid->tree().leafCount() > 9000);
     check_same(*grid, 0);
 }
 
-TEST_CASE("no surface, no file") {
+TEST_CASE("Streaming without a surface, or to an unsupported format, is rejected and leaves no file") {
     const Scratch scratch;
     const FloatGridPtr grid = ring();
     CHECK_THROWS_WITH(stream_mesh(scratch.path("a.ply"), *grid, -100), Catch::Contains("no surface"));

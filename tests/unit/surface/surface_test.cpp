@@ -87,7 +87,7 @@ double nearest_by_search(const detail::InterfacePatches& patches, const Coord& a
 
 }  // namespace
 
-TEST_CASE("a plane's surface is its distance, whatever the slope of u") {
+TEST_CASE("The surface of a plane is its exact distance although u has a slope of 5") {
     const Vec3 n{0.48, 0.6, 0.64};
     const auto distance = [&](const Vec3& x) { return n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - 0.3; };
     const FloatGridPtr grid = extract_surface(*field(kDomain, [&](const Vec3& x) { return 5 * distance(x); }));
@@ -105,7 +105,7 @@ TEST_CASE("a plane's surface is its distance, whatever the slope of u") {
     CHECK(worst < 1e-5);
 }
 
-TEST_CASE("distances are those to the nearest of all patches, between sheets and at creases too") {
+TEST_CASE("Distances are those to the nearest of all patches, except for less than one voxel in a thousand") {
     double worst = 0;
     int voxels = 0, off = 0;
     for (unsigned seed = 1; seed <= 3; ++seed) {
@@ -128,7 +128,7 @@ TEST_CASE("distances are those to the nearest of all patches, between sheets and
     CHECK(worst < 0.05);
 }
 
-TEST_CASE("eight voxels at a time and one by one find the same distance to a patch") {
+TEST_CASE("Distances to a patch for eight voxels at a time equal those for single voxels and the exact ones") {
     std::mt19937 random(5);
     std::uniform_real_distribution<float> unit(-0.5F, 0.5F);
     int reached = 0;
@@ -179,9 +179,9 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
             }
             const detail::PatchHit hit = detail::nearest_on(fan, arm);
             REQUIRE(std::sqrt(hit.squared) == Approx(std::sqrt(exact)).margin(1e-4));
-            const bool above = std::sqrt(exact) < 2.99 && hit.is_interior;
+            const bool is_over_patch = std::sqrt(exact) < 2.99 && hit.is_interior;
             // Its nearest position lies within the patch, so that the voxel is in the patch's cylinder.
-            if (above) {
+            if (is_over_patch) {
                 ++reached;
                 REQUIRE(patch[std::size_t(p)] == 7);
             }
@@ -193,7 +193,7 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
     CHECK(reached > 500);
 }
 
-TEST_CASE("what is inside at the domain's end is closed half a voxel beyond it") {
+TEST_CASE("A solid that reaches the domain's end is closed half a voxel beyond it") {
     const FloatGridPtr grid = extract_surface(*field(kDomain, [](const Vec3& x) { return x[0]; }));
     CHECK(grid->tree().getValue({0, 16, 16}) == Approx(-0.5 * kH));
     CHECK(grid->tree().getValue({-1, 16, 16}) == Approx(0.5 * kH));
@@ -201,7 +201,7 @@ TEST_CASE("what is inside at the domain's end is closed half a voxel beyond it")
     CHECK(measure(extract_mesh(*grid)).volume == Approx(8.0 * 16 * 16).epsilon(0.01));
 }
 
-TEST_CASE("an inside that is a tile has its surface too") {
+TEST_CASE("The surface of an inside tile has exact distances") {
     FloatGridPtr u = make_grid(kDomain, 1.0F, "u");
     u->tree().addTile(1, {8, 8, 8}, -1.0F, false);
     const FloatGridPtr grid = extract_surface(*u);
@@ -210,7 +210,7 @@ TEST_CASE("an inside that is a tile has its surface too") {
     CHECK(grid->tree().getValue({5, 11, 11}) == Approx(2.5 * kH));
 }
 
-TEST_CASE("surface: the same bits for 1, 2 and 8 threads") {
+TEST_CASE("The surface is bitwise identical for 1, 2 and 8 threads") {
     const FloatGridPtr u = waves(kDomain, 9);
     RunContext run;
     run.threads = 1;
@@ -221,7 +221,7 @@ TEST_CASE("surface: the same bits for 1, 2 and 8 threads") {
     }
 }
 
-TEST_CASE("a field without a crossing, and one whose outside is not positive, are refused") {
+TEST_CASE("A field without a zero crossing, or with a negative background, is rejected") {
     CHECK_THROWS_AS(extract_surface(*field(kDomain, [](const Vec3&) { return 1.0; })), Error);
     CHECK_THROWS_AS(extract_surface(*make_grid(kDomain, 1.0F, "u")), Error);
     FloatGridPtr inside_out = make_grid(kDomain, -1.0F, "u");
@@ -229,7 +229,7 @@ TEST_CASE("a field without a crossing, and one whose outside is not positive, ar
     CHECK_THROWS_AS(extract_surface(*inside_out), Error);
 }
 
-TEST_CASE("fog is 1 deep inside, 0 outside, and rises across the inner half of the band") {
+TEST_CASE("The fog volume is 1 deep inside, 0 outside, and linear across the inner half of the band") {
     const FloatGridPtr level_set =
         extract_surface(*field(kDomain, [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 5; }));
     const FloatGridPtr fog = to_fog_volume(*level_set);
@@ -241,7 +241,7 @@ TEST_CASE("fog is 1 deep inside, 0 outside, and rises across the inner half of t
     }
 }
 
-TEST_CASE("a label image has the label where the voxel's centre is inside, in any geometry") {
+TEST_CASE("A label image has the label in voxels whose centre is inside, on an anisotropic lattice") {
     const Vec3 center{0.31, -0.27, 0.44};
     const auto off = [&](const Vec3& x) {
         return std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - 5;
@@ -262,7 +262,7 @@ TEST_CASE("a label image has the label where the voxel's centre is inside, in an
             }
 }
 
-TEST_CASE("extract_surface: where a surface passes through voxels but for rounding, no distance near it is off") {
+TEST_CASE("extract_surface: distances are correct if the surface passes through voxel centres up to rounding") {
     Domain domain;
     domain.max = {47, 47, 15};
     for (unsigned seed = 1; seed <= 8; ++seed) {

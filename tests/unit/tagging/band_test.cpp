@@ -30,7 +30,7 @@ const Domain kDomain = make_domain({{-32, -32, -32}, {32, 32, 32}}, 1.0);
 
 }  // namespace
 
-TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
+TEST_CASE("Tagging the points of a sphere encloses a ball of radius r + D") {
     const double r = 20, tag_distance = 2.5;
     const FloatGridPtr d = tube(sphere_cloud(40000, r, 1), kDomain, 8);
     const BandResult result = tag_interior(*d, {tag_distance, {}});
@@ -62,7 +62,7 @@ TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
         CHECK(value_at(*result.grid, {r - tag_distance - 0.5, 0, 0}) == -3.0F);
         CHECK(value_at(*result.grid, {0, 0, 0}) == -3.0F);
     }
-    SECTION("active voxels are those up to D + 3 h") {
+    SECTION("active voxels are those with d up to D + 3 h") {
         int wrong = 0;
         for (auto value = d->cbeginValueOn(); value; ++value)
             wrong += result.grid->tree().isValueOn(value.getCoord()) != (*value <= float(tag_distance + 3));
@@ -70,7 +70,7 @@ TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
     }
 }
 
-TEST_CASE("the tagged surface of a plane of points is exact to a hundredth of a voxel") {
+TEST_CASE("The tagged surface of densely sampled planes is exact to a hundredth of a voxel") {
     // The faces of a closed box, sampled by a lattice of points denser than the voxels, are planes.
     std::vector<Vec3> points;
     for (double s = -20; s <= 20; s += 0.25)
@@ -91,7 +91,7 @@ TEST_CASE("the tagged surface of a plane of points is exact to a hundredth of a 
     CHECK(worst <= 0.01);
 }
 
-TEST_CASE("an exterior seed opens a cavity") {
+TEST_CASE("An exterior seed opens a cavity") {
     std::vector<Vec3> points = sphere_cloud(40000, 24, 1);
     const std::vector<Vec3> inner = sphere_cloud(15000, 12, 2);
     points.insert(points.end(), inner.begin(), inner.end());
@@ -105,7 +105,7 @@ TEST_CASE("an exterior seed opens a cavity") {
     CHECK(negative_volume(*open.grid) == Approx(open.report.enclosed_volume).epsilon(1e-6));
 }
 
-TEST_CASE("exterior seeds that cannot be are refused") {
+TEST_CASE("Exterior seeds closer than D to the points or outside of the domain are rejected") {
     const FloatGridPtr d = tube(sphere_cloud(5000, 20, 1), kDomain, 8);
     const auto message = [&](const Vec3& seed) -> std::string {
         try {
@@ -120,7 +120,7 @@ TEST_CASE("exterior seeds that cannot be are refused") {
     CHECK(message({40, 0, 0}).find("in the domain") != std::string::npos);
 }
 
-TEST_CASE("a leak is reported with the distance that holds") {
+TEST_CASE("A leak is reported with the tag distance that closes it") {
     // A cap of radius sqrt(20^2 - 18^2) = 8.7 is missing.
     const std::vector<Vec3> points = without_cap(sphere_cloud(40000, 20, 3), 18);
     const FloatGridPtr d = tube(points, kDomain, 14);
@@ -133,14 +133,14 @@ TEST_CASE("a leak is reported with the distance that holds") {
     CHECK_FALSE(holding.report.leaks);
     CHECK(holding.report.core_volume > 1000);
 
-    SECTION("none was found in a narrow tube") {
+    SECTION("in a narrow tube no such tag distance is found") {
         const BandResult narrow = tag_interior(*tube(points, kDomain, 6.5), {3.0, {}});
         CHECK(narrow.report.leaks);
         CHECK(narrow.report.holding_distance == 0);
     }
 }
 
-TEST_CASE("a solid body without a core does not leak") {
+TEST_CASE("A body without a core, smaller than D, is not reported as a leak") {
     // D is larger than the sphere's radius, so that no core remains. A smaller D still finds the core.
     const std::vector<Vec3> points = sphere_cloud(3000, 4, 1);
     const BandResult result = tag_interior(*tube(points, kDomain, 9), {5.0, {}});
@@ -148,7 +148,7 @@ TEST_CASE("a solid body without a core does not leak") {
     CHECK_FALSE(result.report.leaks);
 }
 
-TEST_CASE("what lies beyond the domain is outside") {
+TEST_CASE("Voxels beyond the domain are outside, and the flood fill enters at the domain's end") {
     // The domain cuts the sphere, whose wall reaches the domain's end.
     const Domain half = make_domain({{-32, -32, 0}, {32, 32, 32}}, 1.0);
     const BandResult result = tag_interior(*tube(sphere_cloud(40000, 20, 1), half, 8), {2.5, {}});
@@ -159,7 +159,7 @@ TEST_CASE("what lies beyond the domain is outside") {
     CHECK(result.report.core_volume == 0);  // the flood enters at the domain's end
 }
 
-TEST_CASE("a large empty domain costs nothing") {
+TEST_CASE("A small cloud in a domain of 8192^3 voxels is tagged") {
     const Domain large = make_domain({{-4096, -4096, -4096}, {4096, 4096, 4096}}, 1.0);
     const BandResult result = tag_interior(*tube(sphere_cloud(8000, 12, 1, {3000, -3000, 500}), large, 7), {2.5, {}});
     CHECK(result.report.enclosed_volume == Approx(ball(14.5)).epsilon(0.02));
@@ -167,7 +167,7 @@ TEST_CASE("a large empty domain costs nothing") {
     CHECK(value_at(*result.grid, {0, 0, 0}) == 3.0F);
 }
 
-TEST_CASE("interior far from the surface is tiles, not leaves") {
+TEST_CASE("The interior far from the surface consists of tiles, not of leaves") {
     const Domain wide = make_domain({{-80, -80, -80}, {80, 80, 80}}, 1.0);
     const BandResult result = tag_interior(*tube(sphere_cloud(150000, 70, 1), wide, 6), {2.5, {}});
     CHECK(value_at(*result.grid, {0.5, 0.5, 0.5}) == -3.0F);
@@ -175,7 +175,7 @@ TEST_CASE("interior far from the surface is tiles, not leaves") {
     CHECK(negative_volume(*result.grid) == Approx(ball(72.5)).epsilon(0.01));
 }
 
-TEST_CASE("tag_interior() gives the same bits for any number of threads") {
+TEST_CASE("tag_interior() is bitwise identical for 1, 2 and 8 threads") {
     const FloatGridPtr d = tube(sphere_cloud(3000, 20, 1), kDomain, 8);
     RunContext run;
     run.threads = 1;
@@ -186,7 +186,7 @@ TEST_CASE("tag_interior() gives the same bits for any number of threads") {
     }
 }
 
-TEST_CASE("a tube that is too narrow, a missing tube and a bad D are refused") {
+TEST_CASE("A tube that is too narrow, a missing tube and an invalid D are rejected") {
     const FloatGridPtr d = tube({{0, 0, 0}}, kDomain, 5);
     CHECK_THROWS_AS(tag_interior(*d, {2.5, {}}), Error);
     CHECK_THROWS_AS(tag_interior(*make_grid(kDomain, 5.0F, "distance"), {2.0, {}}), Error);
@@ -194,7 +194,7 @@ TEST_CASE("a tube that is too narrow, a missing tube and a bad D are refused") {
     CHECK_NOTHROW(tag_interior(*d, {2.0, {}}));
 }
 
-TEST_CASE("the tag distance is chosen from the cloud") {
+TEST_CASE("The tag distance is chosen from the cloud") {
     const auto leaks_with = [](const std::vector<Vec3>& points, const TagDistanceChoice& choice) {
         const FloatGridPtr d = tube(points, kDomain, choice.tag_distance + 4);
         const BandReport report = tag_interior(*d, {choice.tag_distance, {}}).report;
@@ -208,13 +208,13 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         CHECK_FALSE(leaks_with(points, choice));
         CHECK(choice.reason.find("core") != std::string::npos);
     }
-    SECTION("300 random points: their largest gap") {
+    SECTION("300 random points: large enough to close their largest gap") {
         const std::vector<Vec3> points = sphere_cloud(300, 20, 2);
         const TagDistanceChoice choice = choose_tag_distance(points, kDomain, {});
         CHECK(choice.tag_distance < 10.0);
         CHECK_FALSE(leaks_with(points, choice));
     }
-    SECTION("a missing cap: its radius") {
+    SECTION("a missing cap: about its radius") {
         // The radius of the hole is sqrt(20^2 - 16^2) = 12.
         const std::vector<Vec3> points = without_cap(sphere_cloud(40000, 20, 3), 16);
         const TagDistanceChoice choice = choose_tag_distance(points, kDomain, {});
@@ -222,7 +222,7 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         CHECK(choice.tag_distance < 14.0);
         CHECK_FALSE(leaks_with(points, choice));
     }
-    SECTION("with a seed in the cavity the shell's core decides") {
+    SECTION("a seed in the cavity: from the core of the shell") {
         std::vector<Vec3> points = sphere_cloud(40000, 26, 4);
         const std::vector<Vec3> inner = sphere_cloud(10000, 12, 5);
         points.insert(points.end(), inner.begin(), inner.end());
@@ -231,11 +231,13 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         const BandReport report = tag_interior(*tube(points, kDomain, 8), {choice.tag_distance, {{0, 0, 0}}}).report;
         CHECK(report.core_volume > 0.5 * (ball(26) - ball(12)));
     }
-    SECTION("a sheet has no inside: the spacing decides, and the reason says so") {
+    SECTION("a sheet without an inside: from the spacing, as the reason states") {
         const TagDistanceChoice choice =
             choose_tag_distance(box_cloud(4000, {{-25, -25, 0}, {25, 25, 0.01}}, 6), kDomain, {});
         CHECK(choice.reason.find("spacing") != std::string::npos);
         CHECK(choice.tag_distance == Approx(1.5));  // the minimum of 1.5 voxels; 1.8 times the spacing of 0.4 is less
     }
-    SECTION("one point") { CHECK(choose_tag_distance({{1, 1, 1}}, kDomain, {}).tag_distance >= 1.5); }
+    SECTION("a single point: at least 1.5 voxels") {
+        CHECK(choose_tag_distance({{1, 1, 1}}, kDomain, {}).tag_distance >= 1.5);
+    }
 }

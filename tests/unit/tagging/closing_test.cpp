@@ -23,7 +23,7 @@ std::vector<Vec3> sphere_points(int n) {
 
 }  // namespace
 
-TEST_CASE("the closing of a tagged cloud touches its points and stays near the body they bound") {
+TEST_CASE("The closing of the tagged points of a sphere touches the points and stays near the sphere") {
     const double h = 0.05, D = 0.45;
     const std::vector<Vec3> points = sphere_points(120);
     const Domain domain = make_domain({{-2, -2, -2}, {2, 2, 2}}, h);
@@ -51,7 +51,7 @@ TEST_CASE("the closing of a tagged cloud touches its points and stays near the b
     }
 }
 
-TEST_CASE("a ball too large for the body leaves no closing") {
+TEST_CASE("close_by_ball returns no grid if the ball is larger than the body") {
     const double h = 0.05;
     const Domain domain = make_domain({{-2, -2, -2}, {2, 2, 2}}, h);
     // A single point: the tagged body is the ball of radius D around it, and its closing is the point itself.

@@ -104,7 +104,7 @@ std::vector<Vec3> points_on_balls(const std::vector<std::array<double, 4>>& ball
 
 }  // namespace
 
-TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with runs between leaves and without") {
+TEST_CASE("Cores have the saddle, volume, area and peak that a brute-force flood fill finds") {
     // The domain's end cuts the second ball. With the smallest `radius` of the tube, a large part of the balls lies
     // beyond the tube; with the largest one, nothing does.
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
@@ -131,12 +131,12 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
     const double main = cores.front().volume;
     CHECK(main > 0.1 * 4.0 / 3.0 * 3.14159 * 21 * 21 * 21);
     for (const detail::Core& core : cores) {
-        const auto is_it = [&](const Flooded::Component& c) {
+        const auto equals_core = [&](const Flooded::Component& c) {
             return double(c.voxels) == core.volume && double(c.faces) * 2 / 3 == core.area &&
                    std::abs(c.peak - core.peak) < 1e-6;
         };
         const auto above = Flooded(*d, radius, core.saddle, seed_voxel).enclosed();
-        CHECK(std::any_of(above.begin(), above.end(), is_it));
+        CHECK(std::any_of(above.begin(), above.end(), equals_core));
         // Slightly below its saddle the core has an opening: no enclosed component contains its peak. Components beyond
         // the tube have no peak of their own and are not tested.
         if (core.peak == radius) continue;
@@ -152,20 +152,20 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
         CHECK(double(c.voxels) <= main);
 }
 
-TEST_CASE("cores are the same for any number of threads") {
+TEST_CASE("Cores are identical for 1, 2 and 8 threads") {
     const std::vector<Vec3> points = points_on_balls({{0, 0, 0, 21}}, 300, 5);
     const FloatGridPtr d = compute_distance(points, make_domain({{-30, -30, -30}, {30, 30, 30}}, 0.5), {8.0}).grid;
-    const auto with = [&](int threads) {
+    const auto cores_with = [&](int threads) {
         RunContext run;
         run.threads = threads;
         detail::Cores cores;
         with_threads(run, [&] { cores = detail::find_cores(*d, 8.0, {}); });
         return cores;
     };
-    const detail::Cores one = with(1);
+    const detail::Cores one = cores_with(1);
     REQUIRE(one.cores.size() > 1);
     for (const int threads : {2, 8}) {
-        const detail::Cores many = with(threads);
+        const detail::Cores many = cores_with(threads);
         CHECK(many.histogram == one.histogram);
         REQUIRE(many.cores.size() == one.cores.size());
         for (std::size_t n = 0; n < one.cores.size(); ++n) {

@@ -14,12 +14,12 @@ double mean(const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
-/// The normals of the sample, reversed at the points for which `where` is true.
-template <typename Where>
-std::vector<Vec3> turned(const test::SurfaceSample& s, Where where) {
+/// The normals of the sample, reversed at the points for which `is_reversed` is true.
+template <typename Predicate>
+std::vector<Vec3> turned(const test::SurfaceSample& s, Predicate is_reversed) {
     std::vector<Vec3> normals = s.normals;
     for (std::size_t n = 0; n < normals.size(); ++n)
-        if (where(s.points[n])) normals[n] = test::scaled(-1, normals[n]);
+        if (is_reversed(s.points[n])) normals[n] = test::scaled(-1, normals[n]);
     return normals;
 }
 
@@ -39,11 +39,11 @@ struct Case {
 
 }  // namespace
 
-TEST_CASE("Consistency: normals of a solid's border are the most consistent ones, whatever is turned as a whole") {
+TEST_CASE("Consistency: correct normals deviate less than normals of which a part or all are reversed") {
     for (const double noise : {0.0, 0.4}) {
-        const auto check_truth_is_better = [&](const test::Solid3& shape, auto where) {
+        const auto check_truth_is_better = [&](const test::Solid3& shape, auto is_reversed) {
             Case c(shape, noise);
-            std::vector<Vec3> normals = c.sample.normals, others = turned(c.sample, where);
+            std::vector<Vec3> normals = c.sample.normals, others = turned(c.sample, is_reversed);
             const double right = mean(c.consistency.off(normals)), wrong = mean(c.consistency.off(others));
             INFO("right " << right << ", wrong " << wrong << ", noise " << noise);
             CHECK(right < 0.8 * wrong);
@@ -58,7 +58,7 @@ TEST_CASE("Consistency: normals of a solid's border are the most consistent ones
     }
 }
 
-TEST_CASE("Consistency: what another orientation has right is taken from it, patch by patch") {
+TEST_CASE("Consistency: take_better() adopts correct patches of another orientation and keeps its own") {
     Case c(test::torus(1, 0.35), 0.3);
     std::vector<Vec3> own = turned(c.sample, [](const Vec3& p) { return p[0] > 0.6 || p[1] < -0.9; });
     const std::vector<Vec3> other = turned(c.sample, [](const Vec3& p) { return p[0] < -0.6 || p[1] < -0.9; });
@@ -84,7 +84,7 @@ TEST_CASE("Consistency: what another orientation has right is taken from it, pat
     CHECK(own == same);
 }
 
-TEST_CASE("Consistency: each point's share is between 0 and 1/4, and the same for any number of threads") {
+TEST_CASE("Consistency: each point's deviation is between 0 and 1/4, and the same for any number of threads") {
     const Case c(test::ball(1));
     const std::vector<double> areas = cloud::areas_of(c.sample.points, c.sample.spacing());
     std::vector<std::vector<double>> found;

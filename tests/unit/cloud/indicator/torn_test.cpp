@@ -15,7 +15,7 @@ namespace {
 constexpr int kCount = 6000;
 const double kSpacing = std::sqrt(4 * M_PI / kCount);
 
-std::size_t inward(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
+std::size_t count_inward(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
     std::size_t count = 0;
     for (std::size_t n = 0; n < points.size(); ++n) count += test::dot(points[n], normals[n]) < 0.5;
     return count;
@@ -23,24 +23,24 @@ std::size_t inward(const std::vector<Vec3>& points, const std::vector<Vec3>& nor
 
 }  // namespace
 
-TEST_CASE("a patch turned over, and normals in all directions around it, are mended") {
+TEST_CASE("repair_torn: a reversed patch and random normals around it are repaired") {
     for (unsigned seed = 1; seed <= 5; ++seed) {
         const std::vector<Vec3> points = test::sphere_cloud(kCount, 1, seed);
-        const std::vector<Vec3> any = test::sphere_cloud(kCount, 1, seed + 10);
+        const std::vector<Vec3> random_normals = test::sphere_cloud(kCount, 1, seed + 10);
         std::vector<Vec3> normals = points;
         std::size_t wrong = 0;
         for (std::size_t n = 0; n < points.size(); ++n) {
             if (points[n][2] < 0.95) continue;
             ++wrong;
-            normals[n] = points[n][2] > 0.97 ? test::scaled(-1, points[n]) : any[n];
+            normals[n] = points[n][2] > 0.97 ? test::scaled(-1, points[n]) : random_normals[n];
         }
         REQUIRE(wrong > 100);
         CHECK(repair_torn(points, kSpacing, normals) > wrong / 2);
-        CHECK(inward(points, normals) == 0);
+        CHECK(count_inward(points, normals) == 0);
     }
 }
 
-TEST_CASE("good normals stay as they are, on edges and on both sides of a plate, too") {
+TEST_CASE("repair_torn: correct normals of a sphere and of both sides of a plate are unchanged") {
     const std::vector<Vec3> ball = test::sphere_cloud(kCount, 1, 3);
     std::vector<Vec3> normals = ball;
     CHECK(repair_torn(ball, kSpacing, normals) == 0);
@@ -59,12 +59,12 @@ TEST_CASE("good normals stay as they are, on edges and on both sides of a plate,
     CHECK(out == before);
 }
 
-TEST_CASE("orient: half a ball points outwards all over") {
+TEST_CASE("orient: all normals of an open hemisphere point outwards") {
     for (unsigned seed = 1; seed <= 4; ++seed) {
         std::vector<Vec3> points;
         for (const Vec3& p : test::sphere_cloud(12000, 1, seed))
             if (p[2] > 0) points.push_back(p);
         const Orientation o = orient(points, measure_cloud_scale(points));
-        CHECK(inward(points, o.normals) == 0);
+        CHECK(count_inward(points, o.normals) == 0);
     }
 }

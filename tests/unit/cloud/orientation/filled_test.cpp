@@ -47,7 +47,7 @@ bool fills(const std::vector<Vec3>& points) { return cloud::fill_a_solid(points,
 
 }  // namespace
 
-TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, whatever their noise and its shape") {
+TEST_CASE("fill_a_solid: true for points within a solid, false for points on surfaces of any shape and noise") {
     for (const unsigned seed : {1, 2}) {
         CHECK(fills(within(test::ball(1), 10000, seed)));
         CHECK(fills(within(test::ball(1), 1500, seed)));
@@ -73,7 +73,7 @@ TEST_CASE("fill_a_solid: points in a solid do, points on its surface do not, wha
     CHECK_FALSE(fills(line));
 }
 
-TEST_CASE("orient_filled: half the density is where the solid ends") {
+TEST_CASE("orient_filled: the indicator's level 1/2 encloses the solid's volume, and normals point outwards") {
     for (const auto& [name, shape] : {std::pair<std::string, test::Solid3>{"ball", test::ball(1)},
                                       std::pair<std::string, test::Solid3>{"torus", test::torus(1, 0.4)}}) {
         const std::vector<Vec3> points = within(shape, 20000, 3);
@@ -101,6 +101,6 @@ TEST_CASE("orient_filled: half the density is where the solid ends") {
     }
 }
 
-TEST_CASE("a surface's points, however noisy, are oriented as before") {
+TEST_CASE("orient_cloud: noisy points on a sphere do not count as filling a solid") {
     CHECK_FALSE(orient_cloud(near(test::ball(1), 4000, 0.05, 5)).fills);
 }

@@ -29,7 +29,7 @@ std::vector<Vec3> flipped(std::vector<Vec3> normals, double fraction, unsigned s
     return normals;
 }
 
-std::vector<Vec3> garbage(std::size_t count, unsigned seed) {
+std::vector<Vec3> random_normals(std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
     std::vector<Vec3> all;
@@ -55,7 +55,7 @@ std::vector<Vec3> towards(const Vec3& sensor, const std::vector<Vec3>& points) {
 
 }  // namespace
 
-TEST_CASE("good normals orient, flipped ones are mended, those that all point inwards are turned over") {
+TEST_CASE("Given normals: correct ones are used, flipped ones are repaired, and inward ones are reversed") {
     for (const test::Solid3& shape :
          {test::ball(1), test::torus(1, 0.35), test::table(0.07), test::block({0.7, 0.7, 0.05})})
         for (unsigned seed = 1; seed <= 2; ++seed) {
@@ -80,10 +80,10 @@ TEST_CASE("good normals orient, flipped ones are mended, those that all point in
         }
 }
 
-TEST_CASE("normals without a meaning change nothing") {
+TEST_CASE("Given normals: random, half-flipped, parallel or few normals are ignored") {
     const test::SurfaceSample s = noisy(test::torus(1, 0.35), 4000, 0.3, 3);
     const CloudOrientation own = orient_cloud(s.points);
-    const std::vector<Vec3> random = garbage(s.points.size(), 5), half = flipped(s.normals, 0.5, 6),
+    const std::vector<Vec3> random = random_normals(s.points.size(), 5), half = flipped(s.normals, 0.5, 6),
                             up(s.points.size(), Vec3{0, 0, 1});
     for (const auto& normals : {random, half, up}) {
         const CloudOrientation cloud = with_normals(s.points, normals);
@@ -100,7 +100,7 @@ TEST_CASE("normals without a meaning change nothing") {
     CHECK(cloud.orientation.normals == own.orientation.normals);
 }
 
-TEST_CASE("a part that is turned as a whole is found by what the points say themselves") {
+TEST_CASE("Given normals: a part that is reversed as a whole is detected from the points alone") {
     for (const test::Solid3& shape : {test::torus(1, 0.35), test::table(0.07)}) {
         const test::SurfaceSample s = noisy(shape, 6000, 0.2, 4);
         std::vector<Vec3> normals = s.normals;
@@ -120,7 +120,7 @@ TEST_CASE("a part that is turned as a whole is found by what the points say them
     }
 }
 
-TEST_CASE("a point without a normal takes the side of those around it") {
+TEST_CASE("Given normals: a point without a normal is oriented as its neighbours") {
     const test::SurfaceSample s = noisy(test::ball(1), 4000, 0.2, 5);
     std::vector<Vec3> normals = s.normals;
     for (std::size_t n = 0; n < normals.size(); n += 3) normals[n] = {0, 0, 0};
@@ -130,7 +130,7 @@ TEST_CASE("a point without a normal takes the side of those around it") {
     CHECK(fraction_wrong(cloud.orientation.normals, s.normals) < 0.001);
 }
 
-TEST_CASE("a sensor orients what it saw, and is not believed where it could not have seen the points") {
+TEST_CASE("Sensor position: it orients the points that it sees, and is ignored if it cannot have seen them all") {
     const test::SurfaceSample s = noisy(test::ball(1), 9000, 0.2, 6);
     const Vec3 sensor{0, 0, 6};
     test::SurfaceSample seen;
@@ -150,7 +150,7 @@ TEST_CASE("a sensor orients what it saw, and is not believed where it could not 
     CHECK(fraction_wrong(whole.orientation.normals, s.normals) < 0.001);
 }
 
-TEST_CASE("walls that touch and bodies that cross: points within the solid are left out") {
+TEST_CASE("Given normals: points within the union of touching or overlapping boxes are left out") {
     const test::Solid3 box = test::block({0.5, 0.5, 0.5});
     for (const double shift : {1.0, 0.6}) {  // side by side, and overlapping
         const Vec3 by{shift, shift == 1.0 ? 0 : 0.3, 0};
@@ -192,7 +192,7 @@ TEST_CASE("walls that touch and bodies that cross: points within the solid are l
     CHECK(with_normals(points, normals).enclosed == 0);
 }
 
-TEST_CASE("hints follow their points") {
+TEST_CASE("carried: hints are assigned to the nearest points, and a wrong number of hints is rejected") {
     const std::vector<Vec3> from{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 0, 0}};
     const PointHints hints{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}}, {}};
     const PointHints left = carried(hints, from, {{2.1, 0, 0}, {1, 0, 0}});
@@ -202,7 +202,7 @@ TEST_CASE("hints follow their points") {
     CHECK_THROWS_AS(carried(PointHints{{{1, 0, 0}}, {}}, from, from), Error);
 }
 
-TEST_CASE("given normals: the same bits for any number of threads") {
+TEST_CASE("Given normals: the orientation is bit-identical on any number of threads") {
     const test::SurfaceSample s = noisy(test::torus(1, 0.35), 3000, 1, 7);
     const PointHints hints{flipped(s.normals, 0.1, 8), {}};
     RunContext one, two;

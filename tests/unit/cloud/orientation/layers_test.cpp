@@ -46,7 +46,7 @@ const double kSpacing = std::sqrt(4 * M_PI / kCount), kDepth = 1 - 4 * kSpacing;
 
 }  // namespace
 
-TEST_CASE("a layer below another is turned outwards, and makes no cavity") {
+TEST_CASE("turn_layers: a second layer below the surface is turned outwards and makes no cavity") {
     for (const unsigned seed : {1, 2, 3}) {
         // A sphere that is open at the top. A part of it was scanned twice, and the points of the second scan lie too
         // deep.
@@ -65,7 +65,7 @@ TEST_CASE("a layer below another is turned outwards, and makes no cavity") {
     }
 }
 
-TEST_CASE("the inner wall of a cup stays as it is") {
+TEST_CASE("turn_layers: the inner wall of a cup is not turned, and the cup stays hollow") {
     for (const unsigned seed : {1, 2, 3}) {
         Layers cup;
         for (const Vec3& p : test::sphere_cloud(kCount, 1, seed)) {

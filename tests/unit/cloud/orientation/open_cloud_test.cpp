@@ -43,11 +43,11 @@ std::vector<Vec3> half_seen_torus(int count, double noise, unsigned seed) {
     return points;
 }
 
-double off_torus(const Vec3& p) { return std::abs(std::hypot(std::hypot(p[0], p[1]) - 1, p[2]) - 0.35); }
+double distance_to_torus(const Vec3& p) { return std::abs(std::hypot(std::hypot(p[0], p[1]) - 1, p[2]) - 0.35); }
 
 }  // namespace
 
-TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
+TEST_CASE("surface_from_cloud: a bowl becomes a closed solid with a lid, not a thin shell") {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const CloudOrientation cloud = orient_cloud(bowl(4000, seed));
         const TriangleMesh mesh =
@@ -69,14 +69,14 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
     }
 }
 
-TEST_CASE("points in a plane are refused") {
+TEST_CASE("reconstruct: points in a plane are rejected") {
     std::vector<Vec3> plane;
     for (int i = 0; i < 80; ++i)
         for (int j = 0; j < 80; ++j) plane.push_back({0.1 * i, 0.1 * j, 0});
     CHECK_THROWS_AS(reconstruct(plane, {}), Error);
 }
 
-TEST_CASE("segment: a bowl is closed by a lid, on the points elsewhere") {
+TEST_CASE("reconstruct: a bowl is closed by a lid, and the surface passes the points elsewhere") {
     const std::vector<Vec3> points = bowl(6000, 2);
     SegmentOptions options;
     options.voxel_size = 0.04;
@@ -89,7 +89,7 @@ TEST_CASE("segment: a bowl is closed by a lid, on the points elsewhere") {
     CHECK(result.report.fraction_without_points > 0.1);
 }
 
-TEST_CASE("segment: a noisy torus of which each part was seen from one side has genus 1") {
+TEST_CASE("reconstruct: a noisy torus with halves scanned only from outside or inside has genus 1") {
     const std::vector<Vec3> points = half_seen_torus(12000, 0.01, 3);
     SegmentOptions options;
     options.voxel_size = 0.05;
@@ -103,7 +103,7 @@ TEST_CASE("segment: a noisy torus of which each part was seen from one side has 
     for (const auto& v : result.mesh.vertices) {
         const Vec3 p{v[0], v[1], v[2]};
         if (test::brute_force_distance(points, p) > 0.05) continue;
-        sum += off_torus(p);
+        sum += distance_to_torus(p);
         ++count;
     }
     CHECK(sum / count < 0.5 * 0.05);

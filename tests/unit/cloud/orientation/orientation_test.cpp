@@ -67,7 +67,7 @@ std::vector<Shape> shapes() {
 
 }  // namespace
 
-TEST_CASE("measure_cloud_scale: spacing and noise of a plane and a sphere") {
+TEST_CASE("measure_cloud_scale: spacing and noise of a plane and a sphere are accurate to 12 %") {
     for (const unsigned seed : {1, 2, 3})
         for (const double spacings : {0.1, kNoise, 0.7})
             for (const bool is_plane : {true, false}) {
@@ -83,7 +83,7 @@ TEST_CASE("measure_cloud_scale: spacing and noise of a plane and a sphere") {
             }
 }
 
-TEST_CASE("measure_cloud_scale: hardly any noise where there is none, lengths follow the points' unit") {
+TEST_CASE("measure_cloud_scale: exact points have hardly any noise, and lengths scale with the unit") {
     const test::SurfaceSample s = test::torus(1, 0.35).sample(4000, 4);
     const CloudScale scale = measure_cloud_scale(s.points);
     CHECK(scale.spacing / s.spacing() == Approx(1).margin(0.12));
@@ -95,7 +95,7 @@ TEST_CASE("measure_cloud_scale: hardly any noise where there is none, lengths fo
     CHECK(of_larger.noise == Approx(256 * scale.noise).margin(1e-6));
 }
 
-TEST_CASE("orient: the normals of closed shapes point outward, into cavities too") {
+TEST_CASE("orient: the normals of closed shapes point out of the solid, also into cavities") {
     for (const Shape& shape : shapes())
         for (const auto& [spacings, seed] :
              std::vector<std::pair<double, unsigned>>{{0, 1}, {kNoise, 2}, {kNoise, 3}}) {
@@ -118,7 +118,7 @@ TEST_CASE("orient: the normals of closed shapes point outward, into cavities too
         }
 }
 
-TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level passes the points") {
+TEST_CASE("orient: the indicator is 1 inside and 0 outside, and its level 1/2 passes near all points") {
     const test::Solid3 shape = test::shell(1, 0.5);
     const test::SurfaceSample s = noisy(shape, 4000, kNoise, 5);
     const Orientation o = orient(s.points, measure_cloud_scale(s.points));
@@ -151,7 +151,7 @@ TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level pa
     }
 }
 
-TEST_CASE("orient: the same bits for any number of threads, and in any unit") {
+TEST_CASE("orient: the normals are bit-identical on any number of threads and in any unit") {
     const test::SurfaceSample s = noisy(test::torus(1, 0.35), 2000, kNoise, 7);
     const CloudOrientation one = orient_cloud(s.points, on_threads(1));
     const CloudOrientation two = orient_cloud(s.points, on_threads(2));
@@ -169,7 +169,7 @@ TEST_CASE("orient: the same bits for any number of threads, and in any unit") {
     CHECK(of_larger.indicator->cell() == Approx(4096 * one.orientation.indicator->cell()));
 }
 
-TEST_CASE("orient: points given several times") {
+TEST_CASE("orient: repeated points get equal normals, and orient_cloud removes them") {
     const test::SurfaceSample s = noisy(test::torus(1, 0.35), 2000, kNoise, 8);
     std::vector<Vec3> doubled = s.points, normals = s.normals;
     doubled.insert(doubled.end(), s.points.begin(), s.points.end());
@@ -184,7 +184,7 @@ TEST_CASE("orient: points given several times") {
     CHECK(twice.orientation.normals == once.orientation.normals);
 }
 
-TEST_CASE("orient_cloud leaves out points spread through space, and none of a surface") {
+TEST_CASE("orient_cloud: points spread through space are left out, those of a thin plate are kept") {
     for (const Shape& shape : shapes()) {
         if (std::string(shape.name) != "thin plate") continue;
         for (const unsigned seed : {1, 2}) {
@@ -223,7 +223,7 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
     }
 }
 
-TEST_CASE("orient: clouds that have no inside are refused, a stop is heeded") {
+TEST_CASE("orient: clouds without an inside are rejected, and a run can be cancelled") {
     const CloudScale scale{0.1, 0, 0};
     const std::vector<Vec3> three{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, at_one_place(10, Vec3{1, 2, 3});
     for (const auto& points : {std::vector<Vec3>{}, three, at_one_place}) {
@@ -249,7 +249,7 @@ TEST_CASE("orient: clouds that have no inside are refused, a stop is heeded") {
     }
 }
 
-TEST_CASE("orient: a flat cloud gets unit normals, too") {
+TEST_CASE("orient: a flat cloud gets unit normals and a finite indicator") {
     const Orientation o = orient(test::box_cloud(500, {{-1, -1, 0}, {1, 1, 1e-300}}, 10), {0.09, 0});
     for (const Vec3& n : o.normals) REQUIRE(test::norm(n) == Approx(1));
     CHECK(std::isfinite(o.indicator->inside({0, 0, 0})));

@@ -32,7 +32,7 @@ std::vector<Vec3> square(std::size_t count, double z, unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("propagated_normals: of a sphere and of a small one beside it all point outwards") {
+TEST_CASE("propagated_normals: all normals of two separate spheres point outwards") {
     std::vector<Vec3> points = test::sphere_cloud(4000, 1, 1), outward = points;
     for (const Vec3& p : test::sphere_cloud(1000, 0.5, 2)) {
         points.push_back({p[0] + 3, p[1], p[2]});
@@ -43,7 +43,7 @@ TEST_CASE("propagated_normals: of a sphere and of a small one beside it all poin
     CHECK(count_along(normals, outward, 0.9) == points.size());
 }
 
-TEST_CASE("propagated_normals: the two sides of a plate three spacings thick point away from each other") {
+TEST_CASE("propagated_normals: normals on both sides of a plate three spacings thick point outwards") {
     constexpr std::size_t kCount = 5000;
     const double spacing = 1 / std::sqrt(double(kCount));
     std::vector<Vec3> points = square(kCount, 0, 1);
@@ -56,7 +56,7 @@ TEST_CASE("propagated_normals: the two sides of a plate three spacings thick poi
     CHECK(count_along(normals, towards, 0.9) > 0.99 * double(points.size()));
 }
 
-TEST_CASE("propagated_normals: an open sheet is turned to where most of it is seen from") {
+TEST_CASE("propagated_normals: an open sheet faces the side from which most of its points are seen") {
     const std::vector<Vec3> points = square(3000, 0, 3);
     const CloudScale scale = measure_cloud_scale(points);
     for (const double side : {-1.0, 1.0}) {
@@ -67,7 +67,7 @@ TEST_CASE("propagated_normals: an open sheet is turned to where most of it is se
     }
 }
 
-TEST_CASE("plane_normals: noise of a spacing is averaged") {
+TEST_CASE("plane_normals: with noise of one spacing the mean cosine to the plane's normal exceeds 0.95") {
     std::vector<Vec3> points = square(6000, 0, 4);
     const double spacing = 1 / std::sqrt(double(points.size()));
     std::mt19937 random(5);

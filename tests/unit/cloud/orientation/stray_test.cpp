@@ -18,7 +18,7 @@ std::size_t count(const std::vector<char>& stray, std::size_t begin, std::size_t
 
 }  // namespace
 
-TEST_CASE("points spread through space are stray, a surface's are not") {
+TEST_CASE("find_stray: points spread through space are stray, those of a noisy surface are not") {
     for (const unsigned seed : {1, 2, 3}) {
         const test::Solid3 shape = test::torus(1, 0.35);
         test::SurfaceSample s = shape.sample(4000, seed);
@@ -34,7 +34,7 @@ TEST_CASE("points spread through space are stray, a surface's are not") {
     }
 }
 
-TEST_CASE("sparse parts of a surface are not stray") {
+TEST_CASE("find_stray: points in sparse parts of a surface are not stray") {
     for (const unsigned seed : {1, 2, 3}) {
         // On one half of the sphere only one point in sixteen is kept, so that points there are four times as far
         // apart.
@@ -54,7 +54,7 @@ TEST_CASE("sparse parts of a surface are not stray") {
     }
 }
 
-TEST_CASE("a point above a sheet is stray when it is far, not when it is close") {
+TEST_CASE("find_stray: a point above a sheet is stray if it is far from it, and not if it is close") {
     std::vector<Vec3> points;
     for (int i = 0; i < 40; ++i)
         for (int j = 0; j < 40; ++j) points.push_back({0.1 * i, 0.1 * j, 0});
@@ -68,7 +68,7 @@ TEST_CASE("a point above a sheet is stray when it is far, not when it is close")
     CHECK(stray[1602]);
 }
 
-TEST_CASE("a handful of points and points at one place are not stray") {
+TEST_CASE("find_stray: a few points and coincident points are not stray") {
     const std::vector<Vec3> few = test::box_cloud(16, {{-1, -1, -1}, {1, 1, 1}}, 1);
     CHECK(count(find_stray(few, {0.01, 0, 0}, {}), 0, 16) == 0);
     CHECK(find_stray({}, {1, 0, 0}, {}).empty());

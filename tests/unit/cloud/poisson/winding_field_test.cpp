@@ -77,7 +77,7 @@ struct UnevenCloud {
 
 }  // namespace
 
-TEST_CASE("each level has all nodes around its points, and around the level that is finer") {
+TEST_CASE("GridStack: each level has all nodes around its points, and every block has a coarser one") {
     const UnevenCloud u;
     const std::vector<GridLevel>& levels = u.stack->levels();
     for (std::size_t n = 0; n < u.points.size(); ++n)
@@ -105,7 +105,7 @@ TEST_CASE("each level has all nodes around its points, and around the level that
     for (const BlockAt& at : levels[0].blocks) REQUIRE(u.stack->origin()[0] + 0.08 * (at[0] + 1) > -0.15);
 }
 
-TEST_CASE("splines are exact on linear functions across levels, and their gradient is that of their values") {
+TEST_CASE("Splines reproduce linear functions across levels, and gradients are the derivatives of values") {
     const UnevenCloud u;
     StackField linear(u.stack), waves(u.stack);
     for_nodes(linear, [](float& value, const Vec3& x, double) { value = float(0.3 + 2 * x[0] - x[1] + 0.5 * x[2]); });
@@ -137,7 +137,7 @@ TEST_CASE("splines are exact on linear functions across levels, and their gradie
     CHECK(linear.at({100, 0, 0}).value == linear.at({1000, 0, 0}).value);
 }
 
-TEST_CASE("what is spread keeps the points' number and their centre") {
+TEST_CASE("spread: the density preserves the number of the points and their centroid") {
     const std::vector<Vec3> points = test::box_cloud(500, {{-1, -0.4, 0}, {1, 0.8, 0.3}}, 3);
     const StackField density = spread(grids(points, 48, 0.5), points, std::vector<double>(points.size(), 1.0));
     double count = 0;
@@ -181,7 +181,7 @@ double error_of_bell(double cell, bool uneven) {
 
 }  // namespace
 
-TEST_CASE("solutions converge with the square of the cell, also across a change of levels") {
+TEST_CASE("Halving the cell size reduces the error to less than 0.36, also across a change of levels") {
     for (const bool uneven : {false, true}) {
         const double coarse = error_of_bell(0.1, uneven), fine = error_of_bell(0.05, uneven);
         INFO((uneven ? "two levels: " : "one level: ") << coarse << " then " << fine);
@@ -190,7 +190,7 @@ TEST_CASE("solutions converge with the square of the cell, also across a change 
     }
 }
 
-TEST_CASE("grids near the points alone give the indicator of grids that fill the box") {
+TEST_CASE("Grids near the points give the same indicator as grids that fill the box") {
     const OrientedSphere s = sphere(4000, 1);
     std::vector<Vec3> all = s.points, vectors = s.vectors;
     for (const Vec3& p : test::box_cloud(40000, {{-1.35, -1.35, -1.35}, {1.35, 1.35, 1.35}}, 9)) {
@@ -208,7 +208,7 @@ TEST_CASE("grids near the points alone give the indicator of grids that fill the
         REQUIRE(near.indicator().value_at(x) == Approx(everywhere.indicator().value_at(x)).margin(0.03));
 }
 
-TEST_CASE("a few points far away make few blocks, and leave the indicator as it was") {
+TEST_CASE("A few points far away add few blocks and do not change the indicator") {
     const OrientedSphere s = sphere(40000, 1);
     const double cell = 0.016;
     const auto alone = std::make_shared<const GridStack>(s.points, std::vector<std::uint8_t>{}, cell, 0.2);
@@ -227,7 +227,7 @@ TEST_CASE("a few points far away make few blocks, and leave the indicator as it 
     CHECK(std::abs(field.indicator().value_at({1.5, 0, 0})) < 0.02);
 }
 
-TEST_CASE("the indicator is the same to the bit on any number of threads") {
+TEST_CASE("The indicator is bit-identical on any number of threads") {
     const UnevenCloud u;
     std::vector<Vec3> vectors;
     for (const Vec3& p : u.points) vectors.push_back(test::scaled(0.001, p));
@@ -246,7 +246,7 @@ TEST_CASE("the indicator is the same to the bit on any number of threads") {
     CHECK(results[0].values == results[2].values);
 }
 
-TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rises inward") {
+TEST_CASE("The indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rises inward") {
     for (const int cells : {32, 64}) {
         const Vec3 center{3.03, -2.01, 0.02};
         const OrientedSphere s = sphere(6000, 1, center);
@@ -273,7 +273,7 @@ TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rise
     }
 }
 
-TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
+TEST_CASE("The indicator changes by 1 across an open surface") {
     const OrientedSphere whole = sphere(8000, 1);
     OrientedSphere bowl;
     for (std::size_t n = 0; n < whole.points.size(); ++n) {
@@ -295,7 +295,7 @@ TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
     CHECK(field.indicator().at({0, 0, 0.9}).value < 0.4);
 }
 
-TEST_CASE("each V-cycle leaves a fraction of the error") {
+TEST_CASE("Each V-cycle reduces the error to less than 0.35, and cycles can be continued later") {
     const OrientedSphere s = sphere(4000, 1);
     const Stack l = grids(s.points, 48);
     WindingField exact(l);
@@ -316,24 +316,24 @@ TEST_CASE("each V-cycle leaves a fraction of the error") {
     CHECK(at_once.indicator().values == field.indicator().values);
 }
 
-TEST_CASE("a coarser solution is a good first guess for a finer one") {
+TEST_CASE("A coarser solution as initial value reduces the error after one V-cycle") {
     const OrientedSphere s = sphere(4000, 1);
     const Stack fine = grids(s.points, 48);
-    WindingField coarse(grids(s.points, 32)), exact(fine), fresh(fine), guessed(fine);
+    WindingField coarse(grids(s.points, 32)), exact(fine), cold_start(fine), warm_start(fine);
     coarse.solve(s.points, s.vectors, 12);
     exact.solve(s.points, s.vectors, 30);
-    guessed.start_from(coarse.indicator());
+    warm_start.start_from(coarse.indicator());
     double inside = 0;
     for (const Vec3& x : test::box_cloud(100, {{-0.4, -0.4, -0.4}, {0.4, 0.4, 0.4}}, 3))
-        inside = std::max(inside, std::abs(guessed.indicator().at(x).value - 1));
+        inside = std::max(inside, std::abs(warm_start.indicator().at(x).value - 1));
     CHECK(inside < 0.02);
-    fresh.solve(s.points, s.vectors, 1);
-    guessed.solve(s.points, s.vectors, 1);
-    CHECK(largest_difference(guessed.indicator(), exact.indicator()) <
-          0.7 * largest_difference(fresh.indicator(), exact.indicator()));
+    cold_start.solve(s.points, s.vectors, 1);
+    warm_start.solve(s.points, s.vectors, 1);
+    CHECK(largest_difference(warm_start.indicator(), exact.indicator()) <
+          0.7 * largest_difference(cold_start.indicator(), exact.indicator()));
 }
 
-TEST_CASE("the indicator is linear in the areas; multiply scales it; turned normals change its sign") {
+TEST_CASE("The indicator is linear in the area vectors, and multiply() scales it") {
     const OrientedSphere s = sphere(1000, 1);
     const Stack l = grids(s.points, 32);
     OrientedSphere turned = s;

@@ -29,7 +29,7 @@ Result surface_of(const std::vector<Vec3>& points, double h, const RunContext& r
 }
 
 /// Root mean square distance of the mesh's vertices to the shape.
-double off(const TriangleMesh& mesh, const test::Solid3& shape) {
+double rms_distance(const TriangleMesh& mesh, const test::Solid3& shape) {
     double squares = 0;
     for (const auto& v : mesh.vertices) squares += std::pow(shape.distance({v[0], v[1], v[2]}), 2);
     return std::sqrt(squares / double(mesh.vertices.size()));
@@ -47,7 +47,7 @@ const Domain kDomain = make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.06);
 
 }  // namespace
 
-TEST_CASE("surface_from_cloud: closed, of the right genus and volume, closer to the shape than the points") {
+TEST_CASE("surface_from_cloud: closed, with the right genus and volume, closer to the shape than noisy points") {
     for (const Shape& shape : {Shape{"ball", test::ball(1), 4.0 / 3 * M_PI, 0},
                                Shape{"torus", test::torus(1, 0.35), 2 * M_PI * M_PI * 0.35 * 0.35, 1}})
         for (const auto& [spacings, seed] : std::vector<std::pair<double, unsigned>>{{0, 1}, {0.3, 2}, {0.3, 3}}) {
@@ -57,14 +57,14 @@ TEST_CASE("surface_from_cloud: closed, of the right genus and volume, closer to 
             const Result r = surface_of(s.points, 0.7 * spacing);
             const MeshMeasures m = measure(r.mesh);
             INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": off "
-                            << off(r.mesh, shape.solid) / spacing << " spacings, volume " << m.volume / shape.volume
-                            << " of the shape's");
+                            << rms_distance(r.mesh, shape.solid) / spacing << " spacings, volume "
+                            << m.volume / shape.volume << " of the shape's");
             CHECK(m.closed);
             CHECK(m.manifold);
             CHECK(m.components == 1);
             CHECK(m.genus == shape.genus);
             CHECK(m.volume / shape.volume == Approx(1).margin(0.008));
-            CHECK(off(r.mesh, shape.solid) < (spacings > 0 ? 0.14 : 0.015) * spacing);
+            CHECK(rms_distance(r.mesh, shape.solid) < (spacings > 0 ? 0.14 : 0.015) * spacing);
             CHECK(r.report.spacing / spacing == Approx(1).margin(0.15));
             CHECK(r.report.radius > (spacings > 0 ? 4 : 2) * spacing);
             CHECK(r.report.bare_nodes < 40);
@@ -73,7 +73,7 @@ TEST_CASE("surface_from_cloud: closed, of the right genus and volume, closer to 
         }
 }
 
-TEST_CASE("surface_from_cloud: a cavity stays one, thin legs stay whole") {
+TEST_CASE("surface_from_cloud: a cavity stays a cavity, and thin legs stay connected") {
     const test::Solid3 shell = test::shell(1, 0.5), table = test::table(0.08);
     const test::SurfaceSample on_shell = shell.sample(4000, 4), on_table = table.sample(4000, 4);
     const Result hollow = surface_of(on_shell.points, 0.7 * on_shell.spacing()),
@@ -83,11 +83,11 @@ TEST_CASE("surface_from_cloud: a cavity stays one, thin legs stay whole") {
     CHECK(of_hollow.components == 2);
     CHECK(of_hollow.genus == 0);
     CHECK(of_hollow.volume == Approx(4.0 / 3 * M_PI * (1 - 0.125)).epsilon(0.005));
-    CHECK(off(hollow.mesh, shell) < 0.03 * on_shell.spacing());
+    CHECK(rms_distance(hollow.mesh, shell) < 0.03 * on_shell.spacing());
     CHECK(of_legs.closed);
     CHECK(of_legs.components == 1);
     CHECK(of_legs.genus == 0);
-    CHECK(off(legs.mesh, table) < 0.07 * on_table.spacing());
+    CHECK(rms_distance(legs.mesh, table) < 0.07 * on_table.spacing());
 }
 
 TEST_CASE("surface_from_cloud: holes in the points are closed") {
@@ -105,7 +105,7 @@ TEST_CASE("surface_from_cloud: holes in the points are closed") {
     CHECK(measure_fit(points, r.mesh).mean < 0.05 * s.spacing());
 }
 
-TEST_CASE("surface_from_cloud: the same bits for any number of threads") {
+TEST_CASE("surface_from_cloud: the level set is bit-identical on any number of threads") {
     test::SurfaceSample s = test::torus(1, 0.35).sample(2000, 6);
     test::add_noise(s, 0.3 * s.spacing(), 7);
     RunContext one, two;
@@ -117,7 +117,7 @@ TEST_CASE("surface_from_cloud: the same bits for any number of threads") {
     CHECK(a.report.bare_nodes == b.report.bare_nodes);
 }
 
-TEST_CASE("surface_from_cloud: no surface in the domain is an error, a stop is heeded") {
+TEST_CASE("surface_from_cloud: a domain without the surface is rejected, and a run can be cancelled") {
     const CloudOrientation cloud = orient_cloud(test::ball(1).sample(1000, 8).points);
     CHECK_NOTHROW(surface_from_cloud(kDomain, cloud));
     Domain elsewhere = kDomain;

@@ -57,15 +57,15 @@ const Solid kHalf = [](const Vec3& p) { return p[0]; };
 Solid half_space(Vec3 normal, double at) {
     return [normal = unit(normal), at](const Vec3& p) { return dot(p, normal) - at; };
 }
-Solid both(Solid a, Solid b) {
+Solid intersection(Solid a, Solid b) {
     return [=](const Vec3& p) { return std::max(a(p), b(p)); };
 }
-Solid either(Solid a, Solid b) {
+Solid union_of(Solid a, Solid b) {
     return [=](const Vec3& p) { return std::min(a(p), b(p)); };
 }
 
 /// The maximum error of the crease's distance at positions near the border and within 0.8 radii of the origin.
-double worst(const Crease& crease, const Solid& f) {
+double max_error(const Crease& crease, const Solid& f) {
     double error = 0;
     for (double x = -0.8; x <= 0.8; x += 0.1)
         for (double y = -0.8; y <= 0.8; y += 0.1)
@@ -77,19 +77,19 @@ double worst(const Crease& crease, const Solid& f) {
 
 }  // namespace
 
-TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where points are exact") {
+TEST_CASE("fit_crease: edges, grooves and corners of every kind are found in exact points") {
     const Solid a = half_space({1, 0.2, 0}, 0.1), b = half_space({-0.1, 1, 0.3}, 0.05),
                 c = half_space({0.1, -0.2, 1}, 0.08);
     const struct {
         const char* name;
         Solid f;
         std::size_t sheets;
-    } kinds[] = {{"edge", both(a, b), 2},
-                 {"groove", either(a, b), 2},
-                 {"corner", both(a, both(b, c)), 3},
-                 {"inner corner", either(a, either(b, c)), 3},
-                 {"two convex edges and a groove", both(a, either(b, c)), 3},
-                 {"two grooves and a convex edge", either(a, both(b, c)), 3}};
+    } kinds[] = {{"edge", intersection(a, b), 2},
+                 {"groove", union_of(a, b), 2},
+                 {"corner", intersection(a, intersection(b, c)), 3},
+                 {"inner corner", union_of(a, union_of(b, c)), 3},
+                 {"two convex edges and a groove", intersection(a, union_of(b, c)), 3},
+                 {"two grooves and a convex edge", union_of(a, intersection(b, c)), 3}};
     for (const auto& kind : kinds) {
         int found = 0;
         for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -97,7 +97,7 @@ TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where 
             INFO(kind.name << ", draw " << seed);
             if (!crease || crease->count != kind.sheets) continue;
             ++found;
-            CHECK(worst(*crease, kind.f) < 0.02);
+            CHECK(max_error(*crease, kind.f) < 0.02);
         }
         INFO(kind.name << ": " << found << " of 20");
         // With three sheets, some of the draws have too few points on one of them.
@@ -105,20 +105,20 @@ TEST_CASE("fit_crease: edges, grooves and corners of every kind are found where 
     }
 }
 
-TEST_CASE("fit_crease: bent sheets meet where they do") {
+TEST_CASE("fit_crease: the crease between a cylinder and its end is accurate to 0.05 radii") {
     const Solid wall = [](const Vec3& p) { return std::hypot(p[0] + 3, p[1]) - 3; };
-    const Solid cylinder = both(wall, half_space({0, 0, 1}, 0.1));
+    const Solid cylinder = intersection(wall, half_space({0, 0, 1}, 0.1));
     double error = 0;
     for (unsigned seed = 1; seed <= 10; ++seed) {
         const std::optional<Crease> crease = fit_crease(border(cylinder, 0, seed), {0, 0, 0}, 1);
         REQUIRE(crease);
-        error = std::max(error, worst(*crease, cylinder));
+        error = std::max(error, max_error(*crease, cylinder));
     }
     INFO(error);
     CHECK(error < 0.05);
 }
 
-TEST_CASE("fit_crease: what is smooth, or noise alone, is no crease") {
+TEST_CASE("fit_crease: smooth surfaces, with or without noise, have no crease") {
     for (unsigned seed = 1; seed <= 20; ++seed) {
         const Solid ball = [](const Vec3& p) { return length(plus(p, Vec3{1.5, 0, 0})) - 1.5; };
         const Solid saddle = [](const Vec3& p) { return p[0] - 0.3 * p[1] * p[1] + 0.3 * p[2] * p[2]; };
@@ -131,7 +131,7 @@ TEST_CASE("fit_crease: what is smooth, or noise alone, is no crease") {
     CHECK_FALSE(fit_crease({}, {0, 0, 0}, 1));
 }
 
-TEST_CASE("sharpen: marching cubes' bevels become the edges and corners of a box, closed and without folds") {
+TEST_CASE("sharpen: bevels of marching cubes become edges and corners of a box without self-intersections") {
     const Vec3 turn = unit({1, 0.3, 0.2}), side = unit(cross(turn, Vec3{0, 0, 1})), up = cross(turn, side);
     const std::array<Vec3, 3> axes{turn, side, up};
     constexpr double kHalfEdge = 6;

@@ -40,23 +40,23 @@ bool is_border(int i, int j, int k) {
     return false;
 }
 
-double away(int i, int j, int k) {
+double radius_at(int i, int j, int k) {
     const double middle = 0.5 * (kSide - 1);
     return std::hypot(i - middle, j - middle, k - middle);
 }
 
-double off_torus(int i, int j, int k) {
+double distance_to_ring(int i, int j, int k) {
     const double middle = 0.5 * (kSide - 1);
     return std::hypot(std::hypot(i - middle, j - middle) - 6, k - middle);
 }
 
 }  // namespace
 
-TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those of the rough one") {
+TEST_CASE("hold_topology: random targets get the pieces and handles of the rough surface") {
     for (unsigned seed = 1; seed <= 8; ++seed) {
         std::mt19937 random(seed);
-        const FloatGridPtr ball = level_set([](int i, int j, int k) { return away(i, j, k) < 7; });
-        const FloatGridPtr ring = level_set([](int i, int j, int k) { return off_torus(i, j, k) < 3; });
+        const FloatGridPtr ball = level_set([](int i, int j, int k) { return radius_at(i, j, k) < 7; });
+        const FloatGridPtr ring = level_set([](int i, int j, int k) { return distance_to_ring(i, j, k) < 3; });
         const FloatGridPtr noise =
             level_set([&](int i, int j, int k) { return !is_border(i, j, k) && random() % 2 == 0; });
         for (const auto& [rough, genus] : {std::pair{ball, 0}, std::pair{ring, 1}}) {
@@ -71,9 +71,10 @@ TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those 
     }
 }
 
-TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are left as they are") {
-    const FloatGridPtr small = level_set([](int i, int j, int k) { return away(i, j, k) < 5; });
-    const FloatGridPtr large = level_set([](int i, int j, int k) { return away(i, j, k) < 7 && away(i, j, k) > 2; });
+TEST_CASE("hold_topology: a target that differs in more voxels than the limit keeps its topology") {
+    const FloatGridPtr small = level_set([](int i, int j, int k) { return radius_at(i, j, k) < 5; });
+    const FloatGridPtr large =
+        level_set([](int i, int j, int k) { return radius_at(i, j, k) < 7 && radius_at(i, j, k) > 2; });
     std::size_t differ = 0;
     for (auto value = large->cbeginValueOn(); value; ++value)
         differ += (*value < 0) != (small->tree().getValue(value.getCoord()) < 0);
@@ -85,7 +86,7 @@ TEST_CASE("hold_topology: surfaces that differ in more voxels than they may are 
     CHECK(measure(extract_mesh(*held)).components == 1);
 }
 
-TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is narrowest") {
+TEST_CASE("hold_topology: two pieces are kept apart at the narrowest part of the target") {
     const double middle = 0.5 * (kSide - 1);
     for (const int narrow : {8, 12, 15}) {
         // `target` consists of two blocks and a bar between them, which is thinner at i == narrow. `rough` lacks the
@@ -105,9 +106,9 @@ TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is n
     }
 }
 
-TEST_CASE("hold_topology: where a surface is cut off, what lies beyond is left alone, and a cancelled run ends") {
+TEST_CASE("hold_topology: no voxels are added beyond the domain, and a run can be cancelled") {
     const FloatGridPtr rough = level_set([](int, int, int k) { return k < 8; });
-    FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && away(i, j, k) > 4; });
+    FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && radius_at(i, j, k) > 4; });
     const std::size_t all = target->activeVoxelCount();
     // A flood fill continues a solid that the domain cuts off beyond the domain, without end. Here only `target` is
     // continued, by a tile; hold_topology() must not add voxels there.

@@ -74,7 +74,7 @@ FitErrors fit_shape(const test::Solid3& shape, std::size_t count, double spacing
 
 }  // namespace
 
-TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
+TEST_CASE("fit_quadrics: the rms distance of the feet from the surface is less than half of the noise") {
     for (const unsigned seed : {1, 2, 3})
         for (const bool is_ball : {true, false}) {
             const test::Solid3 shape = is_ball ? test::ball(1) : test::torus(1, 0.35);
@@ -103,7 +103,7 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
         }
 }
 
-TEST_CASE("a quadric's distance, foot and curvature are those of its paraboloid") {
+TEST_CASE("A quadric's distance, foot and curvature are those of its paraboloid") {
     Quadric q;
     q.origin = {1, 2, 3};
     q.axes = {Vec3{0, 1, 0}, Vec3{0, 0, 1}, Vec3{1, 0, 0}};  // the normal is x
@@ -122,7 +122,7 @@ TEST_CASE("a quadric's distance, foot and curvature are those of its paraboloid"
     CHECK(q.curvature() == Approx(4));
 }
 
-TEST_CASE("an exact paraboloid is found as it is") {
+TEST_CASE("fit_quadrics: an exact paraboloid is recovered") {
     // A paraboloid with the heights 0.3 u^2 - 0.2 uv + 0.1 v^2 over the plane z = 0. The nodes have its normals, so
     // that their own planes are tilted against z = 0.
     const auto height = [](double x, double y) { return 0.3 * x * x - 0.2 * x * y + 0.1 * y * y; };
@@ -147,7 +147,7 @@ TEST_CASE("an exact paraboloid is found as it is") {
     CHECK(q.curvature() == Approx(0.4 + std::sqrt(0.08)).epsilon(0.05));
 }
 
-TEST_CASE("two sheets back to back do not mix") {
+TEST_CASE("fit_quadrics: two sheets back to back are fitted separately") {
     for (const unsigned seed : {1, 2, 3}) {
         const std::size_t each = 3000;
         const double spacing = std::sqrt(4.0 / each), apart = 2.5 * spacing;
@@ -184,7 +184,7 @@ TEST_CASE("two sheets back to back do not mix") {
     }
 }
 
-TEST_CASE("no quadric through the sheets of two folds that the indicator tells apart") {
+TEST_CASE("fit_quadrics: no quadric between two folds if their distances from the indicator are known") {
     for (const bool known : {true, false}) {
         const std::size_t each = 3000;
         const double spacing = std::sqrt(4.0 / each);
@@ -205,7 +205,7 @@ TEST_CASE("no quadric through the sheets of two folds that the indicator tells a
     }
 }
 
-TEST_CASE("no quadric where a normal is against those beside it") {
+TEST_CASE("fit_quadrics: no quadric at a node whose normal is opposite to those around it") {
     const OrientedCloud cloud = oriented(test::ball(1).sample(3000, 7));
     const double spacing = std::sqrt(4 * M_PI / 3000);
     OrientedCloud nodes = every(cloud, 50);
@@ -214,7 +214,7 @@ TEST_CASE("no quadric where a normal is against those beside it") {
     CHECK(fit_quadrics({}, cloud, spacing, {}).empty());
 }
 
-TEST_CASE("quadrics do not depend on the number of threads") {
+TEST_CASE("fit_quadrics: quadrics do not depend on the number of threads") {
     test::SurfaceSample s = test::torus(1, 0.35).sample(3000, 8);
     test::add_noise(s, 0.3 * s.spacing(), 9);
     std::vector<Quadric> of[2];
@@ -230,7 +230,7 @@ TEST_CASE("quadrics do not depend on the number of threads") {
     }
 }
 
-TEST_CASE("thinned: counts add up, the centre stays, both sides of a sheet stay apart") {
+TEST_CASE("thinned: counts and centroid are preserved, and both sides of a sheet stay separate") {
     OrientedCloud cloud;
     std::mt19937 random(10);
     std::uniform_real_distribution<float> count(1, 5);
@@ -267,7 +267,7 @@ TEST_CASE("thinned: counts add up, the centre stays, both sides of a sheet stay 
     CHECK(thinned({}, 1).size() == 0);
 }
 
-TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it is turned") {
+TEST_CASE("thinned: one mean for each cell of a smooth surface, whatever the direction of its normals") {
     const test::SurfaceSample s = test::ball(1).sample(5000, 12);
     const OrientedCloud thin = thinned(oriented(s), 0.1);
     // The mean of a cell's points lies below the sphere by no more than a chord of the cell does. A cell has one mean,
@@ -279,7 +279,7 @@ TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it
     }
 }
 
-TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
+TEST_CASE("fit_quadrics: noise sigma biases the quadrics on a ball by less than 0.4 sigma^2 / R") {
     // If the points of a ball are moved by sigma along each axis, their mean height over a tangent plane is too low by
     // sigma^2 / R.
     double bias = 0;
@@ -301,7 +301,7 @@ TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
     CHECK(std::abs(bias / count) < 0.4 * sigma * sigma);
 }
 
-TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is far from any place") {
+TEST_CASE("quadrics_over: wide neighbourhoods need fewer quadrics, and every position is near one") {
     test::SurfaceSample s = test::ball(1).sample(40000, 1);
     const double spacing = s.spacing(), edge = 1.2 * spacing;
     const OrientedCloud places = oriented(s);
@@ -339,7 +339,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 
-TEST_CASE("points far from all others make no quadrics beside those of a sheet") {
+TEST_CASE("quadrics_over: points off a sheet cause no quadrics with wide neighbourhoods") {
     test::SurfaceSample s = test::ball(1).sample(8000, 1);
     const double spacing = s.spacing();
     OrientedCloud cloud = oriented(s);
@@ -358,7 +358,7 @@ TEST_CASE("points far from all others make no quadrics beside those of a sheet")
     CHECK(widest < 6 * spacing);
 }
 
-TEST_CASE("points selected four at a time are those in the ball on the frame's side, in their order") {
+TEST_CASE("select_near: points in the ball on the frame's side are selected in order, as by a plain loop") {
     std::mt19937 random(8);
     std::uniform_real_distribution<double> some(-1, 1);
     std::vector<Vec3> places, normals;

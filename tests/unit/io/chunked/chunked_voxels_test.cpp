@@ -68,7 +68,7 @@ const WorldBox kPart{{180, 440, 60}, {330, 590, 200}};
 
 }  // namespace
 
-TEST_CASE("chunks: a voxel and a box have the source's values, across chunks and at the image's end") {
+TEST_CASE("Chunks: voxels and boxes have the values of the source, across chunks and at the image's end") {
     const auto source = std::make_shared<Numbered>(Index3{23, 17, 9}, Index3{8, 5, 4});
     const ChunkedVoxels voxels(source);
     CHECK(voxels.chunk_count() == 3 * 4 * 3);
@@ -89,7 +89,7 @@ TEST_CASE("chunks: a voxel and a box have the source's values, across chunks and
     CHECK(voxels.box_of(35) == VoxelBox{{16, 15, 8}, {22, 16, 8}});
 }
 
-TEST_CASE("chunks: each is decoded once, and only what is asked for") {
+TEST_CASE("Chunks: each requested chunk is decoded once, and no other chunk") {
     const auto source = std::make_shared<Numbered>(Index3{64, 64, 64}, Index3{16, 16, 16});
     const ChunkedVoxels voxels(source);
     std::atomic<int> wrong{0};
@@ -105,7 +105,7 @@ TEST_CASE("chunks: each is decoded once, and only what is asked for") {
     CHECK(voxels.read_chunks() == std::vector<std::uint64_t>{0, 1, 4, 5, 16, 17, 20, 21});
 }
 
-TEST_CASE("chunks: those that a file does not have share one chunk of fill values") {
+TEST_CASE("Chunks: all missing chunks are one chunk of fill values in memory") {
     const ChunkedVoxels voxels(std::make_shared<Missing>(Index3{512, 512, 512}, Index3{128, 128, 128}));
     const std::uint64_t before = resident_bytes();
     voxels.load({detail::whole_box({512, 512, 512})}, {});
@@ -119,13 +119,13 @@ TEST_CASE("chunks: those that a file does not have share one chunk of fill value
     CHECK(pair[1] == -3);
 }
 
-TEST_CASE("chunks: two images do not take each other's chunks for their own") {
+TEST_CASE("Chunks: alternating access to two images does not mix their chunks") {
     const auto a = std::make_shared<Numbered>(Index3{8, 8, 8}, Index3{8, 8, 8});
     const ChunkedVoxels first(a), second(std::make_shared<Numbered>(Index3{8, 8, 8}, Index3{4, 4, 4}));
     for (int n = 0; n < 8; ++n) CHECK(first.at({n, 1, 2}) == second.at({n, 1, 2}));
 }
 
-TEST_CASE("chunks: NaN is an error of who asks for its chunk, each time, and beyond the image's end it is none") {
+TEST_CASE("Chunks: NaN is an error at each access to its chunk, but is ignored beyond the image's end") {
     const auto source = std::make_shared<Numbered>(Index3{10, 10, 10}, Index3{8, 8, 8});
     source->bad = {9, 3, 2};
     const ChunkedVoxels voxels(source);
@@ -141,12 +141,12 @@ TEST_CASE("chunks: NaN is an error of who asks for its chunk, each time, and bey
     CHECK(ChunkedVoxels(source).at({8, 0, 0}) == 8.0);
 }
 
-TEST_CASE("chunks: sizes that cannot be are refused") {
+TEST_CASE("Chunks: a chunk size of zero or of 2000^3 voxels is rejected") {
     CHECK(code_of([] { Numbered({9, 9, 9}, {0, 4, 4}); }) == Errc::InvalidInput);
     CHECK(code_of([] { Numbered({9, 9, 9}, {2000, 2000, 2000}); }) == Errc::Unsupported);
 }
 
-TEST_CASE("chunks: an image that is read chunk by chunk samples as one that is held, bit for bit") {
+TEST_CASE("Chunks: samples of an image read in chunks are bitwise equal to those of an image in memory") {
     const Scratch scratch;
     const std::string path = write_large(scratch);
     const Image lazy = read_image(path);
@@ -181,7 +181,7 @@ TEST_CASE("chunks: an image that is read chunk by chunk samples as one that is h
     CHECK(crop.at(250, 500, 120) == lazy.at(250, 500, 120));
 }
 
-TEST_CASE("chunks: percentiles and range depend on what was read, not on threads") {
+TEST_CASE("Chunks: percentiles and range depend on the chunks that were read, not on the thread count") {
     const Scratch scratch;
     const std::string path = write_large(scratch);
     const auto measure = [&](int threads, bool touch) {

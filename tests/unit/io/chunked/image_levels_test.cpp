@@ -65,8 +65,8 @@ struct Pyramid {
                                              {geometry_of({10, 6, 18}, {2, 2, 1}), quarter}};
 
     [[nodiscard]] ImageLevels open(std::uint64_t max_bytes = 1 << 20) const {
-        const std::vector<float> nothing(detail::voxel_count(size));
-        return {Image::from_values(sources.front().geometry, nothing.data()), sources, max_bytes};
+        const std::vector<float> zeros(detail::voxel_count(size));
+        return {Image::from_values(sources.front().geometry, zeros.data()), sources, max_bytes};
     }
 };
 
@@ -83,7 +83,7 @@ std::vector<int> unpacked(const PageSlice& slice) {
 
 }  // namespace
 
-TEST_CASE("A cache of chunks keeps what was used last, up to its bound") {
+TEST_CASE("Chunk cache: the chunks that were used last are kept, up to the limit in bytes") {
     const Slope source({64, 8, 8}, 8, 1);
     ChunkCache cache(3 * kChunkBytes);
     for (int n = 0; n < 3; ++n) static_cast<void>(cache.get(source, {n, 0, 0}));
@@ -103,7 +103,7 @@ TEST_CASE("A cache of chunks keeps what was used last, up to its bound") {
     CHECK(source.reads == 7);
 }
 
-TEST_CASE("Chunks that a file does not have share one") {
+TEST_CASE("Chunk cache: a missing chunk is 0 and does not count towards the limit") {
     const Slope source({16, 8, 8}, 8, 1, true);
     ChunkCache cache(kChunkBytes);
     const ChunkCache::Chunk none = cache.get(source, {0, 0, 0});
@@ -111,7 +111,7 @@ TEST_CASE("Chunks that a file does not have share one") {
     CHECK(cache.bytes() == 0);
 }
 
-TEST_CASE("A chunk that several threads ask for is decoded once") {
+TEST_CASE("Chunk cache: a chunk requested by several threads is decoded once") {
     const Slope source({64, 64, 8}, 8, 1);
     ChunkCache cache(64 * kChunkBytes);
     tbb::parallel_for(0, 640, [&](int n) { static_cast<void>(cache.get(source, {n % 8, n / 8 % 8, 0})); });
@@ -119,7 +119,7 @@ TEST_CASE("A chunk that several threads ask for is decoded once") {
     CHECK(cache.bytes() == 64 * kChunkBytes);
 }
 
-TEST_CASE("A pixel is taken from the coarsest level that suffices") {
+TEST_CASE("Image levels: a pixel is taken from the coarsest level whose factor divides the pixel size") {
     const ImageLevels levels = Pyramid().open();
     REQUIRE(levels.levels().size() == 3);
     CHECK(levels.levels()[1].factor == Index3{2, 2, 2});
@@ -132,7 +132,7 @@ TEST_CASE("A pixel is taken from the coarsest level that suffices") {
     CHECK(levels.level_for(64) == 2);
 }
 
-TEST_CASE("A level whose voxels span no whole number of fine ones is left out") {
+TEST_CASE("Image levels: a level whose voxels are no whole multiple of the finest ones is ignored") {
     Pyramid pyramid;
     pyramid.sources[1].geometry.spacing = {0.8, 0.8, 0.8};
     const ImageLevels levels = pyramid.open();
@@ -144,7 +144,7 @@ TEST_CASE("A level whose voxels span no whole number of fine ones is left out") 
     CHECK(pyramid.open().levels().size() == 1);
 }
 
-TEST_CASE("A slice for a page comes from its level alone, in whole and in part") {
+TEST_CASE("Page slice: a whole slice and a part of it are read from their level alone") {
     const Pyramid pyramid;
     const ImageLevels levels = pyramid.open();
     const std::array<double, 2> range{0, 65535};
@@ -160,9 +160,10 @@ TEST_CASE("A slice for a page comes from its level alone, in whole and in part")
     const PageSlice part = make_page_slice(levels, {2, 21, 2, SliceRequest::Part{5, 7, 9, 100}}, range);
     CHECK(part.width == 9);
     CHECK(part.height == 5);
-    const std::vector<int> some = unpacked(part);
+    const std::vector<int> part_values = unpacked(part);
     for (int y = 0; y < 5; ++y)
-        for (int x = 0; x < 9; ++x) CHECK(some[std::size_t(y * 9 + x)] == values[std::size_t((y + 7) * 20 + x + 5)]);
+        for (int x = 0; x < 9; ++x)
+            CHECK(part_values[std::size_t(y * 9 + x)] == values[std::size_t((y + 7) * 20 + x + 5)]);
     // If the level's voxels are smaller than a pixel, the pixel is the mean of voxels along each axis.
     const std::vector<int> means = unpacked(make_page_slice(levels, {0, 39, 6, {}}, range));
     REQUIRE(means.size() == 4 * 6);
@@ -171,7 +172,7 @@ TEST_CASE("A slice for a page comes from its level alone, in whole and in part")
     CHECK_THROWS_AS(make_page_slice(levels, {2, 0, 1, SliceRequest::Part{40, 0, 1, 1}}, range), Error);
 }
 
-TEST_CASE("A plane of any direction is sampled between voxels, of the level that suffices") {
+TEST_CASE("Oblique slice: values are interpolated from the matching level, 0 outside, invalid planes are rejected") {
     const Pyramid pyramid;
     const ImageLevels levels = pyramid.open();
     const std::array<double, 2> range{0, 65535};
@@ -184,16 +185,16 @@ TEST_CASE("A plane of any direction is sampled between voxels, of the level that
         for (int y = 0; y < plane.count; ++y)
             for (int x = 0; x < plane.count; ++x) {
                 double expected = 0;
-                bool is_there = true, is_at_rim = false;
+                bool is_in_image = true, is_at_rim = false;
                 for (std::size_t a = 0; a < 3; ++a) {
                     const double fine = plane.first[a] + x * plane.right[a] + y * plane.down[a];
                     const double at = (fine + 0.5) / (1 << level) - 0.5;
-                    is_there = is_there && fine >= -0.5 && fine <= pyramid.size[a] - 0.5;
+                    is_in_image = is_in_image && fine >= -0.5 && fine <= pyramid.size[a] - 0.5;
                     is_at_rim = is_at_rim || at < 0 || at > pyramid.size[a] / (1 << level) - 1;
                     expected += std::array{1, 3, 7}[a] * at * (1 << level);
                 }
                 const int value = values[std::size_t(y * plane.count + x)];
-                if (!is_there) {
+                if (!is_in_image) {
                     ++outside;
                     REQUIRE(value == 0);
                 } else if (!is_at_rim) {  // at the rim the last voxel's value continues
@@ -216,7 +217,7 @@ TEST_CASE("A plane of any direction is sampled between voxels, of the level that
     CHECK(unpacked(make_oblique_slice(levels, {{1, 1, 1}, {1e6, 0, 0}, {0, 1e6, 0}, 64}, range))[0] > 0);
 }
 
-TEST_CASE("Of an image in chunks no more is kept than is allowed") {
+TEST_CASE("Image levels: the chunk cache stays within its limit, percentiles come from the coarsest level") {
     const Pyramid pyramid;
     const ImageLevels levels = pyramid.open(20 * kChunkBytes);
     for (int axis = 0; axis < 3; ++axis)
@@ -230,7 +231,7 @@ TEST_CASE("Of an image in chunks no more is kept than is allowed") {
     CHECK(levels.range() == std::array<double, 2>{0, 65535});
 }
 
-TEST_CASE("An image that is held is shown as it is") {
+TEST_CASE("Image levels: slices of an image in memory are means of its voxels, without a chunk cache") {
     const ImageGeometry geometry = geometry_of({4, 3, 2}, {1, 1, 1});
     std::vector<float> values(24);
     for (std::size_t n = 0; n < values.size(); ++n) values[n] = float(n);

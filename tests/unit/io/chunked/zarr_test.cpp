@@ -95,7 +95,7 @@ nlohmann::json odd_value(std::mt19937& random) {
 
 }  // namespace
 
-TEST_CASE("zarr: each codec gives the voxels that were written") {
+TEST_CASE("Zarr: each codec returns the voxels that were written") {
     const Scratch scratch;
     std::vector<std::string> stores;
     for (const std::string& codec : kCodecs) stores.push_back(zarr_stores::write_2(scratch.path("a" + codec), codec));
@@ -116,7 +116,7 @@ TEST_CASE("zarr: each codec gives the voxels that were written") {
     }
 }
 
-TEST_CASE("zarr: a damaged chunk is an error with its path, or other grey values") {
+TEST_CASE("Zarr: random damage in a chunk does not crash, and a chunk of wrong length is an error with its path") {
     const Scratch scratch;
     for (const std::string& codec : kCodecs) {
         INFO(codec);
@@ -139,7 +139,7 @@ TEST_CASE("zarr: a damaged chunk is an error with its path, or other grey values
     }
 }
 
-TEST_CASE("zarr: of a chunk that is longer than the array only the array is held") {
+TEST_CASE("Zarr: a chunk larger than the array is cropped, and a size that its bytes cannot hold is an error") {
     const Scratch scratch;
     const std::string store = scratch.path("a");
     for (const std::string& codec : kCodecs) {
@@ -162,7 +162,7 @@ TEST_CASE("zarr: of a chunk that is longer than the array only the array is held
     }
 }
 
-TEST_CASE("zarr: damaged shards are errors wherever they are damaged") {
+TEST_CASE("Zarr: at most a tenth of randomly damaged shards can be read") {
     const Scratch scratch;
     const std::string store = zarr_stores::write_3(scratch.path("v3")), shard = store + "/c/0/0/0";
     std::mt19937 random(4);
@@ -172,7 +172,7 @@ TEST_CASE("zarr: damaged shards are errors wherever they are damaged") {
     CHECK(outcomes.read <= 40);
 }
 
-TEST_CASE("zarr: damaged metadata is an error or a result") {
+TEST_CASE("Zarr: damaged metadata is an error or is read, without a crash") {
     const Scratch scratch;
     for (const std::string& store :
          {zarr_stores::write_2(scratch.path("v2"), "zstd"), zarr_stores::write_3(scratch.path("v3"))}) {
@@ -200,7 +200,7 @@ TEST_CASE("zarr: damaged metadata is an error or a result") {
     }
 }
 
-TEST_CASE("zarr: metadata that is large, deep or no JSON is refused") {
+TEST_CASE("Zarr: metadata that is too large, too deep or no JSON, or that claims too large a size, is rejected") {
     const Scratch scratch;
     const std::string store = scratch.path("a");
     const auto message = [&](const std::string& text) {
@@ -217,7 +217,7 @@ TEST_CASE("zarr: metadata that is large, deep or no JSON is refused") {
     CHECK(message(zarr_stores::metadata_2(2048, 2048, "|u1", "")).find("1 GiB at most") != std::string::npos);
 }
 
-TEST_CASE("zarr: a shard has 2^22 chunks at most") {
+TEST_CASE("Zarr: a shard with more than 2^22 chunks is rejected") {
     const Scratch scratch;
     const std::string store = zarr_stores::write_3(scratch.path("v3"));
     const std::string whole = bytes_of(store + "/zarr.json");
@@ -233,7 +233,7 @@ TEST_CASE("zarr: a shard has 2^22 chunks at most") {
     CHECK(message(257).find("expected at most 4194304 chunks in a shard") != std::string::npos);
 }
 
-TEST_CASE("zarr: a store that is taken away while it is read is no image of fill values") {
+TEST_CASE("Zarr: a store that is removed while it is read is an error, not an image of fill values") {
     const Scratch scratch;
     const std::string store = scratch.path("large");
     std::string meta = zarr_stores::metadata_2(1024, 64, "|u1", "");

@@ -12,7 +12,7 @@
 using namespace covol;
 using namespace covol::detail;
 
-TEST_CASE("decimal strings have at most 16 characters, and as many digits as fit") {
+TEST_CASE("DICOM: decimal strings have at most 16 characters and a relative error below 1e-8") {
     for (const double value : {0.0, -0.0, 1.5, -1.0 / 3, 1e-7 / 3, -1234567.891234567, 1e22 / 7, -4e-320, 100000.1}) {
         const std::string text = decimal_string(value);
         INFO(text);
@@ -23,7 +23,7 @@ TEST_CASE("decimal strings have at most 16 characters, and as many digits as fit
     CHECK(decimal_string(0.1) == "0.1");
 }
 
-TEST_CASE("UIDs are of UUIDs of version 8, one for each text") {
+TEST_CASE("DICOM: UIDs have the root 2.25 of UUIDs, and equal texts have equal UIDs") {
     const std::string uid = dicom_uid("a text");
     CHECK(uid == dicom_uid("a text"));
     CHECK(uid != dicom_uid("another"));
@@ -33,7 +33,7 @@ TEST_CASE("UIDs are of UUIDs of version 8, one for each text") {
     CHECK(uid[5] != '0');
 }
 
-TEST_CASE("what is written is parsed, with and without VRs, in items of items") {
+TEST_CASE("DICOM: nested items are parsed as written, with and without VR, truncated ones without a crash") {
     DicomItem inner, outer, file;
     inner.put(0x30060050, "DS", "1\\2\\3");
     outer.put_items(0x30060040, {inner, inner});
@@ -62,14 +62,14 @@ TEST_CASE("what is written is parsed, with and without VRs, in items of items") 
     }
 }
 
-TEST_CASE("texts longer than 64 KiB need implicit VR") {
+TEST_CASE("DICOM: texts longer than 64 KiB are rejected with explicit VR and written with implicit VR") {
     DicomItem file;
     file.put(0x30060050, "DS", std::string(70000, '1'));
     CHECK_THROWS_AS(file.encoded(true), Error);
     CHECK(file.encoded(false).size() == 8 + 70000);
 }
 
-TEST_CASE("colours are those of CIELab with D50") {
+TEST_CASE("DICOM: colours are converted to CIELab with the white point D50") {
     // DICOM stores L as 65535 L / 100, and a and b as 65535 (a + 128) / 255. White is (100, 0, 0), black (0, 0, 0).
     const auto white = to_cielab({255, 255, 255}), black = to_cielab({0, 0, 0}), red = to_cielab({255, 0, 0});
     CHECK(white[0] == 65535);

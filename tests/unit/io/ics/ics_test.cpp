@@ -69,7 +69,7 @@ std::string gzipped(const std::string& text) { return test::deflated(text, 16 + 
 
 }  // namespace
 
-TEST_CASE("ICS: voxels of every type, in both byte orders") {
+TEST_CASE("ICS: voxels of every type are read, in either byte order") {
     const Scratch scratch;
     const auto read = [&](const std::string& sizes, const std::string& format, const std::string& sign,
                           const std::string& bytes, const std::string& voxels) {
@@ -94,7 +94,7 @@ TEST_CASE("ICS: voxels of every type, in both byte orders") {
     CHECK(read("64 4 3 2", "real", "signed", "8 7 6 5 4 3 2 1", counted<double>(kVoxels, true)) == PixelType::Double);
 }
 
-TEST_CASE("ICS: spacing and origin, in the unit of x") {
+TEST_CASE("ICS: spacing and origin are converted to the unit of x") {
     const Scratch scratch;
     Header header;
     const std::string voxels = counted<std::uint16_t>();
@@ -152,7 +152,7 @@ TEST_CASE("ICS: the voxels of version 1 may be in .ids.gz, if there is no .ids")
     CHECK(list_image_files(path) == std::vector<std::string>{scratch.path("a.ids")});
 }
 
-TEST_CASE("ICS: headers as other programs write them") {
+TEST_CASE("ICS: header variants of other programs are read") {
     const Scratch scratch;
     const auto read = [&](const Header& header, int volumes = 1) {
         const std::string path = scratch.write("a.ics", header.text() + counted<std::uint16_t>(volumes * kVoxels));
@@ -191,7 +191,7 @@ TEST_CASE("ICS: headers as other programs write them") {
     (void)read(twice);
 }
 
-TEST_CASE("ICS: gzip, other separators, long histories") {
+TEST_CASE("ICS: gzip, other separators and long histories are read") {
     const Scratch scratch;
     Header header;
     const std::string voxels = counted<std::uint16_t>();
@@ -224,7 +224,7 @@ TEST_CASE("ICS: channels and time points are volumes, in either order") {
     }
 }
 
-TEST_CASE("ICS: files that are none, that lie, or that are not supported") {
+TEST_CASE("ICS: invalid, inconsistent and unsupported files are rejected with the reason") {
     const Scratch scratch;
     const Header good{};
     const std::string voxels = counted<std::uint16_t>();
@@ -270,7 +270,7 @@ TEST_CASE("ICS: files that are none, that lie, or that are not supported") {
     is_refused(history.text() + voxels, "expected a header of at most 1 MiB");
 }
 
-TEST_CASE("damaged ICS files end in an Error, never in a crash") {
+TEST_CASE("ICS: damaged files never crash the reader, and truncated ones are rejected") {
     const Scratch scratch;
     const std::string path = scratch.write("f.ics", Header().text() + counted<std::uint16_t>());
     const FuzzCounts counts = fuzz(

@@ -69,7 +69,7 @@ bool has_ramp(const ChunkedVoxels& voxels, const VoxelBox& box) {
 
 }  // namespace
 
-TEST_CASE("a packed stream of one or several members is entered anywhere") {
+TEST_CASE("A compressed stream of one or several members is decoded from any position") {
     const Scratch scratch;
     const std::string bytes = ramp();
     std::string several;
@@ -102,7 +102,7 @@ TEST_CASE("a packed stream of one or several members is entered anywhere") {
     }
 }
 
-TEST_CASE("channels, byte order, slope and a frame of a packed stream") {
+TEST_CASE("A channel and frame of a compressed stream are decoded with byte order, slope and intercept") {
     const Scratch scratch;
     constexpr Index3 kSmall{70, 20, 18};
     std::string bytes = "head";
@@ -133,7 +133,7 @@ TEST_CASE("channels, byte order, slope and a frame of a packed stream") {
     CHECK(same);
 }
 
-TEST_CASE("damaged packed streams end in an Error, a wrong checksum among them") {
+TEST_CASE("Damaged compressed streams never crash, truncated ones and wrong checksums are errors") {
     const Scratch scratch;
     const std::string bytes = ramp();
     std::string stream = packed(bytes, kGzip);
@@ -151,7 +151,7 @@ TEST_CASE("damaged packed streams end in an Error, a wrong checksum among them")
     CHECK(message_of([&] { open(wrong); }).find("damaged") != std::string::npos);
 }
 
-TEST_CASE("loading respects the budget and stops when cancelled") {
+TEST_CASE("Loading chunks beyond the memory budget is rejected, and a cancelled load reads no chunk") {
     const Scratch scratch;
     const std::string path = scratch.write("a", packed(ramp(), kGzip));
     const ChunkedVoxels voxels(packed_chunks(path, place_of(path, 0), frame_of_ramp(), {}));
@@ -165,7 +165,7 @@ TEST_CASE("loading respects the budget and stops when cancelled") {
     CHECK(voxels.read_count() == 0);
 }
 
-TEST_CASE("a TIFF's tiles and strips are read one by one, by several threads") {
+TEST_CASE("TIFF tiles and strips are read one by one and by several threads") {
     constexpr Index3 kPages{700, 530, 5};
     struct Kind {
         int compression, predictor, tile, rows, planes;
@@ -251,7 +251,7 @@ TEST_CASE("a TIFF's tiles and strips are read one by one, by several threads") {
     }
 }
 
-TEST_CASE("the header of a large packed file tells the chunks that it will be read in") {
+TEST_CASE("Image info states the chunk size of large compressed files, and zero for smaller ones") {
     const Scratch scratch;
     const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nspacings: 1 1 1\nencoding: gzip\nsizes: ";
     const std::string stream = packed(std::string(1U << 20, 'a'), kGzip) + std::string(1U << 16, 'b');

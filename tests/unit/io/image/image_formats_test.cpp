@@ -157,7 +157,7 @@ void fuzz_image(const Scratch& scratch, const std::string& path) {
 
 }  // namespace
 
-TEST_CASE("MRC: pixels, spacing and origin") {
+TEST_CASE("MRC: pixels, spacing, origin, permuted axes and extended headers are read") {
     const Scratch scratch;
     const Image image = read_image(scratch.write("a.mrc", mrc(1)));
     check_ramp(image);
@@ -185,7 +185,7 @@ TEST_CASE("MRC: pixels, spacing and origin") {
     check_ramp(read_image(scratch.write("e.mrc", extended)));
 }
 
-TEST_CASE("ITK's HDF5 images, whole and in part") {
+TEST_CASE("HDF5 images of ITK are read whole and in part") {
     const Scratch scratch;
     write_hdf5(scratch.path("a.h5"));
     check_ramp(read_image(scratch.path("a.h5")));
@@ -196,7 +196,7 @@ TEST_CASE("ITK's HDF5 images, whole and in part") {
     CHECK(part.at(3, 2, 2) == value(3, 2, 2));
 }
 
-TEST_CASE("a DICOM series is sorted by position, given as a folder or as one of its files") {
+TEST_CASE("A DICOM series, given as a folder or as one of its files, is sorted by position") {
     const Scratch scratch;
     const std::string folder = scratch.path("series");
     write_series(folder);
@@ -212,7 +212,7 @@ TEST_CASE("a DICOM series is sorted by position, given as a folder or as one of 
           std::string::npos);
 }
 
-TEST_CASE("a float grid of a .vdb file is an image on the box of its active voxels") {
+TEST_CASE("A float grid of a .vdb file is read as an image on the box of its active voxels") {
     const Scratch scratch;
     Domain domain;
     domain.voxel_size = 0.5;
@@ -235,7 +235,7 @@ TEST_CASE("a float grid of a .vdb file is an image on the box of its active voxe
     CHECK(image.at(1, 0, 0) == 7);  // the background
 }
 
-TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
+TEST_CASE("Damaged MRC and DICOM files never crash the reader") {
     const Scratch scratch;
     fuzz_image(scratch, scratch.write("f.mrc", mrc(1)));
     const std::string slice = dicom(0);
@@ -254,7 +254,7 @@ TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
         60, slice.size() - 84);
 }
 
-TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
+TEST_CASE("MRC headers of size 0 are rejected, and a DICOM slice of 0 bits counts as missing") {
     const Scratch scratch;
     for (std::size_t a = 0; a < 3; ++a) {
         std::string flat = mrc(1);
@@ -273,7 +273,7 @@ TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
     CHECK_THAT(message_of([&] { (void)read_image(folder); }), Catch::Contains("a slice is missing"));
 }
 
-TEST_CASE("a damaged slice at the end of a DICOM series is warned of") {
+TEST_CASE("A damaged slice at the end of a DICOM series is skipped with a warning") {
     const Scratch scratch;
     const std::string folder = scratch.path("series");
     write_series(folder);
@@ -288,7 +288,7 @@ TEST_CASE("a damaged slice at the end of a DICOM series is warned of") {
     CHECK_THAT(warnings[0], Catch::Contains("9.dcm") && Catch::Contains("skipped"));
 }
 
-TEST_CASE("damaged HDF5 files end in an Error, never in a crash", "[hdf5]") {
+TEST_CASE("Damaged HDF5 files never crash the reader", "[hdf5]") {
     const Scratch scratch;
     write_hdf5(scratch.path("f.h5"));
     fuzz_image(scratch, scratch.path("f.h5"));

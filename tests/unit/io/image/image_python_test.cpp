@@ -59,7 +59,7 @@ std::string tifffile(const std::string& path, int pages, const std::string& desc
 
 }  // namespace
 
-TEST_CASE("NumPy's arrays in both orders, of several types") {
+TEST_CASE("NumPy arrays of several types are read in C and Fortran order") {
     const Scratch scratch;
     check_counts(read_image(scratch.write("c.npy", npy<std::uint16_t>("<u2", "False", "(2, 3, 4)", 24))), {1, 4, 12});
     check_counts(read_image(scratch.write("f.npy", npy<float>("<f4", "True", "(2, 3, 4)", 24))), {6, 2, 1});
@@ -78,7 +78,7 @@ TEST_CASE("NumPy's arrays in both orders, of several types") {
     CHECK(read_image(scratch.path("f.npy"), part).at(2, 1, 1) == 15);
 }
 
-TEST_CASE("NumPy's arrays that are none, or no volumes") {
+TEST_CASE("NumPy files that are invalid or hold no 3D array are rejected") {
     const Scratch scratch;
     const auto is_refused = [&](const std::string& bytes, const std::string& part) {
         CHECK_THAT(message_of([&] { (void)read_image(scratch.write("a.npy", bytes)); }), Catch::Contains(part));
@@ -94,7 +94,7 @@ TEST_CASE("NumPy's arrays that are none, or no volumes") {
     is_refused(npy<std::uint16_t>("<u2", "False", "(0, 3, 4)", 0), "expected a 3D image");
 }
 
-TEST_CASE("tifffile's description: axes, spacing, and what does not fit the pages") {
+TEST_CASE("TIFFs of tifffile: axes and spacing are read, and a description that does not fit is ignored") {
     const Scratch scratch;
     const std::string path = scratch.path("t.tif");
     tifffile(path, 4, R"({"shape": [2, 2, 3, 4], "axes": "ZCYX", "spacing": 1.5, "unit": "um"})");

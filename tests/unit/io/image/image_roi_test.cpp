@@ -30,7 +30,7 @@ const WorldBox kRoi{{15.2, -10.1, 41}, {20.1, -4.3, 49.5}};
 
 }  // namespace
 
-TEST_CASE("a part of an image has the whole's values, in every format") {
+TEST_CASE("A part of an image has the same values as the whole image, in several formats") {
     const Scratch scratch;
     const ImageGeometry g = lattice();
     ReadImageOptions options;
@@ -65,7 +65,7 @@ TEST_CASE("a part of an image has the whole's values, in every format") {
     }
 }
 
-TEST_CASE("samples beyond the part that is held are an error, beyond the image they are its border") {
+TEST_CASE("Sampling beyond the loaded part is an error, and beyond the image it continues the border values") {
     const Scratch scratch;
     write_image(scratch.path("a.nrrd"), lattice(), values().data());
     ReadImageOptions options;
@@ -83,7 +83,7 @@ TEST_CASE("samples beyond the part that is held are an error, beyond the image t
           std::string::npos);
 }
 
-TEST_CASE("a file too large to read is mapped, and only what the box needs is asked for") {
+TEST_CASE("A file of 3 GiB is memory-mapped, and a region needs memory for its voxels alone") {
     const Scratch scratch;
     // A sparse file of 3 GiB, in which one voxel is not 0.
     constexpr std::uint64_t kSize = 1448;

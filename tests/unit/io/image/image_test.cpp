@@ -111,7 +111,7 @@ std::string read_error(const std::string& path, const ReadImageOptions& options 
 
 }  // namespace
 
-TEST_CASE("images come back with values, type, spacing, origin and direction") {
+TEST_CASE("Images are read as written: values, type, spacing, origin and direction") {
     const Scratch scratch;
     const ImageGeometry g = oblique();
     for (const char* name : {"a.nrrd", "a.nii", "a.nii.gz", "a.mha"}) {
@@ -140,7 +140,7 @@ TEST_CASE("images come back with values, type, spacing, origin and direction") {
     CHECK(scratch.file_count() == 4);
 }
 
-TEST_CASE("a TIFF keeps spacing and unit") {
+TEST_CASE("A TIFF preserves spacing and unit") {
     const Scratch scratch;
     ImageGeometry g = oblique();
     g.spacing = {0.35, 0.35, 1.25};
@@ -159,7 +159,7 @@ TEST_CASE("a TIFF keeps spacing and unit") {
     CHECK(image.geometry().spacing_known);
 }
 
-TEST_CASE("a TIFF without known spacing stays one") {
+TEST_CASE("A TIFF written without known spacing is read without known spacing") {
     const Scratch scratch;
     ImageGeometry g;
     g.size = {7, 6, 5};
@@ -168,7 +168,7 @@ TEST_CASE("a TIFF without known spacing stays one") {
     CHECK_FALSE(read_image_geometry(scratch.path("a.tif")).spacing_known);
 }
 
-TEST_CASE("NIfTI's slope and intercept are applied") {
+TEST_CASE("NIfTI: slope and intercept are applied") {
     const Scratch scratch;
     const ImageGeometry g = oblique();
     write_image(scratch.path("a.nii"), g, ramp<std::int32_t>(g).data());
@@ -181,7 +181,7 @@ TEST_CASE("NIfTI's slope and intercept are applied") {
     CHECK(image.at(3, 2, 1) == 2 * (3 + 20 + 40) - 5);
 }
 
-TEST_CASE("the unit survives where the format has a place for it") {
+TEST_CASE("The unit is preserved in NRRD and MetaImage files") {
     const Scratch scratch;
     ImageGeometry g = oblique();
     g.unit = "um";
@@ -192,7 +192,7 @@ TEST_CASE("the unit survives where the format has a place for it") {
     }
 }
 
-TEST_CASE("TIFF pixels of every kind, in strips and tiles, packed or not, either byte order, classic and big") {
+TEST_CASE("TIFF: every pixel type is read, from strips or tiles, compressed or not, classic or BigTIFF") {
     const Scratch scratch;
     const std::string path = scratch.path("k.tif");
     make_tiff<std::uint8_t>(path, {8, SAMPLEFORMAT_UINT}, number);
@@ -213,7 +213,7 @@ TEST_CASE("TIFF pixels of every kind, in strips and tiles, packed or not, either
     check_tiff<double>(path, PixelType::Double);
 }
 
-TEST_CASE("ImageJ's and OME's spacing and unit are read") {
+TEST_CASE("TIFF: spacing and unit of ImageJ and OME are read, and the options take precedence") {
     const Scratch scratch;
     const std::string path = scratch.path("s.tif");
     const auto geometry = [&](const std::string& description, float resolution) {
@@ -250,7 +250,7 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     CHECK(read_image_geometry(path, stated).spacing == stated.spacing);
 }
 
-TEST_CASE("one channel and frame of a hyperstack is chosen") {
+TEST_CASE("TIFF: the selected channel and frame of a hyperstack are read") {
     const Scratch scratch;
     TiffFormat f;
     f.pages = 12;
@@ -275,7 +275,7 @@ TEST_CASE("one channel and frame of a hyperstack is chosen") {
     for (int z = 0; z < 3; ++z) CHECK(image.at(4, 5, z) == 6 + 3 + z);
 }
 
-TEST_CASE("ImageJ's way with huge stacks: one directory, the slices behind each other") {
+TEST_CASE("TIFF: huge stacks of ImageJ, with one directory and consecutive slices, are read") {
     const Scratch scratch;
     const std::string path = scratch.path("one.tif");
     for (const char* mode : {"wl", "wb"}) {
@@ -312,7 +312,7 @@ TEST_CASE("ImageJ's way with huge stacks: one directory, the slices behind each 
     }
 }
 
-TEST_CASE("unusable images end in one line that says why") {
+TEST_CASE("Unusable images are rejected with a message of one line that states the reason") {
     const Scratch scratch;
     const auto contains = [](const std::string& message, const std::string& part) {
         INFO(message);
@@ -362,7 +362,7 @@ TEST_CASE("unusable images end in one line that says why") {
     CHECK_THROWS_AS(write_image(scratch.path("a.png"), g, values.data()), Error);
 }
 
-TEST_CASE("a sheared lattice is read, and its voxels lie where the file says") {
+TEST_CASE("A sheared lattice is read with the positions that the file states") {
     const Scratch scratch;
     const ImageGeometry g = read_image_geometry(
         scratch.write("shear.nrrd",
@@ -376,7 +376,7 @@ TEST_CASE("a sheared lattice is read, and its voxels lie where the file says") {
     }
 }
 
-TEST_CASE("a fourth dimension of size one is nothing, a larger one is chosen from") {
+TEST_CASE("A fourth dimension of size one is ignored, and from a larger one a frame is selected") {
     const Scratch scratch;
     const std::string header = "NRRD0004\ntype: uint8\nencoding: raw\nendian: little\ndimension: 4\n";
     std::string data;
@@ -390,7 +390,7 @@ TEST_CASE("a fourth dimension of size one is nothing, a larger one is chosen fro
     CHECK(image.at(1, 0, 0) == 17);
 }
 
-TEST_CASE("damaged image files end in an Error, never in a crash") {
+TEST_CASE("Damaged NRRD, NIfTI, MetaImage and TIFF files never crash the reader") {
     const Scratch scratch;
     const ImageGeometry g = oblique();
     const auto read = [](const std::string& path) {
@@ -409,7 +409,7 @@ TEST_CASE("damaged image files end in an Error, never in a crash") {
     fuzz(scratch, tiled, read);
 }
 
-TEST_CASE("the embryo phantom keeps Fiji's spacing") {
+TEST_CASE("The embryo phantom is read with the spacing stored by Fiji") {
     const char* data = std::getenv("COVOL_DATA");
     if (data == nullptr) {
         WARN("SKIPPED: COVOL_DATA is not set");

@@ -33,7 +33,7 @@ std::shared_ptr<const void> fill(std::vector<float>& memory, const Index3& size,
 
 }  // namespace
 
-TEST_CASE("an image over memory of any strides is the image of its values") {
+TEST_CASE("An image view with any strides has the values, statistics and samples of a dense image") {
     const Index3 size{4, 3, 5};
     std::vector<float> dense(60);
     fill(dense, size, {1, 4, 12}, 0);
@@ -53,10 +53,10 @@ TEST_CASE("an image over memory of any strides is the image of its values") {
         CHECK(image.range() == expected.range());
         CHECK(image.percentiles(0.1, 0.7) == expected.percentiles(0.1, 0.7));
         const Domain frame{0.8, {3.1, -4.2, 5.3}, {0, 0, 0}, {3, 3, 3}};
-        std::vector<float> ours(64), theirs(64);
-        image.sample(frame, frame.min, frame.max, ours.data());
-        expected.sample(frame, frame.min, frame.max, theirs.data());
-        CHECK(ours == theirs);
+        std::vector<float> view_samples(64), dense_samples(64);
+        image.sample(frame, frame.min, frame.max, view_samples.data());
+        expected.sample(frame, frame.min, frame.max, dense_samples.data());
+        CHECK(view_samples == dense_samples);
         REQUIRE(image.view());
         CHECK(image.view()->first.get() == first.get());  // the image uses the given memory, and nothing was copied
         CHECK(image.view()->stride == layout.stride);
@@ -64,7 +64,7 @@ TEST_CASE("an image over memory of any strides is the image of its values") {
     CHECK(expected.view()->type == PixelType::Float);
 }
 
-TEST_CASE("a view keeps its memory as long as an image of it lives") {
+TEST_CASE("A view keeps its memory alive as long as any image of it exists") {
     auto memory = std::make_shared<std::vector<float>>(60, 7.0F);
     const std::weak_ptr<std::vector<float>> watched = memory;
     auto image = std::make_unique<Image>(
@@ -76,7 +76,7 @@ TEST_CASE("a view keeps its memory as long as an image of it lives") {
     CHECK(part.at(3, 2, 4) == 7);
 }
 
-TEST_CASE("a view that is no image is refused, with the field that is wrong") {
+TEST_CASE("An invalid image view is rejected with the name of the wrong field") {
     std::vector<float> memory(60, 1.0F);
     const VoxelView view{PixelType::Float, {memory.data(), [](const void*) {}}, {1, 4, 12}};
     const auto refuse = [&](const ImageGeometry& geometry, const char* field) {
@@ -96,7 +96,7 @@ TEST_CASE("a view that is no image is refused, with the field that is wrong") {
     refuse(lattice({4, 3, 5}), "voxel (3, 2, 4)");
 }
 
-TEST_CASE("positions in memory are read as those of a file") {
+TEST_CASE("Positions in memory are interpreted like those in a file, for all spaces and axis orders") {
     const std::vector<Vec3> given{{1, 2, 3}, {4, 5, 6.5}};
     const Scratch scratch;
     const std::string path = scratch.path("points.xyz");

@@ -60,7 +60,7 @@ std::string big_endian(T value) {
 
 }  // namespace
 
-TEST_CASE("what is written is read back, bit for bit, as text and as bytes") {
+TEST_CASE("PLY, OBJ and OFF are read back bit for bit, as text and binary, and STL with the same volume") {
     const Folder folder;
     const TriangleMesh mesh = tetrahedron();
     WriteMeshOptions options;
@@ -86,7 +86,7 @@ TEST_CASE("what is written is read back, bit for bit, as text and as bytes") {
     }
 }
 
-TEST_CASE("y up and the unit's scale keep the orientation") {
+TEST_CASE("Writing with y up and a unit scale preserves the orientation of the mesh") {
     const Folder folder;
     WriteMeshOptions options;
     options.y_up = true;
@@ -98,7 +98,7 @@ TEST_CASE("y up and the unit's scale keep the orientation") {
     CHECK(measure(back).volume == Approx(measure(tetrahedron()).volume / 8));
 }
 
-TEST_CASE("glb has two aligned chunks whose sizes agree with the data") {
+TEST_CASE("GLB: two aligned chunks are written whose sizes match the data") {
     const Folder folder;
     WriteMeshOptions options;
     options.comments = {"delta = 1"};
@@ -145,7 +145,7 @@ TEST_CASE("PLY of other programs: big-endian bytes, doubles, other properties an
     check_refused(folder.file("cut.ply", text), "cut off");
 }
 
-TEST_CASE("OBJ with slashes, negative numbers and groups; OFF with colours and comments") {
+TEST_CASE("OBJ with slashes, negative indices and groups, and OFF with colours and comments, are read") {
     const Folder folder;
     const TriangleMesh obj = read_mesh(folder.file("a.obj",
                                                    "# c\no thing\nv 0 0 0\nv +1 0 0 1.0\nv 1e0 1 0\nv 0 1 0\nvt 0 "
@@ -157,7 +157,7 @@ TEST_CASE("OBJ with slashes, negative numbers and groups; OFF with colours and c
     CHECK(measure(off).area == Approx(1));
 }
 
-TEST_CASE("broken and hostile files give one clear error") {
+TEST_CASE("Malformed and malicious mesh files are rejected with a specific error") {
     const Folder folder;
     const std::string vertex = "property float x\nproperty float y\nproperty float z\n";
     const std::string face = "property list uchar int vertex_indices\n";
@@ -202,7 +202,7 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.stl", "solid x\nvertex 1 2\n"), "a.stl:2");
 }
 
-TEST_CASE("a file is the same to those who want its mesh and to those who want its points") {
+TEST_CASE("Reading a file as a mesh or as points gives the same vertices and the same errors") {
     const Folder folder;
     const auto message_of = [](const auto& read) -> std::string {
         try {
@@ -250,7 +250,7 @@ TEST_CASE("a file is the same to those who want its mesh and to those who want i
     }
 }
 
-TEST_CASE("files with random damage are read or refused, never worse") {
+TEST_CASE("Mesh files with random damage are read with valid indices or rejected with an Error") {
     const Folder folder;
     std::mt19937 random(3);
     for (const char* end : {"ply", "obj", "off", "stl"})
@@ -272,7 +272,7 @@ TEST_CASE("files with random damage are read or refused, never worse") {
         }
 }
 
-TEST_CASE("unknown endings and bad meshes are refused before anything is written") {
+TEST_CASE("Unknown file extensions and invalid meshes are rejected before a file is created") {
     const Folder folder;
     CHECK_THROWS_AS(write_mesh(folder.file("a.xyz"), tetrahedron()), Error);
     CHECK_THROWS_AS(check_mesh_extension("a"), Error);
@@ -284,7 +284,7 @@ TEST_CASE("unknown endings and bad meshes are refused before anything is written
     CHECK(fs::is_empty(folder.path));
 }
 
-TEST_CASE("Attributes are float properties of a PLY's vertices") {
+TEST_CASE("Attributes are written as float properties of PLY vertices, and invalid ones are rejected") {
     const Folder folder;
     WriteMeshOptions options;
     options.attributes = {{"distance_to_marks", {0.5F, 1, 2, 3}}, {"edge_strength", {0, 0.25F, 0.5F, 1}}};
@@ -313,7 +313,7 @@ TEST_CASE("Attributes are float properties of a PLY's vertices") {
     CHECK_FALSE(fs::exists(folder.file("c.ply")));
 }
 
-TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
+TEST_CASE("Several meshes are written to one OBJ or GLB file, each with its name") {
     const Folder folder;
     TriangleMesh second = tetrahedron();
     for (auto& v : second.vertices) v[0] += 10;
@@ -380,7 +380,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 }  // namespace
 
-TEST_CASE("glb of other programs: interleaved vertices, short indices, shared positions; what is not read is named") {
+TEST_CASE("GLB of other programs: interleaved and shared data is read, unsupported features are rejected") {
     const Folder folder;
     // Positions with a stride of 16 bytes, then two primitives with 16-bit indices that use the same positions. In
     // b.glb, the second primitive has no indices.
@@ -399,11 +399,11 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     // The y axis points up in the file, the z axis in covol.
     CHECK(mesh.vertices == std::vector<std::array<float, 3>>{{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}});
     CHECK(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 2, 1}, {0, 1, 3}});
-    const TriangleMesh bare = read_mesh(
+    const TriangleMesh unindexed = read_mesh(
         folder.file("b.glb", glb_of(replaced(json, R"("POSITION":0},"indices":2)", R"("POSITION":3})"), binary)));
-    REQUIRE(bare.vertices.size() == 7);
-    CHECK(bare.triangles[1] == std::array<std::uint32_t, 3>{4, 5, 6});
-    CHECK(bare.vertices[4] == std::array<float, 3>{1, 0, 0});
+    REQUIRE(unindexed.vertices.size() == 7);
+    CHECK(unindexed.triangles[1] == std::array<std::uint32_t, 3>{4, 5, 6});
+    CHECK(unindexed.vertices[4] == std::array<float, 3>{1, 0, 0});
 
     const auto refused = [&](const std::string& what, const std::string& with, const std::string& wanted,
                              Errc code = Errc::InvalidInput) {
@@ -445,7 +445,7 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
         }
 }
 
-TEST_CASE("Corners of a text STL that differ beyond single precision are one vertex") {
+TEST_CASE("Text STL: corners that differ by less than single precision become one vertex") {
     const Folder folder;
     const std::string facet = "facet normal 0 0 1\nouter loop\n", end = "endloop\nendfacet\n";
     const TriangleMesh mesh = read_mesh(
@@ -455,7 +455,8 @@ TEST_CASE("Corners of a text STL that differ beyond single precision are one ver
     check_refused(folder.file("b.obj", "v 1e300 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"), "finite");
 }
 
-TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "[mesh_io]") {
+TEST_CASE("Meshes far from 0 keep their coordinates in every format, relative to an origin in binary STL",
+          "[mesh_io]") {
     const Folder folder;
     TriangleMesh mesh = tetrahedron();
     mesh.origin = {500000, 5400000, -3000};
@@ -473,10 +474,10 @@ TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "
             const Vec3 place = again.place(v);
             double nearest = 1;  // STL stores vertices in another order
             for (std::size_t other = 0; other < 4; ++other) {
-                const Vec3 there = mesh.place(other);
+                const Vec3 original = mesh.place(other);
                 double apart = 0;
                 for (int a = 0; a < 3; ++a)
-                    apart = std::max(apart, std::abs(place[a] + (is_relative ? mesh.origin[a] : 0) - there[a]));
+                    apart = std::max(apart, std::abs(place[a] + (is_relative ? mesh.origin[a] : 0) - original[a]));
                 nearest = std::min(nearest, apart);
             }
             CHECK(nearest < 1e-4);

@@ -253,7 +253,7 @@ std::vector<File> all_formats() {
 
 }  // namespace
 
-TEST_CASE("the same marks are at the same place in the world in every format") {
+TEST_CASE("The same marks in every format have the same world positions") {
     const Scratch scratch;
     const ImageGeometry g = image();
     for (const File& file : all_formats()) {
@@ -271,7 +271,7 @@ TEST_CASE("the same marks are at the same place in the world in every format") {
     }
 }
 
-TEST_CASE("the options go before what a format says") {
+TEST_CASE("Reading options take precedence over the conventions of the format") {
     const Scratch scratch;
     const std::string path = scratch.write("a.mrk.json", markups({{1, 2, 3}}, "Fiducial", "RAS"));
     CHECK(read_points(path).points[0] == Vec3{-1, -2, 3});
@@ -294,7 +294,7 @@ TEST_CASE("the options go before what a format says") {
     CHECK_THROWS_AS(read_points(path, two), Error);
 }
 
-TEST_CASE("scans: invalid points are left out, compressed and newer files refused in words") {
+TEST_CASE("PCD and LAS: invalid points are omitted, compressed, newer and truncated files are rejected") {
     const Scratch scratch;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {
@@ -315,7 +315,7 @@ TEST_CASE("scans: invalid points are left out, compressed and newer files refuse
     contains(read_error(scratch, "a.pcd", "FIELDS x y z\nPOINTS 999999999999\nDATA binary\nabc"), "truncated");
 }
 
-TEST_CASE("archives that lie are refused before memory is taken") {
+TEST_CASE("ZIP archives of ROIs: false sizes, encryption and wrong checksums are rejected") {
     const Scratch scratch;
     contains(read_error(scratch, "a.zip", "PK nothing"), "expected a ZIP archive");
     contains(read_error(scratch, "a.zip", zip({{"a.txt", "text"}})), "expected Fiji ROIs in the archive, got none");
@@ -333,7 +333,7 @@ TEST_CASE("archives that lie are refused before memory is taken") {
     contains(read_error(scratch, "a.zip", broken), "does not match its checksum");
 }
 
-TEST_CASE("damaged files of every format end in an Error, never in a crash") {
+TEST_CASE("Damaged point files of every format never crash the reader") {
     const Scratch scratch;
     for (const File& file : all_formats()) {
         INFO(file.name);

@@ -45,7 +45,7 @@ std::string pcd(const std::string& viewpoint, int width, int height, const std::
 
 }  // namespace
 
-TEST_CASE("PLY: normals are unit, and 0 where the file has no direction") {
+TEST_CASE("PLY: normals have unit length, or are 0 if the file has no valid direction") {
     const std::string text = "0 0 0 0 0 2\n1 0 0 0 0 0\n2 0 0 nan 0 1\n3 0 0 3 0 4\n4 0 0 what 0 0\n";
     const std::string binary =
         floats({0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 0, 2, 0, 0, kNan, 0, 1, 3, 0, 0, 3, 0, 4, 4, 0, 0, 0, 0, 0});
@@ -62,7 +62,7 @@ TEST_CASE("PLY: normals are unit, and 0 where the file has no direction") {
     }
 }
 
-TEST_CASE("PLY: two of three components are no normals, and a list before them shifts them") {
+TEST_CASE("PLY: incomplete normals are ignored, list properties are skipped, truncated data is rejected") {
     const PointCloud two =
         read("a.ply", ply("ascii", 1, kPosition + "property float nx\nproperty float nz\n", "0 0 0 1 1\n"));
     CHECK(two.normals.empty());
@@ -74,7 +74,7 @@ TEST_CASE("PLY: two of three components are no normals, and a list before them s
     CHECK_THROWS_AS(read("c.ply", ply("binary_little_endian", 2, kPosition + kNormal, cut)), Error);
 }
 
-TEST_CASE("normals turn with the axes and signs of their points, and do not scale") {
+TEST_CASE("Normals follow the axis order and signs of their points, but not the scale") {
     const std::string text = ply("ascii", 1, kPosition + kNormal, "1 2 3 0.6 0 0.8\n");
     ReadPointsOptions options;
     options.scale = 10;
@@ -87,7 +87,7 @@ TEST_CASE("normals turn with the axes and signs of their points, and do not scal
     CHECK(read("a.ply", text, options).normals.empty());
 }
 
-TEST_CASE("columns: normals by name, or six columns of which the last three are unit vectors") {
+TEST_CASE("Columns: normals are found by name, or in six columns if the last three are unit vectors") {
     const PointCloud named = read("a.csv", "x,y,z,nx,ny,nz\n1,2,3,0,0,5\n4,5,6,,0,1\n");
     REQUIRE(named.normals.size() == 2);
     check_normal(named.normals[0], {0, 0, 1});
@@ -102,7 +102,7 @@ TEST_CASE("columns: normals by name, or six columns of which the last three are 
     CHECK(read("e.xyz", "0 0 0 0 0 1\n1 0 0\n").normals.at(1) == kNone);     // a short row has none
 }
 
-TEST_CASE("OBJ: one normal for each vertex, of the same number") {
+TEST_CASE("OBJ: normals are read only if each vertex has the normal of its own number") {
     const std::string vertices = "v 0 0 0\nvn 0 0 2\nv 1 0 0\nvn 0 3 0\nv 0 1 0\nvn 1 0 0\n";
     const PointCloud cloud = read("a.obj", vertices + "f 1//1 2//2 3//3\n");
     REQUIRE(cloud.normals.size() == 3);
@@ -113,7 +113,7 @@ TEST_CASE("OBJ: one normal for each vertex, of the same number") {
     CHECK(read("d.obj", vertices + "f 1/4 2/5 3/6\n").normals.size() == 3);
 }
 
-TEST_CASE("PCD: normals stay beside their points where invalid ones are left out; the sensor") {
+TEST_CASE("PCD: normals stay with their points if invalid points are omitted, and the sensor is read") {
     const std::string rows = "nan nan nan 1 0 0\n1 0 0 0 1 0\n2 0 0 nan nan nan\n3 0 0 0 0 1\n";
     const PointCloud cloud = read("a.pcd", pcd("VIEWPOINT 1 2 3 1 0 0 0\n", 4, 1, rows));
     REQUIRE(cloud.points.size() == 3);

@@ -11,7 +11,7 @@
 using namespace covol;
 using namespace covol::test;
 
-TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
+TEST_CASE("Line segments of ITK-SNAP are read as lines of two marks") {
     const Scratch scratch;
     const std::string head = "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n";
     const std::string begin = "<entry key=\"Point1\" value=\"1.5 2.5 3.5\" />\n",
@@ -24,7 +24,7 @@ TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
     contains(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
 }
 
-TEST_CASE("Fiji's areas, lines and points have their own lattice") {
+TEST_CASE("Fiji ROIs: areas are in pixel-corner coordinates, lines in pixel-centre coordinates") {
     const Scratch scratch;
     const auto read = [&](const RoiSpec& spec) { return read_points(scratch.write("one.roi", roi(spec))); };
     RoiSpec spec;
@@ -73,7 +73,7 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
     CHECK(composite.points[4] == Vec3{11.5, 11.5, 3});
 }
 
-TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its name; none is an error") {
+TEST_CASE("Fiji ROIs: the slice is the z of the hyperstack, else the position, else in the name, none is an error") {
     const Scratch scratch;
     RoiSpec spec = outline(kPolygon, 3);
     spec.position = 77;
@@ -94,7 +94,7 @@ TEST_CASE("a ROI's slice is the hyperstack's z, else the position, else in its n
     contains(read_error(scratch, "a.roi", roi(spec)), "expected a slice");
 }
 
-TEST_CASE("the types of Cell Counter are structures, and its slices may count channels") {
+TEST_CASE("Cell Counter: types are read as structures, and slices that count channels are converted") {
     const Scratch scratch;
     const std::string path = scratch.write("a.xml", cell_counter(kIndex));
     std::vector<StructurePoints> structures = read_structures_of_points(path, "type");
@@ -112,7 +112,7 @@ TEST_CASE("the types of Cell Counter are structures, and its slices may count ch
     CHECK(read_points(path, two).points[3][2] == 2);
 }
 
-TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
+TEST_CASE("Cell Counter: other XML files and incomplete ones are rejected with the reason") {
     const Scratch scratch;
     const std::string good = cell_counter(kIndex);
     const auto with = [&](const std::string& old, const std::string& other) {
@@ -137,7 +137,7 @@ TEST_CASE("files that are none of Cell Counter, or incomplete, are refused") {
              "expected at least one point");
 }
 
-TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of cellfinder") {
+TEST_CASE("Cell Counter: line ends around numbers are accepted, and files of cellfinder count slices from 0") {
     const Scratch scratch;
     std::string text = cell_counter(kIndex);
     const auto set = [&](const std::string& old, const std::string& other) {
@@ -153,7 +153,7 @@ TEST_CASE("Cell Counter: line ends around numbers, and slices from 0 in files of
     contains(cloud.rule, "cellfinder (2 types), slices from 0");
 }
 
-TEST_CASE("markups give lines, their own names and nothing that is not placed") {
+TEST_CASE("3D Slicer markups: curves are read as named lines, planes are ignored, invalid files are rejected") {
     const Scratch scratch;
     const std::string text =
         R"({"markups": [

@@ -54,7 +54,7 @@ std::vector<Vec3> marks() {
 
 }  // namespace
 
-TEST_CASE("points outside the image are counted, and both boxes told") {
+TEST_CASE("Points outside the image are counted, and the boxes of points and image are reported") {
     const ImageGeometry geometry = small_image();
     // The image extends over 10 x 8 x 20 world units. The centre of its first voxel is at 0.
     CHECK(verdict(cloud_of({{0, 0, 0}, {9.9, 7.9, 19}, {-0.05, -0.05, -0.5}}), geometry).empty());
@@ -65,7 +65,7 @@ TEST_CASE("points outside the image are counted, and both boxes told") {
     CHECK(message.find('`') == std::string::npos);
 }
 
-TEST_CASE("each usual mistake is named with the option that mends it") {
+TEST_CASE("Each common error of interpretation is reported with the option that corrects it") {
     ImageGeometry geometry = small_image();
     const auto advice = [&](const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
         return verdict(cloud_of(points, space), geometry);
@@ -92,7 +92,7 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
              "`points_space = local` would bring them inside (they leave out the image's origin)");
 }
 
-TEST_CASE("readings that fit equally well are all told") {
+TEST_CASE("Interpretations that fit equally well are all reported") {
     const ImageGeometry geometry = small_image();
     // The points fit if they are read as voxels, or in world units with the axes reversed.
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
@@ -101,7 +101,7 @@ TEST_CASE("readings that fit equally well are all told") {
     contains(message, "several interpretations are possible");
 }
 
-TEST_CASE("an image without spacing is asked for it where points are lengths") {
+TEST_CASE("World points and an image without spacing: the option spacing is suggested, or a warning is given") {
     ImageGeometry geometry = small_image();
     geometry.spacing = {1, 1, 1};
     geometry.spacing_known = false;
@@ -111,7 +111,7 @@ TEST_CASE("an image without spacing is asked for it where points are lengths") {
     CHECK(verdict(cloud_of({{5, 9, 9}}, PointSpace::Index), geometry).empty());
 }
 
-TEST_CASE("points that lie inside by accident are told by their slices") {
+TEST_CASE("Misinterpreted points inside the image are recognised by their voxel centres, with a warning") {
     ImageGeometry geometry;
     geometry.size = {400, 400, 400};  // every interpretation lies within it
     geometry.spacing = {0.35, 0.4, 0.7};
@@ -131,7 +131,7 @@ TEST_CASE("points that lie inside by accident are told by their slices") {
     CHECK(verdict(stated, geometry).empty());
 }
 
-TEST_CASE("what the advice asks for, reads the file rightly") {
+TEST_CASE("Reading a file again with the suggested options gives the correct positions") {
     const Scratch scratch;
     ImageGeometry geometry;
     geometry.size = {128, 96, 20};
@@ -147,9 +147,9 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         const std::string path = scratch.path("marks.xyz");
         write_points(path, written);
         contains(verdict(read_points(path), geometry), "; " + advice + " would bring them inside");
-        const PointCloud mended = read_points(path, options);
-        CHECK(verdict(mended, geometry).empty());
-        const std::vector<Vec3> back = to_world(mended, geometry);
+        const PointCloud corrected = read_points(path, options);
+        CHECK(verdict(corrected, geometry).empty());
+        const std::vector<Vec3> back = to_world(corrected, geometry);
         for (std::size_t n = 0; n < world.size(); ++n)
             for (int a = 0; a < 3; ++a) REQUIRE(back[n][a] == Approx(world[n][a]));
     };
@@ -170,7 +170,7 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
     });
 }
 
-TEST_CASE("numbers that are small in the image's unit are not taken for voxels") {
+TEST_CASE("Coordinates that are small in the image's unit are not taken for voxel indices") {
     // The points are in millimetres. Read as voxels, all of them would lie in the first voxel.
     ImageGeometry geometry = small_image();
     geometry.spacing = {1e-4, 1e-4, 5e-4};
@@ -182,7 +182,7 @@ TEST_CASE("numbers that are small in the image's unit are not taken for voxels")
     CHECK(verdict(cloud_of(points), geometry).find("Index") == std::string::npos);
 }
 
-TEST_CASE("marks of one slice do not say on which axis they were counted") {
+TEST_CASE("Marks in a single slice cause no warning about their interpretation") {
     ImageGeometry geometry = small_image();
     geometry.spacing = {0.1, 0.1, 0.4};
     std::vector<Vec3> points;

@@ -69,7 +69,7 @@ std::string read_error(const Scratch& scratch, const std::string& name, const st
 
 }  // namespace
 
-TEST_CASE("XYZ and CSV in the forms people save them in") {
+TEST_CASE("XYZ, CSV and TSV are read with common headers, separators, decimal commas and line ends") {
     const Scratch scratch;
     const struct {
         const char* name;
@@ -97,7 +97,7 @@ TEST_CASE("XYZ and CSV in the forms people save them in") {
     }
 }
 
-TEST_CASE("column names that mean voxels are understood as such") {
+TEST_CASE("Column names that denote voxels select voxel coordinates, and the options take precedence") {
     const Scratch scratch;
     const std::string napari =
         scratch.write("napari.csv", "index,axis-0,axis-1,axis-2\n0,3,2,1\n1,0.001,0.25,-4.5\n2,9,8,7\n");
@@ -115,7 +115,7 @@ TEST_CASE("column names that mean voxels are understood as such") {
     CHECK(cloud.space == PointSpace::Index);
 }
 
-TEST_CASE("the unit of a table's lengths is the cloud's, unless a scale is given") {
+TEST_CASE("The length unit in column names is the unit of the cloud, unless a scale is given") {
     const Scratch scratch;
     const std::string table = scratch.write("lengths.csv", "x (um),y (um),z (um)\n1,2,3\n");
     const PointCloud cloud = read_points(table);
@@ -131,7 +131,7 @@ TEST_CASE("the unit of a table's lengths is the cloud's, unless a scale is given
     CHECK(read_points(scratch.write("voxels.csv", "x_px,y_px,slice\n1,2,3\n")).unit.empty());
 }
 
-TEST_CASE("a column of kinds says which marks lie inside and outside") {
+TEST_CASE("A column of kinds separates surface, inside and outside marks, and other words are ignored") {
     const Scratch scratch;
     const std::vector<MarkKind> kinds{MarkKind::Surface, MarkKind::Inside, MarkKind::Outside};
     const std::string table = "structure,kind,x,y,z\na,surface,1,2,3\na, Inside ,-4.5,0.25,0.001\na,outside,7,8,9\n";
@@ -153,7 +153,7 @@ TEST_CASE("a column of kinds says which marks lie inside and outside") {
     }
 }
 
-TEST_CASE("marks of several structures keep their kinds; more than a label image holds are refused") {
+TEST_CASE("Marks of several structures keep their kinds, and more than 254 structures are rejected") {
     const Scratch scratch;
     const std::string table =
         "structure,kind,x,y,z\na,surface,1,2,3\nb,inside,4,5,6\na,outside,7,8,9\nb,surface,3,2,1\n";
@@ -171,7 +171,7 @@ TEST_CASE("marks of several structures keep their kinds; more than a label image
     CHECK_THROWS_WITH(read_structures_of_points(path, "cell"), Catch::Contains("at most 254"));
 }
 
-TEST_CASE("a selection of Fiji holds 16-bit pixels") {
+TEST_CASE("Writing marks: Fiji ROIs beyond 32766 pixels and unknown extensions are rejected") {
     const Scratch scratch;
     const ImageGeometry image;
     write_program_marks(scratch.path("near.roi"), {{{32000, 3, 1}, "a"}}, image);
@@ -180,7 +180,7 @@ TEST_CASE("a selection of Fiji holds 16-bit pixels") {
     CHECK_THROWS_WITH(write_program_marks(scratch.path("far.txt"), {}, image), Catch::Contains(".mrk.json"));
 }
 
-TEST_CASE("contours of slices are ordered, closed lines") {
+TEST_CASE("Columns slice and contour are read as ordered, closed lines") {
     const Scratch scratch;
     // The rows contain contour 0 of slices 3 and 4, and contour 1 of slice 3. The last row is out of order.
     const PointCloud cloud = read_points(scratch.write(
@@ -198,7 +198,7 @@ TEST_CASE("contours of slices are ordered, closed lines") {
     CHECK(cloud.rule.find("lines by slice and contour") != std::string::npos);
 }
 
-TEST_CASE("napari shapes are lines, closed or open by their type") {
+TEST_CASE("napari shapes are read as lines that are closed or open according to their type") {
     const Scratch scratch;
     const PointCloud cloud = read_points(
         scratch.write("shapes.csv",
@@ -229,7 +229,7 @@ TEST_CASE("napari shapes are lines, closed or open by their type") {
               .find("expected the 4 corners of an ellipse") != std::string::npos);
 }
 
-TEST_CASE("PLY in ascii and both byte orders, whatever else it holds") {
+TEST_CASE("PLY points are read in ASCII and both byte orders, among other elements and properties") {
     const Scratch scratch;
     for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
         INFO(format);
@@ -240,7 +240,7 @@ TEST_CASE("PLY in ascii and both byte orders, whatever else it holds") {
     }
 }
 
-TEST_CASE("OBJ and OFF give their vertices") {
+TEST_CASE("OBJ and OFF: the vertices are read as points") {
     const Scratch scratch;
     const std::string obj =
         "# cube\nmtllib a.mtl\nv 1 2 3\nvn 0 0 1\nv -4.5 0.25 0.001 0.5 0.5 0.5\nvt 0 0\nv 7 8 9\nf 1 2 3\n";
@@ -251,7 +251,7 @@ TEST_CASE("OBJ and OFF give their vertices") {
               .points == kThree);
 }
 
-TEST_CASE("errors name the file, the line, what was expected and what was found") {
+TEST_CASE("Errors of point files state the file, the line, what was expected and what was found") {
     const Scratch scratch;
     const auto contains = [](const std::string& message, const std::string& part) {
         INFO(message);
@@ -297,7 +297,7 @@ TEST_CASE("errors name the file, the line, what was expected and what was found"
              "vertex 0: expected finite numbers");
 }
 
-TEST_CASE("a PLY whose faces are cut off is truncated, though all its vertices are there") {
+TEST_CASE("A PLY with truncated faces is rejected, although all its vertices are present") {
     const Scratch scratch;
     const auto is_cut_off = [&](const std::string& whole, std::size_t missing) {
         return read_error(scratch, "a.ply", whole.substr(0, whole.size() - missing)).find("truncated") !=
@@ -317,7 +317,7 @@ TEST_CASE("a PLY whose faces are cut off is truncated, though all its vertices a
     for (std::size_t missing = 1; missing <= 26; ++missing) CHECK(is_cut_off(binary, missing));
 }
 
-TEST_CASE("damaged point files end in an Error, never in a crash") {
+TEST_CASE("Damaged PLY, OFF, CSV and OBJ point files never crash the reader") {
     const Scratch scratch;
     const auto read = [](const std::string& path) { (void)read_points(path); };
     for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
@@ -333,7 +333,7 @@ TEST_CASE("damaged point files end in an Error, never in a crash") {
     CHECK(fuzz(scratch, vertices, read).truncated_accepted == 0);
 }
 
-TEST_CASE("points survive writing and reading, to the last bit") {
+TEST_CASE("Points are written and read back bit for bit") {
     const Scratch scratch;
     const std::vector<Vec3> points = random_points(200, 2);
     for (const char* name : {"p.xyz", "p.csv", "p.ply"}) {
@@ -345,7 +345,7 @@ TEST_CASE("points survive writing and reading, to the last bit") {
     CHECK_THROWS_AS(write_points(scratch.path("p.stl"), points), Error);
 }
 
-TEST_CASE("index points go through the image's geometry") {
+TEST_CASE("Voxel coordinates are converted by the image's geometry, and rejected without an image") {
     ImageGeometry geometry;
     geometry.size = {10, 10, 10};
     geometry.spacing = {0.5, 0.5, 2};
@@ -358,7 +358,7 @@ TEST_CASE("index points go through the image's geometry") {
     CHECK_THROWS_AS(to_world(cloud), Error);
 }
 
-TEST_CASE("close points become one, the first stays and so does the order") {
+TEST_CASE("Close points are merged into the first of them, and the order is preserved") {
     const std::vector<Vec3> points{{0.9, 0, 0}, {0.1, 0, 0}, {0.9, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}};
     CHECK(merge_close_points(points, 0) ==
           std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}});
@@ -382,7 +382,7 @@ TEST_CASE("close points become one, the first stays and so does the order") {
         }
 }
 
-TEST_CASE("points sorted in space follow their neighbours, and thin by the same share everywhere") {
+TEST_CASE("Spatial order: neighbours follow each other, and thinning keeps the same fraction everywhere") {
     std::vector<Vec3> points = random_points(20000, 7);
     for (Vec3& p : points) p[0] *= p[0];  // denser on one side
     std::vector<std::uint32_t> order = order_spatially(points, points.size());
@@ -417,7 +417,7 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
     CHECK_THROWS_AS(order_spatially(points, 0), Error);
 }
 
-TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
+TEST_CASE("Spacing statistics are exact for a lattice, and equal brute force for clusters") {
     std::vector<Vec3> lattice;
     for (int i = 0; i < 12; ++i)
         for (int j = 0; j < 12; ++j)

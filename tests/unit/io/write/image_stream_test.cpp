@@ -107,7 +107,7 @@ std::map<std::string, std::string> files_of(const std::string& folder) {
 
 }  // namespace
 
-TEST_CASE("streamed images come back voxel by voxel, and each voxel is told of once") {
+TEST_CASE("Streamed images are read back exactly, and each written voxel is reported once") {
     const Scratch scratch;
     // The first image has several blocks of 256 KB, the second image has only one. Their sizes are not multiples of a
     // tile, chunk or block.
@@ -135,7 +135,7 @@ TEST_CASE("streamed images come back voxel by voxel, and each voxel is told of o
     }
 }
 
-TEST_CASE("streamed files are the same on any number of threads") {
+TEST_CASE("Streamed files are identical for 1 and 8 threads") {
     const Scratch scratch;
     const Balls<std::uint8_t> source(lattice({301, 290, 31}), PixelType::UInt8, true);
     RunContext one, eight;
@@ -156,7 +156,7 @@ TEST_CASE("streamed files are the same on any number of threads") {
     CHECK(a == b);
 }
 
-TEST_CASE("a BigTIFF has tiles, a classic one strips") {
+TEST_CASE("A BigTIFF is written in tiles, a classic TIFF in strips") {
     const Scratch scratch;
     const Balls<std::uint8_t> source(lattice({301, 290, 5}), PixelType::UInt8, true);
     const std::string path = scratch.path("a.tif");
@@ -171,7 +171,7 @@ TEST_CASE("a BigTIFF has tiles, a classic one strips") {
     }
 }
 
-TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, colours and names") {
+TEST_CASE("OME-Zarr: levels hold the most frequent label, empty chunks are omitted, colours and names are written") {
     class Named : public Balls<std::uint8_t> {
     public:
         using Balls::Balls;
@@ -214,7 +214,7 @@ TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, c
     CHECK(different == 0);
 }
 
-TEST_CASE("levels of grey values are means, of labels never") {
+TEST_CASE("Coarse levels are means of grey values, but the most frequent value of labels") {
     const std::array<std::uint8_t, 8> fine{0, 9, 9, 9, 4, 4, 4, 0};
     std::uint8_t coarse = 0;
     detail::coarsen(PixelType::UInt8, true, {2, 2, 2}, fine.data(), {2, 2, 2}, &coarse, {0, 0, 0}, {1, 1, 1});
@@ -223,7 +223,7 @@ TEST_CASE("levels of grey values are means, of labels never") {
     CHECK(coarse == 5);
 }
 
-TEST_CASE("a store takes the place of a store, never of another folder") {
+TEST_CASE("Writing a Zarr store replaces an existing store, but no other folder") {
     const Scratch scratch;
     const Balls<std::uint8_t> source(lattice({20, 20, 20}), PixelType::UInt8, true);
     const std::string path = scratch.path("a.zarr");
@@ -242,7 +242,7 @@ TEST_CASE("a store takes the place of a store, never of another folder") {
     CHECK(scratch.file_count() == 2);
 }
 
-TEST_CASE("what breaks off leaves nothing, and the old file as it was") {
+TEST_CASE("A failed write creates no file, and leaves an existing file unchanged") {
     class Breaking : public Balls<std::uint8_t> {
     public:
         using Balls::Balls;
@@ -268,7 +268,7 @@ TEST_CASE("what breaks off leaves nothing, and the old file as it was") {
     }
 }
 
-TEST_CASE("metadata that gets shorter is filled up, and what a format cannot hold is refused") {
+TEST_CASE("NRRD metadata that becomes shorter is padded, and NIfTI rejects more than 32767 voxels per axis") {
     class Shrinking : public Balls<std::uint8_t> {
     public:
         using Balls::Balls;
@@ -287,7 +287,7 @@ TEST_CASE("metadata that gets shorter is filled up, and what a format cannot hol
     CHECK(scratch.file_count() == 1);
 }
 
-TEST_CASE("voxels are spread over a larger lattice") {
+TEST_CASE("pad_rows moves voxels to their places in a larger lattice, and fills the others with 0") {
     std::vector<std::uint8_t> values{1, 2, 3, 4, 5, 6, 7, 8};
     values.resize(3 * 3 * 3, 0);
     detail::pad_rows({2, 2, 2}, {3, 3, 3}, 1, reinterpret_cast<char*>(values.data()));
