@@ -13,6 +13,7 @@
 #include "base/heuristics.h"
 #include "clip/clipped.h"
 #include "covol/error.h"
+#include "guess/dense_kernels.h"
 #include "guess/triharmonic.h"
 
 namespace covol::guess {
@@ -54,8 +55,8 @@ public:
         Matrix projected = qr_.householderQ().adjoint() * matrix_;
         projected = (projected * qr_.householderQ()).eval();
         const Index rest = size_ - kPolynomial;
-        factor_.compute(projected.bottomRightCorner(rest, rest));
-        if (factor_.info() != Eigen::Success)
+        factor_ = projected.bottomRightCorner(rest, rest);
+        if (!dense_kernels().cholesky(factor_.data(), rest))
             throw Error(
                 Errc::Numerical,
                 "guess: the equations for the marks have no unique solution; remove marks that nearly coincide");
@@ -68,7 +69,7 @@ public:
         Vector y = Vector::Zero(size_);
         y.head(values_) = values;
         Vector w = (qr_.householderQ().adjoint() * y).eval().tail(size_ - kPolynomial);
-        factor_.matrixL().solveInPlace(w);
+        factor_.triangularView<Eigen::Lower>().solveInPlace(w);
         constant = w.squaredNorm();
         return inverse_.triangularView<Eigen::Lower>().transpose() * w.tail(gradients_) -
                projection_.transpose() * (reflected_.transpose() * w);
@@ -80,7 +81,9 @@ public:
         y << values, gradients;
         Vector z = (qr_.householderQ().adjoint() * y).eval();
         z.head<kPolynomial>().setZero();
-        z.tail(size_ - kPolynomial) = factor_.solve(z.tail(size_ - kPolynomial).eval());
+        auto rest = z.tail(size_ - kPolynomial);
+        factor_.triangularView<Eigen::Lower>().solveInPlace(rest);
+        factor_.triangularView<Eigen::Lower>().adjoint().solveInPlace(rest);
         basis = qr_.householderQ() * z;
         const Vector left = qr_.householderQ().adjoint() * (y - matrix_ * basis).eval();
         polynomial = qr_.matrixQR().topLeftCorner<kPolynomial, kPolynomial>().triangularView<Eigen::Upper>().solve(
@@ -88,7 +91,7 @@ public:
     }
     [[nodiscard]] double log_determinant() const {
         double sum = 0;
-        for (Index i = 0; i < factor_.rows(); ++i) sum += 2 * std::log(factor_.matrixLLT()(i, i));
+        for (Index i = 0; i < factor_.rows(); ++i) sum += 2 * std::log(factor_(i, i));
         return sum;
     }
     [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
@@ -105,10 +108,11 @@ private:
         reflections.diagonal().setOnes();
         const Eigen::Matrix4d inner = inner_factor(reflections, qr_.hCoeffs());
         reflected_ = reflections.bottomRows(rest);
-        factor_.matrixL().solveInPlace(reflected_);
+        factor_.triangularView<Eigen::Lower>().solveInPlace(reflected_);
         projection_ = inner.transpose() * reflections.bottomRows(gradients_).transpose();
 
-        const auto triangle = factor_.matrixLLT().bottomRightCorner(gradients_, gradients_);
+        const auto triangle = factor_.bottomRightCorner(gradients_, gradients_);
+        const DenseKernels& dense = dense_kernels();
         inverse_ = Matrix::Zero(gradients_, gradients_);
         energy_.resize(gradients_, gradients_);
         constexpr Index kBlock = 64;
@@ -121,14 +125,14 @@ private:
         for_each_block([&](Index from, Index count, Index below) {
             auto columns = inverse_.block(from, from, below, count);
             columns.topRows(count).setIdentity();
-            triangle.bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(columns);
+            dense.solve_lower(&triangle(from, from), below, rest, &columns(0, 0), count, gradients_);
         });
         const Matrix mixed = inverse_.transpose() * reflected_.bottomRows(gradients_);  // S^T X
         const Matrix outer = 0.5 * (reflected_.transpose() * reflected_) * projection_ - mixed.transpose();
         for_each_block([&](Index from, Index count, Index below) {
             auto block = energy_.block(from, from, below, count);
-            block.noalias() =
-                inverse_.bottomRightCorner(below, below).transpose() * inverse_.block(from, from, below, count);
+            dense.transposed_product(&inverse_(from, from), gradients_, &inverse_(from, from), gradients_, below,
+                                     &block(0, 0), below, count, gradients_);
             block.noalias() += projection_.rightCols(below).transpose() * outer.middleCols(from, count);
             block.noalias() += outer.rightCols(below).transpose() * projection_.middleCols(from, count);
         });
@@ -167,7 +171,7 @@ private:
     Matrix matrix_, energy_;
     Matrix inverse_, reflected_, projection_;  ///< S, X and Y of whiten()
     Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, kPolynomial>> qr_;
-    Eigen::LLT<Matrix> factor_;
+    Matrix factor_;  ///< L in its lower triangle
 };
 
 Vector unit_vectors(const Vector& y) {
@@ -199,7 +203,8 @@ double energy_of(void* instance, const double* y_values, double* derivative, int
     const Eigen::Map<const Vector> y(y_values, size);
     Eigen::Map<Vector> out(derivative, size);
     const Vector unit = unit_vectors(y);
-    Vector q = problem.H * unit;
+    Vector q(size);
+    dense_kernels().times(problem.H.data(), size, unit.data(), q.data());
     const double energy = unit.dot(q) + 2 * problem.c.dot(unit);
     q += problem.c;
     for (int i = 0; i < size; i += 3) {

@@ -1,0 +1,44 @@
+// Compiled once for each instruction set (see lib/CMakeLists.txt). All functions of Eigen that this file instantiates
+// are in the namespace COVOL_EIGEN instead of Eigen: otherwise the linker would merge them with the functions of the
+// same names in other files, and a processor without AVX2 could run code that needs it.
+#define Eigen COVOL_EIGEN
+#include "guess/dense_kernels.h"
+
+#include <Eigen/Cholesky>
+
+namespace covol::guess::COVOL_SIMD_NAME {
+namespace {
+
+using Size = DenseKernels::Size;
+using Stride = Eigen::OuterStride<>;
+using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Stride>;
+using ConstMatrix = Eigen::Map<const Eigen::MatrixXd, 0, Stride>;
+
+bool cholesky(double* matrix, Size n) {
+    Eigen::Map<Eigen::MatrixXd> A(matrix, n, n);
+    return Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(A).info() == Eigen::Success;
+}
+
+void solve_lower(const double* L, Size n, Size L_stride, double* B, Size B_columns, Size B_stride) {
+    Matrix X(B, n, B_columns, Stride(B_stride));
+    ConstMatrix(L, n, n, Stride(L_stride)).triangularView<Eigen::Lower>().solveInPlace(X);
+}
+
+void transposed_product(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
+                        Size C_rows, Size C_columns, Size C_stride) {
+    Matrix(C, C_rows, C_columns, Stride(C_stride)).noalias() =
+        ConstMatrix(A, inner, C_rows, Stride(A_stride)).transpose() *
+        ConstMatrix(B, inner, C_columns, Stride(B_stride));
+}
+
+void times(const double* A, Size n, const double* x, double* y) {
+    Eigen::Map<Eigen::VectorXd>(y, n).noalias() =
+        Eigen::Map<const Eigen::MatrixXd>(A, n, n) * Eigen::Map<const Eigen::VectorXd>(x, n);
+}
+
+}  // namespace
+
+extern const DenseKernels kDenseKernels;
+const DenseKernels kDenseKernels{cholesky, solve_lower, transposed_product, times};
+
+}  // namespace covol::guess::COVOL_SIMD_NAME

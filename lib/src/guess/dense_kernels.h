@@ -1,0 +1,30 @@
+#pragma once
+// Dense linear algebra for systems of hundreds of marks: Eigen's, compiled once for each instruction set.
+#include <cstddef>
+
+namespace covol::guess {
+
+/// Matrices are stored by columns; `stride` is the distance between the first elements of successive columns. The
+/// results of the instruction sets differ by rounding.
+struct DenseKernels {
+    using Size = std::ptrdiff_t;
+
+    /// Replaces the lower triangle of an n x n matrix by its Cholesky factor L.
+    /// @return false if the matrix is not positive definite
+    bool (*cholesky)(double* matrix, Size n);
+
+    /// Solves L X = B for a lower triangular n x n matrix L. B, which has n rows, is replaced by X.
+    void (*solve_lower)(const double* L, Size n, Size L_stride, double* B, Size B_columns, Size B_stride);
+
+    /// C = A^T B. A and B have `inner` rows; A has as many columns as C has rows.
+    void (*transposed_product)(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
+                               Size C_rows, Size C_columns, Size C_stride);
+
+    /// y = A x for an n x n matrix A whose columns follow each other.
+    void (*times)(const double* A, Size n, const double* x, double* y);
+};
+
+/// The kernels of the instruction set that the solver uses, too: scheme/scheme.h.
+[[nodiscard]] const DenseKernels& dense_kernels();
+
+}  // namespace covol::guess
