@@ -9,6 +9,7 @@
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/points.h"
+#include "points/parts.h"
 
 namespace covol::cloud {
 
@@ -17,8 +18,13 @@ double finest_cell(const CloudScale& scale, std::size_t points) {
     return std::max(kOrientation.cell_spacings * apart, scale.noise);
 }
 
-double first_cell(const CloudScale& scale, std::size_t points) {
-    return std::max(finest_cell(scale, points), indicator_side(scale.part) / kOrientation.first_along);
+double part_side(const std::vector<Vec3>& points, const CloudScale& scale) {
+    if (points.empty() || !(scale.spacing > 0)) return 0;
+    return largest_part_side(points, kOrientation.first_along, kCloud.coarse * scale.spacing);
+}
+
+double first_cell(const CloudScale& scale, double part, std::size_t points) {
+    return std::max(finest_cell(scale, points), indicator_side(part) / kOrientation.first_along);
 }
 
 bool is_clean(const CloudScale& scale) { return scale.noise < kCloud.flat * scale.spacing; }
