@@ -27,11 +27,9 @@ using cloud::is_clean;
 using cloud::is_settled;
 using cloud::miss_reach;
 
-/// Fraction of the area of the indicator's surface that is farther from every point than kCloud.coarse times the
-/// spacing or the noise, whichever is larger.
+/// Fraction of the area of the indicator's surface that is farther from every point than coarse_cell().
 double bare_fraction(const CloudOrientation& cloud) {
-    const double reach = kCloud.coarse * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
+    return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, cloud::coarse_cell(cloud.scale));
 }
 
 bool does_enclose(const CloudOrientation& cloud) {

@@ -14,8 +14,8 @@
 namespace covol::cloud {
 
 double finest_cell(const CloudScale& scale, std::size_t points) {
-    const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.max_sampled));
-    return std::max(kOrientation.cell_spacings * apart, scale.noise);
+    const double sampled = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.max_sampled));
+    return std::max(kOrientation.cell_spacings * sampled, scale.noise);
 }
 
 double part_side(const std::vector<Vec3>& points, const CloudScale& scale) {
@@ -29,7 +29,9 @@ double first_cell(const CloudScale& scale, double part, std::size_t points) {
 
 bool is_clean(const CloudScale& scale) { return scale.noise < kCloud.flat * scale.spacing; }
 
-double miss_reach(const CloudScale& scale) { return kOrientation.passed_reach * std::max(scale.spacing, scale.noise); }
+double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
+double coarse_cell(const CloudScale& scale) { return kCloud.coarse * apart(scale); }
+double miss_reach(const CloudScale& scale) { return kOrientation.passed_reach * apart(scale); }
 
 double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kCloud.some); }
 bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }

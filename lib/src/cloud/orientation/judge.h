@@ -23,6 +23,11 @@ namespace covol::cloud {
 /// above or below it.
 [[nodiscard]] bool is_clean(const CloudScale& scale);
 
+/// Distance from which on points are not of one sheet: their spacing or, if that is larger, their noise; world units.
+[[nodiscard]] double apart(const CloudScale& scale);
+/// Edge of cells of which hardly any that the surface crosses is empty, world units: kCloud.coarse times apart(). A
+/// position farther than this from every point is bare.
+[[nodiscard]] double coarse_cell(const CloudScale& scale);
 /// Distance between a point and a surface above which the surface counts as missing the point, world units.
 [[nodiscard]] double miss_reach(const CloudScale& scale);
 
