@@ -54,7 +54,8 @@ struct GuessReport {
     std::string summary;  ///< one line for the user
 };
 
-/// Whether marks can enclose a body: at least four, not all in one plane.
+/// Whether marks can enclose a body: at least four, not all in one plane. Small parts that are more than about 10,000
+/// times their size apart count as marks in one plane.
 [[nodiscard]] COVOL_API bool can_enclose(const std::vector<Vec3>& marks);
 
 struct Guess {

@@ -40,7 +40,7 @@ struct CleanupStep {
 };
 struct CleanupReport {
     int self_intersections = 0;  ///< number of pairs of triangles before the repair
-    int holes_filled = 0;
+    int holes_filled = 0;        ///< including holes that the removal of self-intersections left
     bool closed = false, manifold = false, intersection_free = false;  ///< of the mesh after all steps
     std::optional<CleanupStep> decimation, smoothing;
 };

@@ -15,9 +15,6 @@ struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation of the points from the surface, along its normal
     double nearest = 0;  ///< median distance to the nearest other point
-    /// longest side of the bounding box of the cloud or, if the cloud consists of parts that are far apart compared to
-    /// their size, of its largest part
-    double part = 0;
     /// for groups of a point and its eleven nearest neighbours: the median radius of the groups, and the median of the
     /// standard deviation of a group's points from a quadric fitted to them. The second is 0.33 of the first if the
     /// points fill a ball.

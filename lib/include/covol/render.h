@@ -90,8 +90,8 @@ inline constexpr auto kOptions<RenderOptions> = std::tuple{
                         }}};
 
 /// Draws a figure with three parts: the surfaces, shaded by the gradient of smoothed level sets, with marks, axes and a
-/// scale bar; slices of the image in true proportions, with the structures' outlines, the marks within half a slice and
-/// a scale bar; and a legend. The same input gives the same picture for any number of threads.
+/// scale bar; slices of the image in true proportions, with the structures' outlines, the marks within half a voxel of
+/// the slice and a scale bar; and a legend. The same input gives the same picture for any number of threads.
 /// @throws Error InvalidOptions; InvalidInput (no structure, a grid without voxels at a surface or with voxels that are
 ///     not cubes, slices without an image); Cancelled; whatever reading the image throws.
 [[nodiscard]] COVOL_API Picture render(const RenderScene& scene, const RenderOptions& options = {},

@@ -11,8 +11,8 @@ namespace {
 
 using Size = DenseKernels::Size;
 using Stride = Eigen::OuterStride<>;
-using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Stride>;
-using ConstMatrix = Eigen::Map<const Eigen::MatrixXd, 0, Stride>;
+using Strided = Eigen::Map<Eigen::MatrixXd, 0, Stride>;
+using ConstStrided = Eigen::Map<const Eigen::MatrixXd, 0, Stride>;
 
 bool cholesky(double* matrix, Size n) {
     Eigen::Map<Eigen::MatrixXd> A(matrix, n, n);
@@ -20,15 +20,15 @@ bool cholesky(double* matrix, Size n) {
 }
 
 void solve_lower(const double* L, Size n, Size L_stride, double* B, Size B_columns, Size B_stride) {
-    Matrix X(B, n, B_columns, Stride(B_stride));
-    ConstMatrix(L, n, n, Stride(L_stride)).triangularView<Eigen::Lower>().solveInPlace(X);
+    Strided X(B, n, B_columns, Stride(B_stride));
+    ConstStrided(L, n, n, Stride(L_stride)).triangularView<Eigen::Lower>().solveInPlace(X);
 }
 
 void transposed_product(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
                         Size C_rows, Size C_columns, Size C_stride) {
-    Matrix(C, C_rows, C_columns, Stride(C_stride)).noalias() =
-        ConstMatrix(A, inner, C_rows, Stride(A_stride)).transpose() *
-        ConstMatrix(B, inner, C_columns, Stride(B_stride));
+    Strided(C, C_rows, C_columns, Stride(C_stride)).noalias() =
+        ConstStrided(A, inner, C_rows, Stride(A_stride)).transpose() *
+        ConstStrided(B, inner, C_columns, Stride(B_stride));
 }
 
 void times(const double* A, Size n, const double* x, double* y) {

@@ -6,7 +6,7 @@
 
 namespace covol::guess {
 
-/// Whether marks can enclose a body: at least four, not all in one plane.
+/// can_enclose()
 [[nodiscard]] bool span_space(const std::vector<Vec3>& marks);
 
 /// Points on the ellipsoid around the marks whose axes follow the covariance of their positions; `times` is its size,

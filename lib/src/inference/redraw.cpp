@@ -10,6 +10,7 @@
 
 #include "base/geometry.h"
 #include "base/heuristics.h"
+#include "base/number.h"
 #include "covol/domain.h"
 #include "covol/inference.h"
 #include "covol/start.h"
@@ -254,6 +255,12 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
     with_threads(run, [&] {
         // The guess is clamped, so that the distance by which a mark is missed has to be measured again.
         const Solid wide = solid_of(*guess, geometry, around(geometry, misses, kInference.farthest_miss * voxel));
+        if (std::count(wide.inside.begin(), wide.inside.end(), wide.inside.front()) ==
+            std::ptrdiff_t(wide.inside.size())) {
+            result.reason = "no surface of the guess was found within " + detail::number(kInference.farthest_miss) +
+                            " voxels of the marks that it misses";
+            return;
+        }
         const Field distance = signed_distance(wide.lattice, wide.inside);
         for (Miss& miss : misses) miss.off = std::max(std::abs(wide.lattice.value(distance, miss.place)), miss.off);
         std::erase_if(misses, [&](const Miss& miss) { return miss.off <= missed; });

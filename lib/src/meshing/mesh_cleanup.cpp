@@ -100,18 +100,21 @@ TriangleMesh from_surface_mesh(SurfaceMesh& source, const Vec3& origin) {
     return mesh;
 }
 
+/// @return the number of holes that were filled, without those for which CGAL finds no triangulation
 int fill_holes(SurfaceMesh& mesh) {
     std::vector<SurfaceMesh::Halfedge_index> borders;
     pmp::extract_boundary_cycles(mesh, std::back_inserter(borders));
+    int filled = 0;
     for (const auto border : borders) {
         std::vector<SurfaceMesh::Face_index> patch;
         pmp::triangulate_hole(mesh, border, std::back_inserter(patch));
+        filled += !patch.empty();
     }
-    return int(borders.size());
+    return filled;
 }
 
 /// Fills holes, separates parts of the surface at non-manifold vertices, and removes self-intersections. @return the
-/// number of holes before the removal of self-intersections, which may leave new holes that are filled, too
+/// number of filled holes, including those that the removal of self-intersections left
 int repair(SurfaceMesh& mesh) {
     pmp::stitch_borders(mesh);
     pmp::duplicate_non_manifold_vertices(mesh);
@@ -121,7 +124,7 @@ int repair(SurfaceMesh& mesh) {
         pmp::experimental::remove_self_intersections(mesh, CGAL::parameters::preserve_genus(false));
         pmp::stitch_borders(mesh);
         pmp::duplicate_non_manifold_vertices(mesh);
-        fill_holes(mesh);
+        holes += fill_holes(mesh);
     }
     if (CGAL::is_closed(mesh) && !pmp::does_self_intersect(mesh)) pmp::orient_to_bound_a_volume(mesh);
     return holes;

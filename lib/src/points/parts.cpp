@@ -12,7 +12,7 @@ namespace covol::cloud {
 namespace {
 
 /// The points of the part with the longest side. Cells that are adjacent belong to the same part.
-std::vector<Vec3> largest_part(const PointCells& cells) {
+std::vector<Vec3> largest_of(const PointCells& cells) {
     const std::size_t count = cells.cell_count();
     std::vector<std::uint32_t> cell_of(cells.sorted().size());
     for (std::uint32_t n = 0; n < count; ++n)
@@ -37,18 +37,30 @@ std::vector<Vec3> largest_part(const PointCells& cells) {
     return std::move(grouped[largest]);
 }
 
+/// The points of largest_part(), or none if the cloud is in one part, and the longest side of their box.
+struct LargestPart {
+    LargestPart(const std::vector<Vec3>& all, double resolution, double edge) : side(longest_side(bounding_box(all))) {
+        while (side > resolution * edge) {
+            std::vector<Vec3> next = largest_of(PointCells(points.empty() ? all : points, side / resolution));
+            const double longest = longest_side(bounding_box(next));
+            if (kCommon.clear_ratio * longest > side) break;
+            points = std::move(next);
+            side = longest;
+        }
+    }
+    std::vector<Vec3> points;
+    double side;
+};
+
 }  // namespace
 
 double largest_part_side(const std::vector<Vec3>& points, double resolution, double edge) {
-    double side = longest_side(bounding_box(points));
-    std::vector<Vec3> part;
-    while (side > resolution * edge) {
-        part = largest_part(PointCells(part.empty() ? points : part, side / resolution));
-        const double longest = longest_side(bounding_box(part));
-        if (kCommon.clear_ratio * longest > side) break;
-        side = longest;
-    }
-    return side;
+    return LargestPart(points, resolution, edge).side;
+}
+
+std::vector<Vec3> largest_part(const std::vector<Vec3>& points, double resolution, double edge) {
+    LargestPart part(points, resolution, edge);
+    return part.points.empty() ? points : std::move(part.points);
 }
 
 }  // namespace covol::cloud

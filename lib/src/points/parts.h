@@ -12,4 +12,7 @@ namespace covol::cloud {
 /// @param edge  minimum edge of a cell, world units, > 0: large enough for neighbouring points to be in adjacent cells
 [[nodiscard]] double largest_part_side(const std::vector<Vec3>& points, double resolution, double edge);
 
+/// The points of that part; all points if the cloud is in one part.
+[[nodiscard]] std::vector<Vec3> largest_part(const std::vector<Vec3>& points, double resolution, double edge);
+
 }  // namespace covol::cloud

@@ -225,11 +225,10 @@ private:
     }
 
     void draw_marks(const std::vector<Vec3>& marks, const Color& color) const {
-        const double thick = *std::max_element(geometry_.spacing.begin(), geometry_.spacing.end());
         std::vector<std::array<double, 2>> places;
         for (const Vec3& mark : marks) {
             const Vec3 index = geometry_.world_to_index(mark);
-            if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] <= 0.5 * thick)
+            if (std::abs(index[plane_.axis] - plane_.index) <= 0.5)
                 places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
         }
         // Draws only every n-th mark if there are very many, because they would hide the outline.

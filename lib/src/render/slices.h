@@ -62,9 +62,9 @@ struct SliceStyle {
     double mark_radius = 3;              ///< pixels
 };
 
-/// Draws the plane's part that lies in the region: the image, the outlines, the marks whose distance from the plane is
-/// at most half of the image's largest spacing, the plane's name, and letters of the directions at its edges if the
-/// axes are anatomical.
+/// Draws the plane's part that lies in the region: the image, the outlines, the marks that are at most half a voxel
+/// from the plane along its axis, the plane's name, and letters of the directions at its edges if the axes are
+/// anatomical.
 void draw_slice(Canvas& canvas, const Rect& at, const Plane& plane, const Region& region, const RenderScene& scene,
                 const SliceStyle& style, const RunContext& run);
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
+#include <utility>
 
 #include "base/disjoint_sets.h"
 #include "base/heuristics.h"
@@ -204,12 +205,17 @@ private:
         });
     }
 
-    /// The positions of blocks along an axis, in units of blocks, at which the space is examined: those of leaves, and
-    /// the adjacent ones, which represent the ranges without leaves, in which no surface lies.
-    [[nodiscard]] std::vector<int> positions(int axis) const {
-        std::vector<int> all;
-        for (const Leaf* leaf : leaves_)
-            for (int beside = -1; beside <= 1; ++beside) all.push_back(leaf->origin()[axis] / kDim + beside);
+    /// The positions along i and j, in units of blocks, of the rows that are examined, in this order: those with
+    /// leaves, and the four beside each of them. A row without leaves lies in the surrounding space, because surfaces
+    /// are closed; rows between such rows need not be examined.
+    [[nodiscard]] std::vector<std::pair<int, int>> row_positions() const {
+        std::vector<std::pair<int, int>> all;
+        for (std::size_t n = 0; n < leaves_.size(); ++n) {
+            const Coord& at = leaves_[n]->origin();
+            if (n > 0 && leaves_[n - 1]->origin().x() == at.x() && leaves_[n - 1]->origin().y() == at.y()) continue;
+            const int i = at.x() / kDim, j = at.y() / kDim;
+            all.insert(all.end(), {{i - 1, j}, {i, j - 1}, {i, j}, {i, j + 1}, {i + 1, j}});
+        }
         std::sort(all.begin(), all.end());
         all.erase(std::unique(all.begin(), all.end()), all.end());
         return all;
@@ -218,42 +224,45 @@ private:
     /// Finds the gaps before, between and after the leaves of each row of blocks; each gap has one sign.
     void find_gaps() {
         if (leaves_.empty()) return;
-        const std::vector<int> along_i = positions(0), along_j = positions(1), along_k = positions(2);
-        columns_ = along_j.size();
-        const int low = along_k.front(), high = along_k.back();
+        const auto [lowest, highest] =
+            std::minmax_element(leaves_.begin(), leaves_.end(),
+                                [](const Leaf* x, const Leaf* y) { return x->origin().z() < y->origin().z(); });
+        const int low = (*lowest)->origin().z() / kDim - 1, end = (*highest)->origin().z() / kDim + 2;
         const auto values = level_set_.getConstAccessor();
         std::size_t next = 0;
-        for (const int i : along_i)
-            for (const int j : along_j) {
-                Row row{i, j, next, next, {}};
-                int from = low;
-                const auto add_gap = [&](int to) {
-                    if (from < to)
-                        row.gaps.push_back(
-                            {from, to, new_label(values.getValue({kDim * i, kDim * j, kDim * from}) < 0)});
-                };
-                for (; next < leaves_.size() && leaves_[next]->origin().x() == kDim * i &&
-                       leaves_[next]->origin().y() == kDim * j;
-                     ++next) {
-                    const int k = leaves_[next]->origin().z() / kDim;
-                    add_gap(k);
-                    from = k + 1;
-                }
-                row.last = next;
-                add_gap(high + 1);
-                const bool is_around =
-                    i == along_i.front() || i == along_i.back() || j == along_j.front() || j == along_j.back();
-                for (const Gap& gap : row.gaps)
-                    if (!is_inside_[gap.label] && (is_around || gap.begin == low || gap.end == high + 1))
-                        unite(kAround, gap.label);
-                rows_.push_back(std::move(row));
+        for (const auto& at : row_positions()) {
+            Row row{at.first, at.second, next, next, {}};
+            int from = low;
+            const auto add_gap = [&](int to) {
+                if (from < to)
+                    row.gaps.push_back(
+                        {from, to, new_label(values.getValue({kDim * row.i, kDim * row.j, kDim * from}) < 0)});
+            };
+            for (; next < leaves_.size() && leaves_[next]->origin().x() == kDim * row.i &&
+                   leaves_[next]->origin().y() == kDim * row.j;
+                 ++next) {
+                const int k = leaves_[next]->origin().z() / kDim;
+                add_gap(k);
+                from = k + 1;
             }
+            row.last = next;
+            add_gap(end);
+            for (const Gap& gap : row.gaps)
+                if (!is_inside_[gap.label] && (gap.begin == low || gap.end == end)) unite(kAround, gap.label);
+            rows_.push_back(std::move(row));
+        }
     }
 
     void join() {
+        const auto is_at = [&](std::size_t n, int i, int j) {
+            return n < rows_.size() && rows_[n].i == i && rows_[n].j == j;
+        };
+        std::size_t beyond = 0;  // the first row that is not before the position next to rows_[n] along i
         for (std::size_t n = 0; n < rows_.size(); ++n) {
-            if (n + columns_ < rows_.size()) join_rows(rows_[n], rows_[n + columns_], 0);
-            if ((n + 1) % columns_ != 0) join_rows(rows_[n], rows_[n + 1], 1);
+            const int i = rows_[n].i, j = rows_[n].j;
+            while (beyond < rows_.size() && std::pair{rows_[beyond].i, rows_[beyond].j} < std::pair{i + 1, j}) ++beyond;
+            if (is_at(beyond, i + 1, j)) join_rows(rows_[n], rows_[beyond], 0);
+            if (is_at(n + 1, i, j + 1)) join_rows(rows_[n], rows_[n + 1], 1);
         }
         for (const Row& row : rows_) {
             for (std::size_t n = row.first; n + 1 < row.last; ++n)
@@ -370,8 +379,7 @@ private:
     FloatGrid& level_set_;
     std::vector<Leaf*> leaves_;  // sorted by origin
     std::vector<std::array<Label, kVoxels>> labels_;
-    std::vector<Row> rows_;    // for each position along i, the rows at all positions along j
-    std::size_t columns_ = 0;  // number of positions along j
+    std::vector<Row> rows_;  // in the order of row_positions()
     std::vector<Label> parents_;
     std::vector<char> is_inside_;
     std::vector<std::size_t> surface_;  // number of active voxels of each region

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 
 #include "covol/error.h"
+#include "covol/evolve.h"
 #include "covol/start.h"
 #include "redistance/redistance.h"
 #include "support/clouds.h"
@@ -70,6 +72,44 @@ Difference difference(const FloatGrid& one, const FloatGrid& other) {
     return result;
 }
 
+/// A cube of 16^3 voxels. The plane x = kPlane lies midway between two voxels of one leaf.
+const Domain kCube = make_domain({{-4, -4, -4}, {4, 4, 4}}, kH);
+constexpr double kPlane = 1;
+
+/// A grid with a value at each voxel of kCube, all of them active. @param value  function of x
+FloatGridPtr over_cube(const std::function<double(double)>& value, const char* name) {
+    FloatGridPtr grid = make_grid(kCube, float(value(kCube.world_box().max[0])), name);
+    const openvdb::CoordBBox box({kCube.min[0], kCube.min[1], kCube.min[2]},
+                                 {kCube.max[0], kCube.max[1], kCube.max[2]});
+    for (auto voxel = box.begin(); voxel; ++voxel)
+        grid->tree().setValue(*voxel, float(value(world_of(kCube, *voxel)[0])));
+    return grid;
+}
+
+/// |grad u| at the plane, in the middle of the cube.
+double slope_at_plane(const FloatGrid& u) {
+    const openvdb::Coord below(9, 8, 8), above(10, 8, 8);
+    REQUIRE(world_of(kCube, below)[0] < kPlane);
+    REQUIRE(world_of(kCube, above)[0] > kPlane);
+    const double low = u.tree().getValue(below), high = u.tree().getValue(above);
+    CHECK(low / (low - high) == Approx(0.5).margin(1e-3));  // the surface has not moved
+    return (high - low) / kH;
+}
+
+/// u after some steps of a flow with a tracked band, from the distance to the plane.
+FloatGridPtr tracked(const EvolveFields& fields, double theta, double delta, int steps) {
+    const FloatGridPtr u = over_cube([](double x) { return std::clamp(x - kPlane, -kClamp * kH, kClamp * kH); }, "u");
+    EvolveOptions options;
+    options.theta = theta;
+    options.rho = options.tolerance = 0;
+    options.delta = delta;
+    options.tau = kH;
+    options.follow = true;
+    options.max_steps = steps;
+    CHECK(evolve(*u, fields, options).steps == steps);
+    return u;
+}
+
 }  // namespace
 
 TEST_CASE("track_surface: a band of any slope and width agrees with exact distances to first order") {
@@ -129,6 +169,35 @@ TEST_CASE("track_free_surface: the surface stays in place, and the band contains
     const openvdb::Coord corner(int(std::lround(beyond[0])), int(std::lround(beyond[1])), int(std::lround(beyond[2])));
     CHECK_FALSE(values.isValueOn(corner));
     CHECK(std::abs(values.getValue(corner) - level(world_of(kDomain, corner))) < kH / kRadius);
+}
+
+// The band is examined in each third step.
+TEST_CASE("A free band is rebuilt if |grad u| on its surface is below 1/2 or above 2, otherwise it stays as it is") {
+    const double slope = GENERATE(0.25, 0.6, 1.7, 8.0);
+    INFO("slope " << slope);
+    // An obstacle and a floor with the same values hold u to them, so that the slope changes, but the surface does not
+    // move.
+    const FloatGridPtr held = over_cube([&](double x) { return slope * (x - kPlane); }, "obstacle");
+    EvolveFields fields;
+    fields.obstacle = fields.floor = held.get();
+    CHECK(slope_at_plane(*tracked(fields, 0, kH, 2)) == Approx(slope));
+    const FloatGridPtr u = tracked(fields, 0, kH, 3);
+    const bool is_rebuilt = slope < detail::kFlattest || slope > detail::kSteepest;
+    CHECK(slope_at_plane(*u) == Approx(is_rebuilt ? 1 : slope).margin(1e-3));
+    double maximum = 0;
+    for (auto value = u->cbeginValueOn(); value; ++value) {
+        const double x = world_of(kCube, value.getCoord())[0];
+        maximum = std::max(maximum, std::abs(double(*value) - (is_rebuilt ? 1 : slope) * (x - kPlane)) / kH);
+    }
+    CHECK(maximum < 0.1);
+}
+
+TEST_CASE("The level set of a surface held by points is redistanced once |grad u| on it is above 2") {
+    const FloatGridPtr distance = over_cube([](double x) { return std::abs(x - kPlane); }, "distance");
+    EvolveFields fields;
+    fields.distance = distance.get();
+    CHECK(slope_at_plane(*tracked(fields, 1, 0, 2)) > detail::kSteepest);
+    CHECK(slope_at_plane(*tracked(fields, 1, 0, 3)) == Approx(1).margin(0.05));
 }
 
 TEST_CASE("track_surface: a level set without a surface is rejected and unchanged") {

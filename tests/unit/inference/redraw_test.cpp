@@ -117,6 +117,17 @@ TEST_CASE("A guess is not redrawn from an image of noise, nor if its surface pas
     CHECK_FALSE(passed.used);
 }
 
+TEST_CASE("A guess without a surface near the marks that it misses is not redrawn") {
+    const auto in_corner = [](const Vec3& p) { return std::hypot(p[0] - 4, p[1] - 4, p[2] - 4) < 2.5; };
+    Domain domain;
+    domain.max = {kSize - 1, kSize - 1, kSize - 1};
+    const FloatGridPtr given = start_from_mask(domain, mask_of(in_corner));
+    const Redrawn redrawn = redraw(given, {{38, 38, 38}}, picture(6));
+    CHECK_FALSE(redrawn.used);
+    CHECK(redrawn.u == given);
+    CHECK_THAT(redrawn.reason, Catch::Contains("no surface of the guess was found within 30 voxels"));
+}
+
 TEST_CASE("Redrawing does not add a bright ball that is separate from the missing part") {
     // A second, equally bright ball, which is near the missing part but separate from it, must not be added.
     const Vec3 other{kMiddle[0] + kRadius + 4, kMiddle[1], kMiddle[2]};

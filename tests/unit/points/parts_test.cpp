@@ -1,5 +1,6 @@
 #include "points/parts.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "covol/points.h"
@@ -23,6 +24,7 @@ TEST_CASE("A cloud without gaps is one part") {
     const std::vector<Vec3> ball = test::sphere_cloud(3000, 1, 1);
     CHECK(largest_part_side(ball, 10, kEdge) == longest_side(bounding_box(ball)));
     CHECK(largest_part_side({{1, 2, 3}}, 10, kEdge) == 0);
+    CHECK(largest_part(ball, 10, kEdge) == ball);
 }
 
 TEST_CASE("Distant parts of a cloud are measured one by one, by repeated division") {
@@ -33,6 +35,10 @@ TEST_CASE("Distant parts of a cloud are measured one by one, by repeated divisio
     cloud = joined(cloud, test::sphere_cloud(3000, 0.8, 4, {1e5, 2e5, 0}));
     cloud = joined(cloud, test::sphere_cloud(3000, 0.7, 5, {1e5, 2e5, 300}));
     CHECK(largest_part_side(cloud, 192, kEdge) == side);
+    std::vector<Vec3> part = largest_part(cloud, 192, kEdge), whole = ball;  // the part is in another order
+    std::sort(part.begin(), part.end());
+    std::sort(whole.begin(), whole.end());
+    CHECK(part == whole);
 }
 
 TEST_CASE("Parts are not separated if the gap is narrower than a cell or a part is over half of the whole") {

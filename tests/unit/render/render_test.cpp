@@ -333,6 +333,38 @@ TEST_CASE("Frames of a rotation differ and have the same scale") {
     CHECK(bars.size() == 1);
 }
 
+TEST_CASE("A slice shows the marks within half a voxel along its own axis, however thick the voxels are along others") {
+    ImageGeometry geometry;
+    geometry.size = {20, 20, 6};
+    geometry.spacing = {1, 1, 5};
+    const Image image = make_image(geometry, [](const Vec3&) { return 0.0F; });
+    RenderScene scene;
+    scene.image = &image;
+    const auto is_drawn = [&](int axis, double index, const Vec3& mark) {
+        scene.marks = {mark};
+        const figure::Plane plane = figure::plane_across(axis, index, scene);
+        const figure::Region region{{-0.5, -0.5, -0.5}, {19.5, 19.5, 5.5}};
+        const Rect at{0, 0, 200, 200};
+        figure::SliceStyle style;
+        style.pixel = 0.25;
+        figure::Canvas canvas(at.width, at.height, figure::gray(0));
+        figure::draw_slice(canvas, at, plane, region, scene, style, {});
+        const auto [x, y] = figure::place_on(at, plane, region, style.pixel, geometry.world_to_index(mark), geometry);
+        const std::array<int, 3> color = pixel(canvas.picture(), int(x), int(y));
+        return color[2] > color[0] + 80;
+    };
+    for (const int axis : {0, 1})
+        for (const auto& [off, expected] :
+             {std::pair{0.0, true}, {0.45, true}, {-0.45, true}, {0.6, false}, {-2.0, false}}) {
+            INFO("axis " << axis << ", " << off << " voxels");
+            Vec3 mark{10, 10, 10};
+            mark[axis] += off;
+            CHECK(is_drawn(axis, 10, mark) == expected);
+        }
+    CHECK(is_drawn(2, 2, {10, 10, 12.4}));
+    CHECK_FALSE(is_drawn(2, 2, {10, 10, 12.6}));
+}
+
 TEST_CASE("A composed figure has no empty quarter, shows marks, and is identical for any number of threads") {
     const Vec3 center{20, 18, 22};
     const FloatGridPtr ball = make_ball(center, 9, 1);

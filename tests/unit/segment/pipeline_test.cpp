@@ -210,6 +210,21 @@ TEST_CASE("segment: missing points and invalid options are errors") {
     CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
 }
 
+TEST_CASE("segment: points that enclose nothing, and parts too far apart, are refused for what they are") {
+    const auto in_two_places = [](const std::vector<Vec3>& points, const Vec3& second) {
+        std::vector<Vec3> both = points;
+        for (const Vec3& p : points) both.push_back({p[0] + second[0], p[1] + second[1], p[2] + second[2]});
+        return both;
+    };
+    std::vector<Vec3> line;
+    for (int n = 0; n < 50; ++n) line.push_back({0.5 * n, 0.25 * n, 0});
+    for (const auto& points : {line, in_two_places(line, {10000, 5000, 0})})
+        CHECK_THROWS_WITH((void)reconstruct(points), Catch::Contains("the points lie on a line"));
+    // Two balls, 15,000 radii apart.
+    CHECK_THROWS_WITH((void)reconstruct(in_two_places(sphere_points(3000), {15000 * kRadius, 0, 0})),
+                      Catch::Contains("parts that are far apart compared to their size: the largest part is 16 long"));
+}
+
 TEST_CASE("segment: a region of the image, and another cloud, give a surface on the same lattice") {
     const Image image = ball_image(1.0);
     SegmentOptions options;

@@ -44,6 +44,20 @@ std::vector<Vec3> on_small(const Vec3& center, double off = 0) {
 }
 const std::vector<Vec3> on_main = test::sphere_cloud(500, 0.8, 1);
 
+/// Adds a ball to a narrow band. @param center  voxel at its centre
+void add_ball(FloatGrid& grid, const openvdb::Coord& center, double radius) {
+    const double limit = grid.background();
+    const int reach = int((radius + limit) / kVoxel) + 1;
+    for (const openvdb::Coord& at : openvdb::CoordBBox(center.offsetBy(-reach), center.offsetBy(reach))) {
+        const double u = kVoxel * (at - center).asVec3d().length() - radius;
+        if (u >= limit) continue;
+        if (u > -limit)
+            grid.tree().setValueOn(at, float(u));
+        else
+            grid.tree().setValueOff(at, float(-limit));
+    }
+}
+
 }  // namespace
 
 TEST_CASE("Pieces and cavities with points on them are kept") {
@@ -89,6 +103,20 @@ TEST_CASE("Only the piece without points is removed, and the other surfaces are 
                 std::max(farthest, std::min(std::abs(ball(p, {0, 0, 0}, 0.8)), std::abs(ball(p, kCavity, kSmall))));
         }
         CHECK(farthest < 0.2 * kVoxel);
+    }
+}
+
+TEST_CASE("pieces along a diagonal, far apart: those without points go, except the largest") {
+    const FloatGridPtr grid = FloatGrid::create(float(3 * kVoxel));
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(kVoxel));
+    constexpr int kBalls = 200, kMarked = 3;
+    const auto center = [](int n) { return openvdb::Coord(40 * n, 56 * n, -72 * n); };
+    for (int n = 0; n < kBalls; ++n) add_ball(*grid, center(n), n == 0 ? 2 * kSmall : kSmall);
+    const openvdb::Vec3d marked = grid->indexToWorld(center(kMarked));
+    CHECK(detail::drop_bare_pieces(*grid, on_small({marked[0], marked[1], marked[2]}), 1) == kBalls - 2);
+    for (int n = 0; n < kBalls; ++n) {
+        INFO("ball " << n);
+        CHECK((grid->tree().getValue(center(n)) < 0) == (n == 0 || n == kMarked));
     }
 }
 

@@ -7,6 +7,7 @@
 #include "cloud/indicator/consistency.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
+#include "cloud/orientation/attempts.h"
 #include "cloud/orientation/filled.h"
 #include "cloud/orientation/given_sides.h"
 #include "cloud/orientation/heuristics.h"
@@ -21,17 +22,14 @@ namespace covol {
 namespace {
 
 using cloud::doubt;
-using cloud::first_cell;
 using cloud::fraction_missed;
 using cloud::is_clean;
 using cloud::is_settled;
 using cloud::miss_reach;
 
-/// Fraction of the area of the indicator's surface that is farther from every point than kCloud.coarse times the
-/// spacing or the noise, whichever is larger.
+/// Fraction of the area of the indicator's surface that is farther from every point than coarse_cell().
 double bare_fraction(const CloudOrientation& cloud) {
-    const double reach = kCloud.coarse * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, reach);
+    return cloud::bare_fraction(*cloud.orientation.indicator, cloud.points, cloud::coarse_cell(cloud.scale));
 }
 
 bool does_enclose(const CloudOrientation& cloud) {
@@ -41,13 +39,13 @@ bool does_enclose(const CloudOrientation& cloud) {
 }
 /// Recomputes the indicator with smaller cells if its cells are too large for the detail of the normals, or if the
 /// orientation is not settled and the surface misses many points.
-void refine(CloudOrientation& cloud, const RunContext& run) {
+/// @param first_cell  cell size of the first attempt of orient()
+void refine(CloudOrientation& cloud, double first_cell, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double spacing = cloud.scale.spacing;
     // If the orientation is settled, the cells may be as small as the points allow; otherwise they are those of the
     // first attempt of orient().
-    const double first = is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size())
-                                       : first_cell(cloud.scale, cloud.points.size());
+    const double first = is_settled(o) ? cloud::finest_cell(cloud.scale, cloud.points.size()) : first_cell;
     const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && is_clean(cloud.scale) &&
@@ -58,7 +56,8 @@ void refine(CloudOrientation& cloud, const RunContext& run) {
 /// For sheets, as in scans of one side or from the air: orients neighbours to the same side, and each connected part to
 /// the side from which most of its points are seen. @return whether this is used: the normals are consistent, and the
 /// surface misses no more points than the current one
-bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunContext& run) {
+/// @param cell  cell size of the indicator's grid
+bool choose_by_propagation(CloudOrientation& cloud, double cell, double reach, const RunContext& run) {
     // If the noise is not small compared to the spacing, nearest neighbours may lie above one another instead of beside
     // one another, and quadrics form handles in regions without points.
     if (!is_clean(cloud.scale)) return false;
@@ -66,8 +65,7 @@ bool choose_by_propagation(CloudOrientation& cloud, double reach, const RunConte
     hints.normals = cloud::propagated_normals(cloud.points, cloud.scale, cloud.scale.spacing,
                                               cloud::towards_sky(cloud.points, cloud.scale));
     hints.is_outward = true;
-    cloud::GivenSides sheets =
-        cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points.size()), run);
+    cloud::GivenSides sheets = cloud::given_sides(cloud.points, hints, cloud.scale, cell, run);
     if (!sheets.report.used || sheets.torn > kCloud.few) return false;
     cloud::add_screened(cloud.points, cloud.scale, {}, nullptr, sheets.orientation, run);
     if (fraction_missed(*sheets.orientation.screened, cloud.points, reach) >
@@ -113,10 +111,10 @@ bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::Give
 
 /// Orients the cloud by the hints if they are consistent and a reliable orientation does not contradict them, otherwise
 /// by the points alone, and by propagation or views if the points then enclose nothing.
-void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunContext& run) {
-    const auto checked = [&] {
-        return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points.size()), run);
-    };
+/// @param part  part_side() of the cloud
+void choose_orientation(CloudOrientation& cloud, double part, PointHints hints, const RunContext& run) {
+    const auto first_cell = [&] { return cloud::first_cell(cloud.scale, part, cloud.points.size()); };
+    const auto checked = [&] { return cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(), run); };
     cloud::GivenSides given = checked();
     if (given.report.used && drop_enclosed(cloud, hints, given)) given = checked();
     HintsReport& report = cloud.hints = given.report;
@@ -128,7 +126,7 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
     }
     const bool is_certain = report.used && given.torn < kCloud.few && is_settled(given.orientation);
     if (!is_certain) {
-        cloud.orientation = orient(cloud.points, cloud.scale, run);
+        cloud.orientation = cloud::try_orientations(cloud.points, cloud.scale, part, run);
         cloud.encloses = does_enclose(cloud);
         const double reach = kOrientation.passed_reach * cloud.scale.spacing;
         // Walls inside a solid can be identified only by given normals, and some points of such walls may remain.
@@ -142,9 +140,9 @@ void choose_orientation(CloudOrientation& cloud, PointHints hints, const RunCont
             report.used = false;
             report.why_not = "in whole regions they point to the wrong side";
         }
-        if (!report.used && !cloud.encloses && !choose_by_propagation(cloud, reach, run))
+        if (!report.used && !cloud.encloses && !choose_by_propagation(cloud, first_cell(), reach, run))
             choose_by_views(cloud, reach, run);
-        if (!report.used && cloud.encloses && !cloud.orientation.screened) refine(cloud, run);
+        if (!report.used && cloud.encloses && !cloud.orientation.screened) refine(cloud, first_cell(), run);
     }
     if (report.used) {
         cloud.orientation = std::move(given.orientation);
@@ -167,6 +165,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
     with_threads(run, [&] {
         cloud.points = merge_close_points(points, 0);
         cloud.scale = measure_cloud_scale(cloud.points, run);
+        const double part = cloud::part_side(cloud.points, cloud.scale);
         // If there are many stray points, some can be detected only after others were removed.
         for (int round = 0; round < kCloud.settling; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
@@ -178,7 +177,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
             cloud.points.resize(kept);
             if (double(gone) < kCloud.few * double(stray.size())) break;
         }
-        choose_orientation(cloud, carried(hints, points, cloud.points), run);
+        choose_orientation(cloud, part, carried(hints, points, cloud.points), run);
     });
     return cloud;
 }

@@ -10,12 +10,10 @@
 
 #include "base/heuristics.h"
 #include "base/median.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
 #include "points/neighbours.h"
-#include "points/parts.h"
 
 namespace covol {
 namespace {
@@ -133,7 +131,6 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
         // because the surface's curvature then contributes to the deviation.
         if (best < kCloudScale.sheet || noise / radius > (1 + kCommon.minority) * best) break;
     }
-    scale.part = cloud::largest_part_side(points, kOrientation.first_along, kCloud.coarse * scale.spacing);
     return scale;
 }
 

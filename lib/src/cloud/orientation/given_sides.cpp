@@ -12,6 +12,7 @@
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
+#include "cloud/orientation/judge.h"
 #include "cloud/orientation/propagation.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
@@ -48,7 +49,7 @@ public:
         : points_(points),
           run_(run),
           areas_(areas_of(points, scale.spacing)),
-          field_(indicator_grid(points, areas_, kCloud.coarse * std::max(scale.spacing, scale.noise))) {
+          field_(indicator_grid(points, areas_, coarse_cell(scale))) {
         oriented_.normals = std::move(normals);
         oriented_.areas = areas_;
     }

@@ -9,6 +9,7 @@
 #include "base/median.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
+#include "cloud/orientation/judge.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"
 
@@ -56,7 +57,7 @@ bool is_isolated(const PointCells& cells, std::size_t n, double distance, std::v
 std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
     if (points.size() <= 2 * kCommon.ring) return stray;
-    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, scale.noise));
+    const PointCells cells(points, kNear.first_radius * apart(scale));
     const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> isolated(points.size());

@@ -12,15 +12,13 @@
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
+#include "cloud/orientation/judge.h"
 #include "cloud/orientation/layers.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
 namespace {
-
-/// The unit of the cell sizes: the spacing of the points or the noise, if that is larger.
-double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
 
 /// Directions distributed evenly over the sphere: a Fibonacci spiral.
 std::vector<Vec3> directions() {
@@ -110,7 +108,7 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
 }
 
 std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale& scale) {
-    const double cell = kCloud.coarse * apart(scale);
+    const double cell = coarse_cell(scale);
     const Occupied occupied(points, cell);
     const PointCells cells(points, occupied.cell());
     const std::vector<Vec3> rays = directions();
@@ -137,7 +135,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
 }
 
 double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
-    const Occupied occupied(points, kCloud.coarse * apart(scale));
+    const Occupied occupied(points, coarse_cell(scale));
     std::vector<char> free(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
@@ -150,7 +148,7 @@ double fraction_free(const std::vector<Vec3>& points, const std::vector<Vec3>& d
 
 void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, const std::vector<char>& is_free,
                   const StackField* start, Orientation& result, const RunContext& run) {
-    WindingField fine(indicator_grid(points, result.areas, 0.5 * kCloud.coarse * apart(scale)));
+    WindingField fine(indicator_grid(points, result.areas, 0.5 * coarse_cell(scale)));
     const double cell = fine.indicator().stack().cell();
     // A view determines only the side of a normal; its direction is taken from the indicator's gradient.
     std::vector<double> screen(points.size());
@@ -171,16 +169,16 @@ void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, cons
 
 Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     Orientation result;
-    const double between = apart(scale);
-    const std::vector<Vec3> free = free_directions(points, kCloud.coarse * between);
+    const double cell = coarse_cell(scale);
+    const std::vector<Vec3> free = free_directions(points, cell);
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
-    WindingField coarse(indicator_grid(points, result.areas, kCloud.coarse * between));
+    WindingField coarse(indicator_grid(points, result.areas, cell));
     solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
-    const std::vector<char> turned = turn_layers(coarse, points, free, between, result, run);
+    const std::vector<char> turned = turn_layers(coarse, points, free, apart(scale), result, run);
     result.layered = std::size_t(std::count(turned.begin(), turned.end(), 1));
     result.indicator = make_indicator(coarse);
     run.check();

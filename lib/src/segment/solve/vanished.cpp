@@ -7,8 +7,11 @@
 #include <sstream>
 
 #include "base/heuristics.h"
+#include "cloud/indicator/heuristics.h"
 #include "covol/domain.h"
+#include "covol/guess.h"
 #include "covol/points.h"
+#include "points/parts.h"
 
 namespace covol::detail {
 namespace {
@@ -39,6 +42,17 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
         text << "the points are too sparse to hold the surface at the tag distance " << tag_distance
              << "; try `tag_distance = " << kCommon.growth * tag_distance << "`, a lower `delta`, or more points";
         return text.str();
+    }
+    if (is_flat) {
+        // Small parts that are far apart nearly lie on a line or in a plane, too, although each may enclose a body.
+        const double edge = 2 * kCloud.coarse * measure_spacing(points).median;
+        const std::vector<Vec3> part = cloud::largest_part(points, 1 / kCommon.negligible, edge);
+        if (can_enclose(part)) {
+            text << "the points form parts that are far apart compared to their size: the largest part is "
+                 << longest_side(bounding_box(part)) << " long, all points together "
+                 << longest_side(bounding_box(points)) << "; reconstruct each part alone, or try `init = cloud`";
+            return text.str();
+        }
     }
     const WorldBox box = bounding_box(points);
     Vec3 side;

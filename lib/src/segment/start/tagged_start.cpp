@@ -191,8 +191,8 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
     return start;
 }
 
-/// Rejects points in one plane, on a line or at fewer than four positions, which define no surface: tagging and a flow
-/// would take half a minute to find that out.
+/// Rejects points in one plane, on a line or at fewer than four positions, which define no surface, and parts that are
+/// too far apart for it: tagging and a flow would take half a minute to find that out.
 void refuse_flat(const Problem& problem, const Choices& choices, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
     if (problem.image != nullptr || o.contours || o.tag_distance || problem.has_seeds() ||
