@@ -1,7 +1,8 @@
 #include "guess/dense_kernels.h"
 
 #include <Eigen/Dense>
-#include <catch2/catch_test_macros.hpp>
+#include <catch2/catch.hpp>
+#include <cmath>
 
 namespace covol::guess {
 namespace {

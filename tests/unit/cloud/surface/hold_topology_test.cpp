@@ -80,7 +80,8 @@ TEST_CASE("hold_topology: a target that differs in more voxels than the limit ke
         differ += (*value < 0) != (small->tree().getValue(value.getCoord()) < 0);
     const FloatGridPtr left = large->deepCopy(), held = large->deepCopy();
     CHECK(cloud::hold_topology(*small, *left, {}, differ - 1) == 0);
-    CHECK(left->tree().hasSameTopology(large->tree()));
+    for (auto value = large->cbeginValueOn(); value; ++value)
+        REQUIRE(left->tree().getValue(value.getCoord()) == *value);
     CHECK(measure(extract_mesh(*left)).components == 2);  // the surface around the cavity is a component of its own
     CHECK(cloud::hold_topology(*small, *held, {}, differ) > 0);
     CHECK(measure(extract_mesh(*held)).components == 1);

@@ -179,7 +179,7 @@ TEST_CASE("Coordinates that are small in the image's unit are not taken for voxe
     CHECK(verdict(cloud_of(points), geometry).empty());
     // If they lie outside of the image, voxels are not suggested either.
     for (Vec3& p : points) p[0] += 1;
-    CHECK(verdict(cloud_of(points), geometry).find("Index") == std::string::npos);
+    CHECK(verdict(cloud_of(points), geometry).find("points_space = index") == std::string::npos);
 }
 
 TEST_CASE("Marks in a single slice cause no warning about their interpretation") {
