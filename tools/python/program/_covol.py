@@ -36,7 +36,7 @@ class Result:
 
     @property
     def mesh(self):
-        """The Mesh: closed, manifold, outward."""
+        """The Mesh: manifold, outward; closed unless holes are left open."""
         path = self._folder.file("mesh.ply" if not self.name else f"mesh_{self._grid}.ply")
         return Mesh._read(path, self._folder)
 
