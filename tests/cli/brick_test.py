@@ -103,7 +103,10 @@ class Bricks(Case):
         self.run_covol("brick", "run", "plan")
         output = self.run_covol("brick", "join", "plan", "-o", "s.vdb", "--json", "s.json", "--strict", code=5).stderr
         self.assertRegex(output, f"[0-9]+ of {planned['bricks']} bricks are not steady after [0-9]+ steps")
-        self.assertEqual(json.loads((self.out / "s.json").read_text())["solve"]["stop_reason"], "max_steps")
+        report = json.loads((self.out / "s.json").read_text())
+        self.assertEqual(report["solve"]["stop_reason"], "max_steps")
+        self.assertEqual(report["resolved"]["edge_feature"], "slope")
+        self.assertGreater(report["resolved"]["edge_k"], 0)
 
     def test_the_surface_has_the_same_bits_whatever_else_is_made(self):
         self.plan("plan")

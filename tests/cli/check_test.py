@@ -7,7 +7,7 @@ import subprocess
 import unittest
 
 from covol_case import COVOL
-from interchange_test import MISSING, Folder, ball, np, sphere, tifffile
+from interchange_test import MISSING, RADIUS, Folder, ball, np, sphere, tifffile
 
 
 @unittest.skipIf(MISSING, MISSING)
@@ -58,6 +58,15 @@ class Programs(Folder):
             self.run_covol("mesh", "s.vdb", "-o", "scaled.ply", "--unit-scale", scale, "--quiet")
             self.expect_finding("scaled.ply", "blender", "remark", word, "--unit-scale")
             self.silent("m.ply", "blender", word)
+
+    def test_the_limits_of_size_are_the_same_without_a_program(self):
+        """The clip end and the clip start of Blender's default view, 1,000 m and 0.01 m."""
+        for size in (0.005, 0.02, 900, 1100):
+            self.run_covol("mesh", "s.vdb", "-o", "sized.ply", "--unit-scale", size / (2 * RADIUS), "--quiet")
+            expected = not 0.01 < size < 1000
+            for more in ((), ("--for", "blender")):
+                report = json.loads(self.run_covol("check", "sized.ply", *more, "--quiet", "--json", "-").stdout)
+                self.assertEqual(any("units wide" in f["text"] for f in report["findings"]), expected, (size, more))
 
     def test_houdini(self):
         self.expect_finding("s.vdb", "houdini", "remark", "Blosc", "--compression none")

@@ -26,6 +26,31 @@ class Usage(Case):
         self.refuse("segment", self.image, code=2, expected_text="--output")
         self.refuse("segment", self.image, "-o", "s.vdb", "--no-such-flag", code=2, expected_text="--no-such-flag")
 
+    def test_what_was_expected(self):
+        """Messages about values that the parser of options refuses."""
+        job = ("segment", self.image, "-o", "s.vdb")
+        for words, expected_text in (
+                ((*job, "--theta", 0.5, "--theta", 0.4, "--theta", 0.3),
+                 "--theta: expected one value, got 3 ('0.5', '0.4', '0.3'); give the option once; see covol segment"),
+                ((*job, "-o", "t.vdb"), "--output: expected one value, got 2 ('s.vdb', 't.vdb'); give the option once"),
+                ((*job, "--threads", 1, "--threads", 2), "--threads: expected one value, got 2"),
+                ((*job, "--max-steps", 0.5), "--max-steps: expected a whole number, got '0.5'"),
+                ((*job, "--max-steps", 10**12), "in the range of this option, got '1000000000000'"),
+                ((*job, "--checkpoint-every", "x"), "--checkpoint-every: expected a number (SECONDS), got 'x'"),
+                ((*job, "--half=maybe"), "--half: expected true or false, got 'maybe'"),
+                ((*job, "--model", "pper"), "--model: expected guided or paper, got 'pper'; did you mean paper?"),
+                ((*job, "--config", "none.toml"), "--config none.toml: no such file"),
+                ((*job, "--config", self.inputs), "expected a file of options, got a folder"),
+                (("segment", self.image), "expected -o, --output OUT.vdb|..., which is required"),
+                (("info",), "expected FILE, which is required; see covol info --help"),
+                (("info", self.image, "b.nrrd", "c.nrrd"),
+                 "unexpected: 'b.nrrd', 'c.nrrd'; covol info takes only FILE and options"),
+                (("--threads", 2), "expected a command")):
+            with self.subTest(words[-2:]):
+                self.refuse(*words, code=2, expected_text=expected_text)
+        self.assertIn("--points: expected a value, [NAME=]FILE..., got none",
+                      self.run_covol(*job, "--points", code=2).stderr)
+
     def test_text_instead_of_numbers(self):
         for flag in ("--theta", "--tau", "--tag-distance", "--exterior-seed", "--roi", "--max-steps"):
             line = self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "many", code=2, expected_text=flag)
@@ -209,6 +234,34 @@ class Configuration(Case):
         config.write_text("thta = 0.5\n")
         self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2, expected_text="thta")
         self.refuse("segment", self.image, "-o", "s.vdb", "--config", "none.toml", code=2, expected_text="none.toml")
+
+    def test_mistakes_in_a_file(self):
+        """The message names the file, the line and the option, and what was expected."""
+        config = self.inputs / "c.toml"
+        for text, line, expected_text in (
+                ("\nthta = 0.5\n", 2, "'thta' is not an option of covol segment; did you mean theta?"),
+                ("[segment]\nqqqqqqq = 1\n", 2, "'qqqqqqq' is not an option of covol segment. See covol segment"),
+                ("segment.size = 3\n", 1, "'size' is not an option of covol segment"),
+                ("[segmnt]\ntheta = 0.5\n", 2, "'segmnt' is not a command of covol; did you mean segment?"),
+                ("[segment]\nthreads = 1\n", 2, "'threads' is an option of every command; write it above the first"),
+                ("save-config = x.toml\n", 1, "'save-config' cannot be in a file"),
+                ("theta = 0.5\ntheta = 0.6\n", 2, "'theta': expected one value, got 2"),
+                ("theta = 0.5\ndelta = 1\ntheta = 0.6\n", 3, "'theta' is already given in line 1"),
+                ("roi = 0,0,0,1,1,1\n", 1, "'roi': expected one value, got 6; give the option once, with quotes"),
+                ("\nmax-steps = 0.5\n", 2, "--max-steps: expected a whole number, got '0.5'"),
+                ("threads = many\n", 1, "--threads: expected a whole number, got 'many'"),
+                ("delta = many\n", 1, "--delta: expected a length in world units, or in voxels as 3vx, got 'many'"),
+                ("delta = -1\n", 1, "--delta: expected a length >= 0"),
+                ("model = other\n", 1, "--model: expected guided or paper, got 'other'")):
+            with self.subTest(text):
+                config.write_text(text)
+                self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2,
+                            expected_text=f"--config {config}: line {line}: {expected_text}")
+        # The command line takes precedence, and is then to blame.
+        config.write_text("max-steps = many\n")
+        line = self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, "--max-steps", "few", code=2,
+                           expected_text="--max-steps: expected a whole number, got 'few'")
+        self.assertNotIn("line 1", line)
 
     def test_saved_options_give_the_same_run(self):
         first = self.report("segment", self.image, "--points", self.sparse, "-o", "s.vdb", "--theta", "0.5", "--delta",

@@ -13,9 +13,8 @@ import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from docs_test import PAGES, blocks, check_example, examples_in  # noqa: E402
+from examples_case import PAGES, ROOT, blocks, check_example, examples_in  # noqa: E402
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 COVOL = pathlib.Path(os.environ.get("COVOL", "build/bin/covol")).resolve()
 SCRIPTS = sorted((ROOT / "houdini_free_examples").glob("[0-9]*.sh"))
 IN_PAGES = {name for page in PAGES for block in blocks(page, "bash") for name in examples_in(block)}

@@ -152,6 +152,10 @@ class Reports(Case):
         self.assertIsNone(report["resolved"]["edge_feature"])
         self.assertIsNone(report["resolved"]["edge_k"])
         self.assertGreater(report["resolved"]["delta"], 0)
+        report = self.report("segment", self.image, "--points", self.points, "-o", "o.vdb", "--model", "paper",
+                             "--max-steps", 3)
+        self.assertEqual(report["resolved"]["edge_feature"], "slope")
+        self.assertGreater(report["resolved"]["edge_k"], 0)
 
 
 class Outputs(Case):

@@ -70,10 +70,11 @@ class Rerun(Case):
         (self.out / "marks.csv").write_text("x,y,z,kind\n" + "".join(
             f"{ORIGIN[0] + SPACING[0] * (12 + 7 * c)},{ORIGIN[1] + SPACING[1] * (10 + 7 * s)},{ORIGIN[2] + SPACING[2] * k},surface\n"
             for k in (2, 4, 6) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1), (0.7, 0.7), (-0.7, -0.7))))
-        self.run_covol("segment", "series", "--points", "marks.csv", "-o", "series/s.vdb", "--max-steps", 3)
+        self.run_covol("segment", "series", "--points", "marks.csv", "-o", "series/s.vdb", "--max-steps", 3,
+                       "--mask", "series/mask.dcm", "--rtstruct", "series/contours.dcm")
         shutil.copy(self.out / "series/s.vdb", self.out / "s.vdb")
         self.assertIn("bit-identical", self.run_covol("rerun", "s.vdb").stdout)
-        one = sorted(series.glob("*.dcm"))[4]
+        one = sorted(series.glob("1.2*.dcm"))[4]
         content = bytearray(one.read_bytes())
         content[-1000] ^= 1
         one.write_bytes(content)

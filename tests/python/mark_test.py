@@ -1,4 +1,5 @@
 """covol.mark(): a study next to a notebook, and its representation there."""
+import importlib.util
 import json
 import os
 import pathlib
@@ -40,6 +41,39 @@ def test_marks_and_result_follow_the_page(sphere, study):
     assert study.result is not before
     assert len(study.result["ball"].mesh.faces) < len(before["ball"].mesh.faces)
     live.close()
+
+
+def test_options_of_a_study(sphere, program, tmp_path):
+    """Those of the last set_options that is not undone. The package of the wheel reads the journal itself, and agrees."""
+    path = pathlib.Path(__file__).resolve().parents[2] / "tools/python/program/_study.py"
+    wheel = importlib.util.module_from_spec(importlib.util.spec_from_file_location("covol._study", path))
+    wheel.__spec__.loader.exec_module(wheel)
+    covol.mark(sphere[0], study=tmp_path, program=program, notebook=[]).close()
+    journal = tmp_path / "journal.jsonl"
+    header = journal.read_text().splitlines()[0] + "\n"
+    action = lambda do, **fields: json.dumps({"do": do, **fields}) + "\n"
+    options = lambda **fields: action("set_options", options=fields)
+    undo, redo, name = action("undo"), action("redo"), action("add_structure", name="a")
+    one, two = {"voxel_size": 2.0, "rho": 0.5}, {"mark_precision": 1.0, "model": "paper"}
+    first, second = options(voxel_size=2, rho=0.5), options(**two)
+    for actions, expected in ((name, {}), (first, one), (first + second, two), (first + second + undo, one),
+                              (first + undo + redo, one), (first + second + undo + undo + undo, {}),
+                              (first + name + undo + undo + redo, one), (first + second + undo + name + redo, one),
+                              (first + options(), {}), (first + second[:-1], one)):
+        journal.write_text(header + actions)
+        for found in covol.read_study_options(tmp_path), wheel.read_options(tmp_path):
+            assert found == expected and {type(value) for value in found.values()} <= {float, str}, actions
+    for content, code in ((None, "io"), ("", "invalid_input"), ("{}\n", "invalid_input"),
+                          (header.replace('"covol_study":1', '"covol_study":2'), "unsupported"),
+                          (header + "nothing\n", "invalid_input"), (header + options(rho="x"), "invalid_input"),
+                          (header + options(model="x"), "invalid_input"), (header + "{}\n", "invalid_input")):
+        journal.unlink(missing_ok=True)
+        if content is not None:
+            journal.write_text(content)
+        for read in covol.read_study_options, wheel.read_options:
+            with pytest.raises(covol.Error, match="journal.jsonl") as error:
+                read(tmp_path)
+            assert error.value.code == code, content
 
 
 def test_paint_and_guesses_give_the_same_as_the_page(sphere, program, tmp_path):

@@ -9,8 +9,9 @@ namespace covol {
 /// it; "xxh128-of-pieces:HEX" of a file above 64 MiB, from 64 evenly spaced pieces of 1 MiB, which include its first
 /// and last byte; "xxh128-of-metadata:HEX" of a folder such as a Zarr store or a study, from its files .zarray,
 /// .zattrs, .zgroup, zarr.json and journal.jsonl, ordered by their paths; "xxh128-of-files:HEX" of a folder without
-/// these files, such as a DICOM series, from the names, sizes and contents of its DICOM files, or of all files in it if
-/// there are none; if these have more than 64 MiB in total, only the first and last bytes of each are used.
+/// these files, such as a DICOM series, from the names, sizes and contents of its DICOM images, or of all files in it
+/// if there are none, but never of segmentations, structure sets and other DICOM objects without an image; if these
+/// files have more than 64 MiB in total, only the first and last bytes of each are used.
 /// @throws Error Io.
 [[nodiscard]] COVOL_API std::string digest_of(const std::string& path);
 

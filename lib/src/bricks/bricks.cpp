@@ -250,7 +250,7 @@ struct BrickJob::Parts {
         Solution solution;
         solution.start = facts_of_brick(resolved.choices, plan.domain, resolved.marks.attracting);
         solution.start.flow = resolved.choices.evolve;
-        solution.edges.options = resolved.choices.edge;
+        solution.edges.options = field ? resolved.choices.edge : plan.edge;
         return solution;
     }
 

@@ -14,6 +14,7 @@
 
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/dicom_class.h"
 
 namespace covol {
 namespace {
@@ -97,14 +98,15 @@ bool is_dicom(const fs::path& path) {
     return file.read(bytes, 4) && std::string(bytes, 4) == "DICM";
 }
 
-/// Adds the names, sizes and contents of the DICOM files directly in a folder, or of all its files if none of them is
-/// one. If together they are larger than a file that is read as a whole, the middle of each file is left out.
+/// Adds the names, sizes and contents of the DICOM images directly in a folder, or of all its files if none of them is
+/// one. DICOM objects without an image, such as segmentations and structure sets, are left out, as the reader of series
+/// does. If together the files are larger than a file that is read as a whole, the middle of each is left out.
 void add_files(const fs::path& folder, Digest& hash) {
     std::set<fs::path> all, dicom;  // other files are not a part of the image: results may be in the same folder
     std::error_code status;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
         std::error_code is_gone;
-        if (!entry.is_regular_file(is_gone)) continue;
+        if (!entry.is_regular_file(is_gone) || detail::holds_no_image(entry.path().string())) continue;
         all.insert(entry.path());
         if (is_dicom(entry.path())) dicom.insert(entry.path());
     }

@@ -9,6 +9,7 @@
 #include "cli/options/first_steps.h"
 #include "cli/options/nearest.h"
 #include "cli/options/option_names.h"
+#include "cli/options/parse_errors.h"
 #include "cli/output/profile.h"
 #include "cli/system/cancel_signals.h"
 #include "cli/system/process.h"
@@ -139,11 +140,11 @@ int Session::run_command_line(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
         if (const std::string unknown = unknown_name(app_, given); !unknown.empty()) return fail(kUsage, unknown);
-        return fail(kUsage, error.what() + std::string("; see covol --help"));
+        return fail(kUsage, explain(error, app_));
     } catch (const UsageError& error) {
-        return fail(kUsage, error.what());
+        return fail(kUsage, origin_of(app_, error.option) + error.what());
     } catch (const Error& error) {
-        return fail(exit_code_of(error.code()), error.what());
+        return fail(exit_code_of(error.code()), origin_of(app_, error.option()) + error.what());
     }
     command_ = app_.get_subcommands().front();
     return execute();

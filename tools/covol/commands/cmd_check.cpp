@@ -17,10 +17,8 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kLargeScene = 10000;  // world units; Blender's default clipping hides larger objects
-constexpr double kSmallScene = 0.01;   // world units; the default view shows smaller objects as a dot
-constexpr double kFlatVoxels = 3;      // largest / smallest spacing; above it, most of a surface is interpolated
-constexpr double kFarPoint = 20;       // nearest-neighbour distance of an outlier, divided by the median of all points
+constexpr double kFlatVoxels = 3;  // largest / smallest spacing; above it, most of a surface is interpolated
+constexpr double kFarPoint = 20;   // nearest-neighbour distance of an outlier, divided by the median of all points
 
 /// Collects what a file would cause in other programs: problems, which fail the check, and remarks, which do not.
 class Findings {
@@ -58,11 +56,11 @@ private:
 void check_extent(double extent, const std::string& what, Findings& findings) {
     findings.facts.extent = std::max(findings.facts.extent, extent);
     if (!findings.in_general()) return;
-    if (extent > kLargeScene)
+    if (extent > kFarClip)
         findings.remark(what + " is " + std::to_string(extent) +
                         " units wide: Blender and Houdini interpret a unit as a metre and clip it; write meshes with "
                         "--unit-scale, or scale the object");
-    if (extent > 0 && extent < kSmallScene)
+    if (extent > 0 && extent < kNearClip)
         findings.remark(
             what + " is " + std::to_string(extent) +
             " units wide: Blender and Houdini interpret a unit as a metre and show a dot; write meshes with "

@@ -13,11 +13,9 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kFarClip = 1000;   // metres, clip end of Blender's default view; wider objects get a remark
-constexpr double kNearClip = 0.01;  // metres, clip start of Blender's default view; smaller objects get a remark
-constexpr double kNozzle = 0.4;     // mm, common diameter of printer nozzles: thinner walls are not printed
-constexpr double kPrintBed = 300;   // mm; wider objects get a remark on their size
-constexpr double kSmallPart = 1;    // mm; narrower objects get a remark on their size
+constexpr double kNozzle = 0.4;    // mm, common diameter of printer nozzles: thinner walls are not printed
+constexpr double kPrintBed = 300;  // mm; wider objects get a remark on their size
+constexpr double kSmallPart = 1;   // mm; narrower objects get a remark on their size
 
 std::string number(double value) {
     std::ostringstream text;

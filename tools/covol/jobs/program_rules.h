@@ -9,6 +9,9 @@ namespace covol::tool {
 
 enum class Program { Any, Blender, Houdini, Slicer, Fiji, Print };
 
+/// [m] Clip end and clip start of Blender's default view. Wider or smaller objects get a remark, also without --for.
+inline constexpr double kFarClip = 1000, kNearClip = 0.01;
+
 /// Properties of a file that the rules depend on.
 struct FileFacts {
     FileKind kind = FileKind::Image;

@@ -182,7 +182,11 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
             ->type_name("all|N|A-B");
         in_group(command, Group::Output);
     }
-    command.add_option("--mesh", mesh_path, "the surface as a closed, manifold mesh with outward normals")
+    command
+        .add_option("--mesh", mesh_path,
+                    with_image ? "the surface as a closed, manifold mesh with outward normals"
+                               : "the surface as a manifold mesh with outward normals; closed, unless --holes leaves "
+                                 "it open")
         ->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, kDensityHelp)->type_name("OUT.vdb");
     command

@@ -8,7 +8,7 @@ import shutil
 
 import numpy as np
 
-from . import _files, _program, _values
+from . import _files, _program, _study, _values
 from ._errors import Error
 from ._lapse import Frames
 from ._program import PROGRAM, Folder, read_json, run as run_program  # noqa: F401 - PROGRAM is for covol.mark()
@@ -36,7 +36,7 @@ class Result:
 
     @property
     def mesh(self):
-        """The Mesh: closed, manifold, outward."""
+        """The Mesh: manifold, outward; closed unless holes are left open."""
         path = self._folder.file("mesh.ply" if not self.name else f"mesh_{self._grid}.ply")
         return Mesh._read(path, self._folder)
 
@@ -267,7 +267,7 @@ def read_study(folder):
 
 
 def read_study_options(folder):
-    return {}
+    return _study.read_options(folder)
 
 
 def copy_level_set(source, path, half):

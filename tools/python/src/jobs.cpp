@@ -132,7 +132,7 @@ void add_jobs(py::module_& module) {
         .def_property_readonly(
             "surface", [](const Result& r) { return LevelSet{r.result.surface}; },
             "The LevelSet: a signed distance, world units.")
-        .def_property_readonly("mesh", mesh_of, "The Mesh: closed, manifold, outward.")
+        .def_property_readonly("mesh", mesh_of, "The Mesh: manifold, outward; closed unless holes are left open.")
         .def_property_readonly(
             "image", [](const Result& r) { return r.image; }, "The Image; None if there are only points.")
         .def_property_readonly(

@@ -6,6 +6,7 @@
 #include <optional>
 #include <variant>
 
+#include "files/dicom_class.h"
 #include "io/dicom/dicom_header.h"
 #include "io/dicom/dicom_volumes.h"
 #include "io/image/image_formats.h"
@@ -15,20 +16,6 @@ namespace covol::detail {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Whether a file is a DICOM object without an image, or a segmentation. Such files are often stored in the folder of a
-/// series, of which they are not slices: structure sets, plans, treatments, registrations, reports, presentations,
-/// documents (PS3.4 B.5).
-bool holds_no_image(const std::string& path) {
-    const std::string own = dicom_class(path);
-    constexpr std::string_view kClasses = "1.2.840.10008.5.1.4.1.1.";
-    if (!own.starts_with(kClasses)) return false;
-    const std::string kind = own.substr(kClasses.size());
-    if (kind == "481.1" || kind == "481.2") return false;  // RT images and RT doses, which have pixels
-    for (const char* group : {"481.", "66.", "88.", "11.", "104."})
-        if (kind.starts_with(group)) return true;
-    return false;
-}
 
 std::string kind_of_object(const std::string& sop_class) {
     if (sop_class == kSegmentationStorage)

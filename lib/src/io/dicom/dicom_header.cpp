@@ -314,26 +314,6 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
     return walker.header();
 }
 
-std::string dicom_class(const std::string& path) {
-    std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a named pipe would wait for a writer
-    // [bytes] Size of the part of the file that is searched for the SOP class, which is near the beginning.
-    constexpr std::size_t kMeta = 1024;
-    std::string begin(kMeta, '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(begin.data(), std::streamsize(begin.size()));
-    begin.resize(static_cast<std::size_t>(file.gcount()));
-    constexpr std::string_view kMediaClass("\x02\x00\x02\x00UI", 6);
-    const std::size_t at = begin.find(kMediaClass, kPreamble + 4);
-    if (begin.compare(std::min<std::size_t>(kPreamble, begin.size()), 4, "DICM") != 0 || at == std::string::npos ||
-        at + 8 > begin.size())
-        return {};
-    const auto length = std::size_t(static_cast<unsigned char>(begin[at + 6]));
-    std::string uid = begin.substr(at + 8, length);
-    if (!uid.empty() && uid.back() == '\0') uid.pop_back();
-    return uid;
-}
-
 bool is_dicom(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     std::array<char, kPreamble + 4> begin{};

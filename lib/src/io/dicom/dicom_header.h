@@ -52,13 +52,6 @@ private:
 /// encoding.
 std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
-/// The kind of object according to the file's meta group (a SOP class, PS3.6 A); empty if it is not stated.
-std::string dicom_class(const std::string& path);
-
-/// SOP classes: RT structure sets, which contain contours but no pixels, and segmentations.
-inline constexpr const char* kRtStructureSet = "1.2.840.10008.5.1.4.1.1.481.3";
-inline constexpr const char* kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
-
 /// Whether the file has the marker "DICM" after a preamble, or begins with an element of the groups 0002 or 0008.
 bool is_dicom(const std::string& path);
 

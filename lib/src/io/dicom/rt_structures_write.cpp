@@ -7,7 +7,7 @@
 #include "covol/error.h"
 #include "covol/slice_contours.h"
 #include "files/atomic.h"
-#include "io/dicom/dicom_header.h"
+#include "files/dicom_class.h"
 #include "io/dicom/dicom_source.h"
 
 namespace covol {

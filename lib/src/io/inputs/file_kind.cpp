@@ -10,7 +10,7 @@
 #include "covol/mesh_io.h"
 #include "covol/points.h"
 #include "covol/vdb_io.h"
-#include "io/dicom/dicom_header.h"
+#include "files/dicom_class.h"
 
 namespace covol {
 namespace {

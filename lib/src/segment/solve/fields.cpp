@@ -180,6 +180,7 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
     edges.options.edge_k = e.edge_k;
     edges.options.edge_contrast.reset();
     edges.options.intensities = {e.low, e.high};
+    if (options.feature == EdgeFeature::Automatic) edges.options.feature = EdgeFeature::Slope;  // as detect_edges() did
     return edges;
 }
 

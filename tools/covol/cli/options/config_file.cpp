@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "cli/options/arguments.h"
+#include "cli/options/nearest.h"
+#include "cli/options/parse_errors.h"
 #include "covol/safe_text.h"
 
 namespace covol::tool {
@@ -19,6 +21,7 @@ constexpr std::size_t kMaxBytes = 1 << 20;
 struct Entry {
     std::string section, name;
     std::vector<std::string> values;
+    std::size_t line = 0;  ///< where it begins, from 1
 };
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
@@ -26,9 +29,13 @@ bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 /// Parses one file from beginning to end, without recursion.
 class Reader {
 public:
-    explicit Reader(std::string_view text) : text_(text) {
+    /// @param file  "--config FILE", which begins the messages
+    Reader(std::string_view text, std::string file) : text_(text), file_(std::move(file)) {
         if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
     }
+
+    /// The beginning of a message about a line.
+    [[nodiscard]] std::string place(std::size_t line) const { return file_ + ": line " + std::to_string(line) + ": "; }
 
     std::optional<Entry> next() {
         while (skip_to_content()) {
@@ -43,9 +50,7 @@ private:
     [[nodiscard]] bool at_end() const { return at_ >= text_.size(); }
     [[nodiscard]] char peek() const { return at_end() ? '\n' : text_[at_]; }
 
-    [[noreturn]] void fail(const std::string& what) const {
-        throw UsageError("--config: line " + std::to_string(line_) + ": " + what);
-    }
+    [[noreturn]] void fail(const std::string& what) const { throw UsageError(place(line_) + what); }
 
     void skip_blanks() {
         while (!at_end() && is_blank(text_[at_])) ++at_;
@@ -87,7 +92,7 @@ private:
     }
 
     Entry entry() {
-        Entry found{section_, peek() == '"' || peek() == '\'' ? quoted() : bare(" \t\r=#"), {}};
+        Entry found{section_, peek() == '"' || peek() == '\'' ? quoted() : bare(" \t\r=#"), {}, line_};
         if (found.name.empty()) fail("expected NAME = VALUE");
         // A name outside of sections may be prefixed by its section, as in "segment.theta = 0.5".
         if (const std::size_t dot = found.name.find('.'); dot != std::string::npos && found.section.empty()) {
@@ -208,15 +213,73 @@ private:
 
     std::string_view text_;
     std::size_t at_ = 0, line_ = 1;
-    std::string section_;
+    std::string file_, section_;
 };
 
-std::string all_of(std::istream& input) {
+std::string all_of(std::istream& input, const std::string& file) {
     std::string text(kMaxBytes + 1, '\0');
     input.read(text.data(), std::streamsize(text.size()));
     text.resize(std::size_t(input.gcount()));
-    if (text.size() > kMaxBytes) throw UsageError("--config: expected a file of options, got one of more than 1 MiB");
+    if (text.size() > kMaxBytes) throw UsageError(file + ": expected a file of options, got one of more than 1 MiB");
     return text;
+}
+
+/// The option of the command with this name; null if there is none. CLI11 also finds it by this name.
+const CLI::Option* find_option(const CLI::App& command, const std::string& name) {
+    std::vector<std::string> words{"--" + name, name};
+    if (name.size() == 1) words.insert(words.begin() + 1, "-" + name);
+    for (const std::string& word : words)
+        if (const CLI::Option* const found = command.get_option_no_throw(word)) return found;
+    return nullptr;
+}
+
+/// "; did you mean X?" if a name of the list is close to an unknown one.
+std::string hint(const std::string& name, const std::vector<std::string>& known) {
+    constexpr std::size_t kLongest = 60;  // no option and no command has a longer name
+    const std::string close = name.size() > kLongest ? "" : nearest(name, known);
+    return close.empty() ? "." : "; did you mean " + close + "?";
+}
+
+/// The option that an entry outside of sections, or in the section of the command, names.
+/// @throws UsageError if there is none, or if it cannot be in a file
+const CLI::Option& option_of(const Entry& entry, const CLI::App& command, const CLI::App& program,
+                             const std::string& place) {
+    const CLI::Option* const common = program.get_option_no_throw("--" + entry.name);
+    const CLI::Option* const option =
+        entry.section.empty() && common != nullptr ? common : find_option(command, entry.name);
+    const std::string name = in_quotes(entry.name);
+    if (option == nullptr && common != nullptr)
+        throw UsageError(place + name + " is an option of every command; write it above the first [section]");
+    if (option == nullptr) {
+        std::vector<std::string> known;
+        for (const CLI::App* app : {&command, &program})
+            for (const CLI::Option* one : app->get_options())
+                if (one->get_configurable()) known.push_back(one->get_single_name());
+        throw UsageError(place + name + " is not an option of covol " + command.get_name() + hint(entry.name, known) +
+                         " See covol " + command.get_name() + " --help-all");
+    }
+    if (!option->get_configurable())
+        throw UsageError(place + name + " cannot be in a file; delete it there, and give it on the command line");
+    return *option;
+}
+
+/// @throws UsageError for the name of a section that is no command, whose options would be ignored
+void require_command(const std::string& section, const std::vector<const CLI::App*>& commands,
+                     const std::string& place) {
+    std::vector<std::string> known;
+    for (const CLI::App* command : commands) known.push_back(command->get_name());
+    if (std::find(known.begin(), known.end(), section) == known.end())
+        throw UsageError(place + in_quotes(section) + " is not a command of covol" + hint(section, known) +
+                         " Options are outside of sections or in the section of a command");
+}
+
+void require_count(const CLI::Option& option, const CLI::ConfigItem& item, const std::string& place) {
+    const auto maximum = std::size_t(std::max(1, option.get_items_expected_max()));
+    if (item.inputs.size() > maximum)
+        throw UsageError(place + in_quotes(item.name) + ": expected " +
+                         (maximum == 1 ? "one value" : "at most " + std::to_string(maximum) + " values") + ", got " +
+                         std::to_string(item.inputs.size()) +
+                         "; give the option once, with quotes around a value that has blanks or commas");
 }
 
 /// Whether the value is a number or a Boolean, which TOML writes without quotes.
@@ -249,26 +312,44 @@ std::string toml_text(const std::string& value) {
 
 std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const {
     const std::vector<const CLI::App*> commands = program_.get_subcommands([](const CLI::App*) { return true; });
-    std::string command;
-    for (const CLI::App* one : commands)
-        if (program_.got_subcommand(const_cast<CLI::App*>(one))) command = one->get_name();
-    const std::string text = all_of(input);
+    const std::vector<CLI::App*> parsed = program_.get_subcommands();
+    const CLI::App* const command = parsed.empty() ? nullptr : parsed.front();
+    const std::vector<std::string>& files = program_.get_config_ptr()->results();
+    const std::string file = "--config" + (files.empty() ? "" : " " + files.front()), text = all_of(input, file);
     std::vector<CLI::ConfigItem> items;
-    Reader reader(text);
+    std::map<const CLI::Option*, std::size_t> lines;
+    const CLI::Option* last = nullptr;
+    origins_.clear();
+    Reader reader(text, file);
     while (std::optional<Entry> entry = reader.next()) {
-        const bool is_common = entry->section.empty() && program_.get_option_no_throw("--" + entry->name) != nullptr;
-        if (!entry->section.empty() && entry->section != command) continue;
-        CLI::ConfigItem item;
-        if (!is_common) item.parents = {command};
-        item.name = std::move(entry->name);
-        item.inputs = std::move(entry->values);
+        const std::string place = reader.place(entry->line);
+        if (!entry->section.empty()) require_command(entry->section, commands, place);
+        if (command == nullptr) continue;  // CLI11 reports this
+        if (!entry->section.empty() && entry->section != command->get_name()) continue;
+        const CLI::Option& option = option_of(*entry, *command, program_, place);
+        const bool is_new = lines.emplace(&option, entry->line).second;
         // A list of values may be given by consecutive lines with the same name.
-        if (!items.empty() && items.back().name == item.name && items.back().parents == item.parents)
-            items.back().inputs.insert(items.back().inputs.end(), item.inputs.begin(), item.inputs.end());
-        else
+        if (!is_new && last != &option)
+            throw UsageError(place + in_quotes(entry->name) + " is already given in line " +
+                             std::to_string(lines.at(&option)) + "; give it once, with all its values");
+        if (is_new) {
+            CLI::ConfigItem item;
+            if (&option != program_.get_option_no_throw("--" + entry->name)) item.parents = {command->get_name()};
+            item.name = std::move(entry->name);
             items.push_back(std::move(item));
+            if (option.count() == 0) origins_[&option] = place;
+        }
+        std::vector<std::string>& values = items.back().inputs;
+        values.insert(values.end(), entry->values.begin(), entry->values.end());
+        require_count(option, items.back(), place);
+        last = &option;
     }
     return items;
+}
+
+std::string ConfigFile::origin(const CLI::Option& option) const {
+    const auto found = origins_.find(&option);
+    return found == origins_.end() ? "" : found->second;
 }
 
 std::string ConfigFile::to_config(const CLI::App* command, bool, bool, std::string) const {

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "covol/error.h"
+#include "files/dicom_class.h"
 #include "io/dicom/dicom_elements.h"
-#include "io/dicom/dicom_header.h"
 #include "io/dicom/dicom_tree.h"
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
