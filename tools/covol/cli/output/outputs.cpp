@@ -11,6 +11,7 @@
 #include <climits>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <thread>
 
 #include "covol/error.h"
@@ -133,6 +134,7 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
 
 void Outputs::protect(const std::vector<std::string>& inputs) {
     inputs_.insert(inputs_.end(), inputs.begin(), inputs.end());
+    std::copy_if(inputs.begin(), inputs.end(), std::back_inserter(stores_), is_zarr_name);
 }
 
 const std::vector<std::string>& Outputs::files_of(const std::string& input, const fs::path& folder) {
@@ -157,14 +159,17 @@ void Outputs::check_inputs(const std::string& flag, const std::string& path, con
         throw Error(Errc::InvalidOptions, flag + ": " + path + ": " + why + "; choose another name");
     };
     std::error_code status;
-    for (const std::string& input : inputs_) {
-        if (fs::equivalent(target, input, status)) refuse("is an input of this run");
-        if (is_zarr_name(input) && fs::is_directory(input, status) && lies_in(target, input))
-            refuse("lies in " + input + ", an input of this run");
-        if (!fs::exists(target, status)) continue;
-        for (const std::string& file : files_of(input, target.parent_path()))
-            if (fs::equivalent(target, file, status)) refuse("belongs to " + input + ", an input of this run");
-    }
+    // Only a file that exists can be an input. With thousands of frames, comparing each output with each input takes
+    // minutes.
+    if (fs::exists(target, status))
+        for (const std::string& input : inputs_) {
+            if (fs::equivalent(target, input, status)) refuse("is an input of this run");
+            for (const std::string& file : files_of(input, target.parent_path()))
+                if (fs::equivalent(target, file, status)) refuse("belongs to " + input + ", an input of this run");
+        }
+    for (const std::string& store : stores_)
+        if (fs::is_directory(store, status) && lies_in(target, store))
+            refuse("lies in " + store + ", an input of this run");
 }
 
 void Outputs::check(const std::string& flag, const std::string& path, OutputKind kind) {
