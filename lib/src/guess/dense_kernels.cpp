@@ -24,9 +24,9 @@ void solve_lower(const double* L, Size n, Size L_stride, double* B, Size B_colum
     ConstStrided(L, n, n, Stride(L_stride)).triangularView<Eigen::Lower>().solveInPlace(X);
 }
 
-void transposed_product(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
-                        Size C_rows, Size C_columns, Size C_stride) {
-    Strided(C, C_rows, C_columns, Stride(C_stride)).noalias() =
+void add_transposed_product(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
+                            Size C_rows, Size C_columns, Size C_stride) {
+    Strided(C, C_rows, C_columns, Stride(C_stride)).noalias() +=
         ConstStrided(A, inner, C_rows, Stride(A_stride)).transpose() *
         ConstStrided(B, inner, C_columns, Stride(B_stride));
 }
@@ -39,6 +39,6 @@ void times(const double* A, Size n, const double* x, double* y) {
 }  // namespace
 
 extern const DenseKernels kDenseKernels;
-const DenseKernels kDenseKernels{cholesky, solve_lower, transposed_product, times};
+const DenseKernels kDenseKernels{cholesky, solve_lower, add_transposed_product, times};
 
 }  // namespace covol::guess::COVOL_SIMD_NAME

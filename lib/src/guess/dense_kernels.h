@@ -16,9 +16,9 @@ struct DenseKernels {
     /// Solves L X = B for a lower triangular n x n matrix L. B, which has n rows, is replaced by X.
     void (*solve_lower)(const double* L, Size n, Size L_stride, double* B, Size B_columns, Size B_stride);
 
-    /// C = A^T B. A and B have `inner` rows; A has as many columns as C has rows.
-    void (*transposed_product)(const double* A, Size A_stride, const double* B, Size B_stride, Size inner, double* C,
-                               Size C_rows, Size C_columns, Size C_stride);
+    /// Adds A^T B to C. A and B have `inner` rows; A has as many columns as C has rows.
+    void (*add_transposed_product)(const double* A, Size A_stride, const double* B, Size B_stride, Size inner,
+                                   double* C, Size C_rows, Size C_columns, Size C_stride);
 
     /// y = A x for an n x n matrix A whose columns follow each other.
     void (*times)(const double* A, Size n, const double* x, double* y);

@@ -52,8 +52,9 @@ public:
             for (int k = 0; k < 3; ++k) polynomials(values_ + 3 * i + k, 1 + k) = 1;
         // On the orthogonal complement of the polynomials the matrix is positive definite.
         qr_.compute(polynomials);
-        Matrix projected = qr_.householderQ().adjoint() * matrix_;
-        projected = (projected * qr_.householderQ()).eval();
+        Matrix projected = matrix_;
+        projected.applyOnTheLeft(qr_.householderQ().adjoint());
+        projected.applyOnTheRight(qr_.householderQ());
         const Index rest = size_ - kPolynomial;
         factor_ = projected.bottomRightCorner(rest, rest);
         if (!dense_kernels().cholesky(factor_.data(), rest))
@@ -114,7 +115,7 @@ private:
         const auto triangle = factor_.bottomRightCorner(gradients_, gradients_);
         const DenseKernels& dense = dense_kernels();
         inverse_ = Matrix::Zero(gradients_, gradients_);
-        energy_.resize(gradients_, gradients_);
+        energy_ = Matrix::Zero(gradients_, gradients_);
         constexpr Index kBlock = 64;
         const Index blocks = (gradients_ + kBlock - 1) / kBlock;
         const auto for_each_block = [&](const auto& body) {
@@ -129,12 +130,17 @@ private:
         });
         const Matrix mixed = inverse_.transpose() * reflected_.bottomRows(gradients_);  // S^T X
         const Matrix outer = 0.5 * (reflected_.transpose() * reflected_) * projection_ - mixed.transpose();
+        // The energy is S^T S + left^T right.
+        Matrix left(2 * kPolynomial, gradients_), right(2 * kPolynomial, gradients_);
+        left << projection_, outer;
+        right << outer, projection_;
         for_each_block([&](Index from, Index count, Index below) {
-            auto block = energy_.block(from, from, below, count);
-            dense.transposed_product(&inverse_(from, from), gradients_, &inverse_(from, from), gradients_, below,
-                                     &block(0, 0), below, count, gradients_);
-            block.noalias() += projection_.rightCols(below).transpose() * outer.middleCols(from, count);
-            block.noalias() += outer.rightCols(below).transpose() * projection_.middleCols(from, count);
+            const auto add = [&](const Matrix& a, const Matrix& b, Index row, Index inner) {
+                dense.add_transposed_product(&a(row, from), a.rows(), &b(row, from), b.rows(), inner,
+                                             &energy_(from, from), below, count, gradients_);
+            };
+            add(inverse_, inverse_, from, below);
+            add(left, right, 0, 2 * kPolynomial);
         });
         energy_.triangularView<Eigen::StrictlyUpper>() = energy_.transpose();
     }

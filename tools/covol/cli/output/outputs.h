@@ -69,7 +69,7 @@ private:
     };
     const RunContext& run_;
     std::vector<std::string> inputs_;
-    std::vector<std::string> stores_;  ///< those of the inputs whose names end in .zarr
+    std::vector<std::string> stores_;                           ///< those of the inputs whose names end in .zarr
     std::map<std::string, std::vector<std::string>> files_of_;  ///< results of files_of(), by input
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
