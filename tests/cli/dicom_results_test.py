@@ -265,6 +265,21 @@ class Segmentations(DicomCase):
         self.assertNotIn("warning", again.stderr)
         self.assertEqual(self.info("scan")["size"], list(SIZE))
 
+    def test_segments_are_numbered_from_1(self):
+        """Another value of the inside cannot be stored, and is refused."""
+        job = ("segment", self.scan, "--points", self.inputs / "left.xyz", "-o", "s.vdb")
+        for more in (("--mask", "m.dcm"), ("--mask", "M.DCM")):
+            error = self.refused(*job, *more, "--mask-label", 7)
+            self.assertIn("--mask-label: expected 1 for " + more[-1], error)
+            self.assertEqual(os.listdir(self.out), [])
+        self.run_covol(*job, "--mask", "m.dcm", "--mask-label", 1)
+        error = self.refused("mask", "s.vdb", "--like", self.scan, "-o", "n.dcm", "--label", 7)
+        self.assertIn("--label: expected 1 for n.dcm", error)
+        self.assertFalse((self.out / "n.dcm").exists())
+        self.run_covol("mask", "s.vdb", "--like", self.scan, "-o", "n.dcm")
+        for name in "m.dcm", "n.dcm":
+            self.assertEqual([s.SegmentNumber for s in pydicom.dcmread(str(self.out / name)).SegmentSequence], [1])
+
     def test_what_is_no_segmentation_is_refused(self):
         self.assertIn("only label images", self.refused("convert", self.scan, "grey.dcm"))
         self.run_covol(*self.two("--mask", "m.dcm"))

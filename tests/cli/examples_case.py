@@ -20,7 +20,10 @@ def examples_in(block):
 
 
 def check_example(test, done, out, folder):
-    """Checks what an example script printed, and that the files that it names are there. `out`: its COVOL_OUT, relative to `folder`."""
+    """Checks what an example script printed, and that the files that it names are there.
+
+    `out`: its COVOL_OUT, relative to `folder`.
+    """
     test.assertNotIn("warning", done.stderr)
     output = done.stdout.split("== results", 1)
     test.assertEqual(len(output), 2, done.stdout)

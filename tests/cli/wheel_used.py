@@ -117,9 +117,11 @@ checks["no file"] = error(covol.segment, "none.tif", marks)[0] == "io"
 checks["shape"] = error(covol.segment, image, np.zeros((3, 2))) == ("invalid_input", "points")
 seeds = list(covol.timelapse([voxels], {"points": np.asarray(marks), "inside": [np.mean(np.asarray(marks), 0)]}))
 checks["seeds of a time-lapse"] = [e.code for e in seeds] == ["unsupported"]
-lines = ({"covol_study": 1}, {"do": "set_options", "options": {"rho": 0.5}}, {"do": "set_options", "options": {}}, {"do": "undo"})
-pathlib.Path("journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-checks["read_study_options"] = covol.read_study_options(".") == {"rho": 0.5} and error(covol.read_study_options, "none")[0] == "io"
+set_options = [{"do": "set_options", "options": options} for options in ({"rho": 0.5}, {})]
+journal = ({"covol_study": 1}, *set_options, {"do": "undo"})
+pathlib.Path("journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in journal))
+checks["read_study_options"] = covol.read_study_options(".") == {"rho": 0.5}
+checks["options of no study"] = error(covol.read_study_options, "none")[0] == "io"
 checks["read_study"] = error(covol.read_study, "none")[0] == "unsupported"
 
 # The log, the callback for progress, exceptions that it raises, and Ctrl-C.

@@ -44,7 +44,7 @@ def test_marks_and_result_follow_the_page(sphere, study):
 
 
 def test_options_of_a_study(sphere, program, tmp_path):
-    """Those of the last set_options that is not undone. The package of the wheel reads the journal itself, and agrees."""
+    """Those of the last set_options that is not undone. The package of the wheel, which reads the journal, agrees."""
     path = pathlib.Path(__file__).resolve().parents[2] / "tools/python/program/_study.py"
     wheel = importlib.util.module_from_spec(importlib.util.spec_from_file_location("covol._study", path))
     wheel.__spec__.loader.exec_module(wheel)

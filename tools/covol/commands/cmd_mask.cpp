@@ -2,7 +2,6 @@
 
 #include "cli/output/report.h"
 #include "commands/commands.h"
-#include "covol/error.h"
 #include "covol/file_kind.h"
 #include "covol/structures.h"
 #include "flags/bindings.h"
@@ -18,8 +17,7 @@ struct MaskJob {
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Image);
-        if (label < 1 || label > 255)
-            throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
+        check_label("--label", label, output);
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const ImageGeometry geometry = image.read_geometry(like, session.run());
         const auto labels = std::make_shared<LabelImage>(std::vector<Structure>{{"surface", level_set}}, geometry,
@@ -49,7 +47,7 @@ void add_mask(Session& session) {
     command->add_option("-o,--output", job->output, "label image")
         ->required()
         ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.npy|.zarr|.dcm");
-    command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
+    command->add_option("--label", job->label, "value of the inside, 1 to 255; in .dcm only 1")->capture_default_str();
     command->add_flag("--raw", job->raw, "write the voxels of .nrrd and .mha without compression");
     job->image.bind(*command);
 }

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "covol/mesh_stream.h"
 
 namespace covol::tool {
@@ -199,6 +200,14 @@ WriteMeshOptions MeshFlags::write_options(const Session& session) const {
     write.comments = session.provenance().comments();
     write.warn = [run = session.run()](const std::string& line) { run.warn(line); };
     return write;
+}
+
+void check_label(const std::string& flag, int label, const std::string& path) {
+    if (label < 1 || label > 255)
+        throw Error(Errc::InvalidOptions, flag + ": expected 1 to 255, got " + std::to_string(label));
+    if (label != 1 && long_ending(path) == ".dcm")
+        throw UsageError(flag + ": expected 1 for " + path + ", because segments of DICOM are numbered from 1, got " +
+                         std::to_string(label) + "; leave it out, or write a .nrrd or .nii.gz");
 }
 
 bool is_float_grid(const VdbGridInfo& grid) {

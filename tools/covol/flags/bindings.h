@@ -158,6 +158,13 @@ struct MeshFlags : Given<WriteMeshOptions> {
     [[nodiscard]] WriteMeshOptions write_options(const Session& session) const;
 };
 
+/// Refuses a value of the inside in a label image that is not 1 to 255 or that its format cannot store: DICOM
+/// segmentations number their segments from 1.
+/// @param flag  the option with the value, for messages
+/// @param path  of the image, or empty
+/// @throws Error InvalidOptions, UsageError
+void check_label(const std::string& flag, int label, const std::string& path);
+
 [[nodiscard]] bool is_float_grid(const VdbGridInfo& grid);
 
 }  // namespace covol::tool

@@ -57,8 +57,7 @@ void SegmentJob::check_options() const {
 
 void SegmentJob::check_settings() const {
     require_valid_flags(resolve(1.0));
-    if (mask_label && (*mask_label < 1 || *mask_label > 255))
-        throw Error(Errc::InvalidOptions, "--mask-label: expected 1 to 255, got " + std::to_string(*mask_label));
+    if (mask_label) check_label("--mask-label", *mask_label, mask_path);
     cloud.check();
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
