@@ -18,6 +18,8 @@ struct Surrounding {
     double cell;
 };
 
+constexpr float kZeros[4] = {};
+
 /// Collects the nodes around a position. @return whether all of them exist
 /// @param whole  for the coarsest level: a position beyond its end is moved to the end, and missing nodes are 0
 bool collect(const GridLevel& level, const float* values, const Vec3& origin, const Vec3& world, bool whole,
@@ -43,15 +45,17 @@ bool collect(const GridLevel& level, const float* values, const Vec3& origin, co
             for (int j = 0; j < 4; ++j) std::memcpy(s.nodes + i * 16 + j * 4, p + i * 64 + j * 8, 16);
         return true;
     }
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j)
-            for (int k = 0; k < 4; ++k) {
-                const int x = local[0] + i - 1, y = local[1] + j - 1, z = local[2] + k - 1;
+    float* to = s.nodes;
+    for (int x = local[0] - 1; x < local[0] + 3; ++x)
+        for (int y = local[1] - 1; y < local[1] + 3; ++y)
+            for (int z = local[2] - 1, run = 0; z < local[2] + 3; z += run, to += run) {
+                run = std::min(8 - (z & 7), local[2] + 3 - z);  // up to the end of the block
                 const std::uint32_t b =
                     level.beside[block][std::size_t(((x >> 3) + 1) * 9 + ((y >> 3) + 1) * 3 + (z >> 3) + 1)];
                 if (b == kNoBlock && !whole) return false;
-                s.nodes[i * 16 + j * 4 + k] =
-                    b == kNoBlock ? 0 : values[b * kBlockNodes + std::size_t((x & 7) * 64 + (y & 7) * 8 + (z & 7))];
+                const float* from =
+                    b == kNoBlock ? kZeros : values + b * kBlockNodes + (x & 7) * 64 + (y & 7) * 8 + (z & 7);
+                for (int n = 0; n < run; ++n) to[n] = from[n];
             }
     return true;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "cloud/poisson/block_kernel.h"
 #include "cloud/poisson/spread.h"
@@ -69,25 +70,32 @@ void WindingField::pad(std::size_t l, std::size_t block, float* padded) const {
     for (std::size_t i = 0; i < 8; ++i)
         for (std::size_t j = 0; j < 8; ++j)
             std::memcpy(padded + (i + 1) * 100 + (j + 1) * 10 + 1, own + i * 64 + j * 8, 8 * sizeof(float));
-    constexpr std::size_t kFaces[6] = {4, 22, 10, 16, 12, 14};
-    constexpr std::size_t kNodeStep[3] = {64, 8, 1}, kPaddedStep[3] = {100, 10, 1};
-    for (std::size_t face = 0; face < 6; ++face) {
-        const std::size_t axis = face / 2, b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;  // b, c: parallel to the face
-        const std::uint32_t other = grid(l).beside[block][kFaces[face]];
-        const bool high = (face & 1) != 0;
-        const float* from;
-        std::size_t step_b = 8, step_c = 1;
-        if (other != kNoBlock) {
-            from = u.data() + other * kBlockNodes + (high ? 0 : 7 * kNodeStep[axis]);
-            step_b = kNodeStep[b], step_c = kNodeStep[c];
-        } else {
-            from = levels_[l].ghosts.data() + std::size_t(grid(l).ghost[block][face]) * 64;
-        }
-        float* to = padded + (high ? 9 : 0) * kPaddedStep[axis] + kPaddedStep[b] + kPaddedStep[c];
-        for (std::size_t m = 0; m < 8; ++m)
-            for (std::size_t n = 0; n < 8; ++n)
-                to[m * kPaddedStep[b] + n * kPaddedStep[c]] = from[m * step_b + n * step_c];
-    }
+    // Calls copy(values across the face, distance in memory between their rows, whether these are nodes of a block).
+    const auto across = [&](std::size_t face, std::size_t beside, std::size_t first, std::size_t rows, auto copy) {
+        if (const std::uint32_t other = grid(l).beside[block][beside]; other != kNoBlock)
+            copy(u.data() + other * kBlockNodes + first, rows, std::true_type());
+        else
+            copy(levels_[l].ghosts.data() + std::size_t(grid(l).ghost[block][face]) * 64, std::size_t(8),
+                 std::false_type());
+    };
+    const auto rows_to = [](float* to, std::size_t to_rows) {
+        return [=](const float* from, std::size_t rows, auto) {
+            for (std::size_t m = 0; m < 8; ++m) std::memcpy(to + m * to_rows, from + m * rows, 8 * sizeof(float));
+        };
+    };
+    across(0, 4, 7 * 64, 8, rows_to(padded + 11, 10));
+    across(1, 22, 0, 8, rows_to(padded + 911, 10));
+    across(2, 10, 7 * 8, 64, rows_to(padded + 101, 100));
+    across(3, 16, 0, 64, rows_to(padded + 191, 100));
+    const auto column_to = [](float* to) {
+        return [=](const float* from, std::size_t rows, auto in_block) {
+            constexpr std::size_t kStep = decltype(in_block)::value ? 8 : 1;
+            for (std::size_t m = 0; m < 8; ++m)
+                for (std::size_t n = 0; n < 8; ++n) to[m * 100 + n * 10] = from[m * rows + n * kStep];
+        };
+    };
+    across(4, 12, 7, 64, column_to(padded + 110));
+    across(5, 14, 0, 64, column_to(padded + 119));
 }
 
 void WindingField::sweep(std::size_t l) {
