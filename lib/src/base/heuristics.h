@@ -8,6 +8,8 @@
 // COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
 #include <cstddef>
 
+#include "covol/domain.h"
+
 #ifdef COVOL_SENSITIVITY
 #include <algorithm>
 #include <cmath>
@@ -48,11 +50,14 @@ template <typename T>
     return heuristic(name, value);
 }
 
+/// Distance in voxels by which a surface is continued beyond a cut, so that its band is correct up to the cut.
+inline constexpr double kBeyondVoxels = 2 * kHalfWidthVoxels;
+
 /// Constants that all steps have in common: samples, neighbourhoods, significance, repetition and margins.
 struct CommonHeuristics {
     /// [points] Size of a sample from which a median, a mean or a fraction is estimated: the standard error is below
     /// 2 %. Also the maximum number of points for steps whose time grows with its square.
-    std::size_t sample = heuristic("common.sample", 4000);
+    std::size_t sample = limit("common.sample", 4000);
     /// [points] Number of nearest neighbours that represent the surroundings of a point on a surface: about as many as
     /// a vertex of a mesh has.
     std::size_t ring = heuristic("common.ring", 8);
@@ -65,9 +70,6 @@ struct CommonHeuristics {
     int rounds = heuristic("common.rounds", 4);
     /// [ratio] Factor between successive lengths in the search for a suitable scale: sqrt(2), so that areas double.
     double growth = heuristic("common.growth", 1.4142135623730951);
-    /// [voxels] Distance by which a surface is continued beyond a cut, so that its band is correct up to the cut: twice
-    /// the half width of a band.
-    double beyond_voxels = heuristic("common.beyond_voxels", 6.0);
     /// [ratio] Margin around points, contours or a body, relative to their longest side.
     double margin = heuristic("common.margin", 0.2);
     /// [voxels] Precision of a position that is given by voxels, and thus the smallest length that has to be resolved.

@@ -56,7 +56,7 @@ Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domai
     // If the domain of the coarse solve extends beyond the image, because the image cuts off the body, the fine domain
     // is extended as well.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
-    return beyond > 2 * coarse.voxel_size ? widened(own, int(kCommon.beyond_voxels)) : own;
+    return beyond > 2 * coarse.voxel_size ? widened(own, int(kBeyondVoxels)) : own;
 }
 
 /// The band on the fine lattice at up to kEdgeSamples leaves of the coarse band, spread evenly over it.

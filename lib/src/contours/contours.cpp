@@ -30,7 +30,7 @@ constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
 /// Distance, in cells, from the image's end to the end of a body that is continued beyond it. No result depends on this
 /// end, because it lies farther outside the domain than the half width of the narrow band.
-double end_cells() { return kCommon.beyond_voxels + kHalfWidthVoxels + 1; }
+double end_cells() { return kBeyondVoxels + kHalfWidthVoxels + 1; }
 
 struct Line {
     std::vector<Vec3> index;  ///< marks in voxels of the image, or of the contours' own frame
@@ -443,7 +443,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
         if (!slices[end].open) return;
-        slices[end].cap = left + kCommon.beyond_voxels * options_.step;
+        slices[end].cap = left + kBeyondVoxels * options_.step;
         slices[end].end = left + end_cells() * options_.step;
     };
     if (slices.size() == 1) {

@@ -39,6 +39,10 @@ bool has_active(const FloatGrid& u) {
     return false;
 }
 
+// Motion in a step, relative to the motion that counts as steady, below which a leaf becomes inactive, unless one of
+// the 26 leaves around it moves by more.
+constexpr double kInactiveFraction = 0.2;
+
 // Limits of the step of check_step(): tau times the strongest weight. The coefficients of a row are stored as
 // fractions, accurate to half of 1/65535. With the smallest step, the motion is wrong by at most 1.5 %; with the
 // largest step, the fraction of the voxel itself, 1/(1 + 6 * step), is still above the smallest fraction that can be
@@ -216,7 +220,7 @@ private:
         marks_.resize(solver_->band().size());
     }
 
-    [[nodiscard]] double inactive_below() const { return kEvolve.inactive_fraction * options_.tolerance * tau_; }
+    [[nodiscard]] double inactive_below() const { return kInactiveFraction * options_.tolerance * tau_; }
 
     // For a fixed band: updates which leaves are active. @return remaining motion of the surface, voxels per step: the
     // smaller one of `motion` and its net motion

@@ -6,9 +6,6 @@ namespace covol {
 
 /// Time steps: evolve.cpp.
 struct EvolveHeuristics {
-    /// [fraction of the motion that counts as steady] Motion in a step below which a leaf becomes inactive, unless one
-    /// of the 26 leaves around it moves by more.
-    double inactive_fraction = heuristic("evolve.inactive_fraction", 0.2);
     /// [h] Maximum automatic time step.
     double largest_tau = heuristic("evolve.largest_tau", 10.0);
 };

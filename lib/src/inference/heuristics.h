@@ -15,7 +15,7 @@ struct InferenceHeuristics {
     double max_voxels = limit("inference.max_voxels", 6.4e7);
     /// [marks] Maximum number of marks from which the guess of a body is computed; also the maximum number of positions
     /// inside, and of positions outside, that are used. If there are more, those that are farthest apart are chosen.
-    std::size_t guess_marks = heuristic("inference.guess_marks", 150);
+    std::size_t guess_marks = limit("inference.guess_marks", 150);
     /// [spacings] Height above the marks' convex hull from which on a body is improbable.
     double above_hull = heuristic("inference.above_hull", 0.5);
     /// [log odds] Maximum for a single position, and the decrease of the log odds of inside per spacing of height above

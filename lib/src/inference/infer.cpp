@@ -124,7 +124,7 @@ Candidate Inference::best_candidate() const {
 
 void Inference::choose_box() {
     const double voxel = image_.geometry().smallest_spacing();
-    box_ = bounding_box(marks_.places, std::max(kCommon.beyond_voxels * voxel, marks_.spacing));
+    box_ = bounding_box(marks_.places, std::max(kBeyondVoxels * voxel, marks_.spacing));
 }
 
 bool Inference::find(InferenceReport& report) {

@@ -270,8 +270,7 @@ Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const 
             sum += miss.off / double(misses.size());
             maximum = std::max(maximum, miss.off);
         }
-        const Lattice lattice =
-            around(geometry, misses, (kCommon.clear_ratio + 1) * maximum + kCommon.beyond_voxels * voxel);
+        const Lattice lattice = around(geometry, misses, (kCommon.clear_ratio + 1) * maximum + kBeyondVoxels * voxel);
         if (is_too_large(lattice, geometry, run)) {
             result.reason = "the image's box around the marks that the guess misses is too large to be read as a whole";
             return;

@@ -39,9 +39,9 @@ struct FlowHeuristics {
     double rough_tau = heuristic("flow.rough_tau", 2.0);
     /// [voxels] Minimum width of a domain for an automatic coarse level: in a smaller one it saves little time, and
     /// thin structures may be lost.
-    int min_coarsened = heuristic("flow.min_coarsened", 64);
+    int min_coarsened = limit("flow.min_coarsened", 64);
     /// [steps] Maximum number of steps of the first flow after tagging, in which only the points attract.
-    int approach_steps = heuristic("flow.approach_steps", 40);
+    int approach_steps = limit("flow.approach_steps", 40);
     /// [passes] Maximum number of times that the image moves the body between contours.
     int contour_passes = heuristic("flow.contour_passes", 3);
     /// [distances between marked slices] Range within which the image may move the body between contours in one pass.

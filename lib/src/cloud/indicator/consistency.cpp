@@ -52,7 +52,7 @@ void Consistency::solve(const std::vector<Vec3>& normals) {  // starts from the 
     std::vector<Vec3> vectors(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(),
                       [&](std::size_t n) { vectors[n] = times(areas_[n], normals[n]); });
-    field_.solve(points_, vectors, is_solved_ ? kIteration.patch_cycles : kIndicator.cycles_from_nothing, run_);
+    field_.solve(points_, vectors, is_solved_ ? kIteration.patch_cycles : kCyclesFromNothing, run_);
     is_solved_ = true;
     const double half = scale_to_half(field_, points_);
     for (double& area : areas_) area *= half;

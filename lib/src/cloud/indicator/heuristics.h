@@ -35,8 +35,6 @@ struct IndicatorHeuristics {
     /// [square roots of the area that a point represents] Maximum cell size at the point, unless the finest grid is
     /// coarser: the coarsest grid within this limit is used, so that sparser points have coarser grids.
     double local_cells = heuristic("indicator.local_cells", 0.5);
-    /// [V-cycles] Number of multigrid cycles for a solution without a close initial value.
-    int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
 };
 COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
 

@@ -126,7 +126,7 @@ void solve(WindingField& field, const std::vector<Vec3>& points, const Orientati
 std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation,
                                               double cell, const RunContext& run) {
     WindingField field(indicator_grid(points, orientation.areas, cell));
-    solve(field, points, orientation, kIndicator.cycles_from_nothing, run);
+    solve(field, points, orientation, kCyclesFromNothing, run);
     scale_to_half(field, points);
     return make_indicator(field);
 }

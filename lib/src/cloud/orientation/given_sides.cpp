@@ -107,7 +107,7 @@ private:
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
             vectors[n] = selected[n] ? times(oriented_.areas[n], oriented_.normals[n]) : Vec3{0, 0, 0};
-        field_.solve(points_, vectors, kIndicator.cycles_from_nothing, run_);
+        field_.solve(points_, vectors, kCyclesFromNothing, run_);
         scale_to_half(field_, points_);
     }
 
@@ -137,7 +137,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
 /// Computes the indicator of an orientation's normals, scaled to 1/2 at the points, and scales the areas by the same
 /// factor.
 void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result, const RunContext& run) {
-    solve(field, points, result, kIndicator.cycles_from_nothing, run);
+    solve(field, points, result, kCyclesFromNothing, run);
     const double half = scale_to_half(field, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(field);

@@ -9,7 +9,7 @@ namespace covol {
 /// Spacing and noise of a cloud from quadrics fitted to neighbourhoods of increasing size: cloud_scale.cpp.
 struct CloudScaleHeuristics {
     /// [count] Maximum number of radii of the neighbourhoods that are tried.
-    int radii = heuristic("cloud_scale.radii", 14);
+    int radii = limit("cloud_scale.radii", 14);
     /// [median distances to the nearest point] The smallest radius of the neighbourhoods that are tried.
     double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
     /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; it is 0.45 for points that
@@ -82,8 +82,6 @@ COVOL_HEURISTICS PropagationHeuristics kPropagation{};
 
 /// Scans of one side, oriented by the directions from which each point can be seen: views.cpp.
 struct ViewsHeuristics {
-    /// [rays] Number of rays from each cell, evenly distributed over the sphere.
-    int rays = heuristic("views.rays", 96);
     /// [cells] Maximum number of cells along the longest side of the points' box: limits memory.
     int max_view_cells = limit("views.max_view_cells", 256);
     /// [indicator's slope over a cell] Weight of deviations of the screened indicator from 1/2 at a point that

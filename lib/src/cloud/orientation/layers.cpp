@@ -108,7 +108,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         run.check();
         turn(patch, orientation);
         WindingField now(field.indicator().shared_stack());
-        solve(now, points, orientation, kIndicator.cycles_from_nothing, run);
+        solve(now, points, orientation, kCyclesFromNothing, run);
         scale_to_half(now, points);
         const Level level(now, cells);
         const PointCells surface(level.middles, kLayers.farthest_layer * between);

@@ -20,12 +20,14 @@
 namespace covol::cloud {
 namespace {
 
+constexpr int kRays = 96;  // from each cell; half and twice as many changed no result of small scans
+
 /// Directions distributed evenly over the sphere: a Fibonacci spiral.
 std::vector<Vec3> directions() {
     std::vector<Vec3> all;
     const double golden = M_PI * (3 - std::sqrt(5.0));
-    for (int n = 0; n < kViews.rays; ++n) {
-        const double z = 1 - (2 * n + 1.0) / kViews.rays, r = std::sqrt(1 - z * z);
+    for (int n = 0; n < kRays; ++n) {
+        const double z = 1 - (2 * n + 1.0) / kRays, r = std::sqrt(1 - z * z);
         all.push_back({r * std::cos(golden * n), r * std::sin(golden * n), z});
     }
     return all;
@@ -100,7 +102,7 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
         Vec3 sum{0, 0, 0};
         for (const Vec3& ray : rays)
             if (occupied.is_free(from, ray))
-                for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kViews.rays;
+                for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kRays;
         const auto [begin, end] = cells.cell(c);
         for (std::uint32_t at = begin; at < end; ++at) free[cells.order()[at]] = sum;
     });
@@ -163,7 +165,7 @@ void add_screened(const std::vector<Vec3>& points, const CloudScale& scale, cons
     result.turned = double(against) / double(points.size());
     if (start != nullptr) fine.start_from(*start);
     fine.screen(points, screen);
-    solve(fine, points, result, kIndicator.cycles_from_nothing, run);
+    solve(fine, points, result, kCyclesFromNothing, run);
     result.screened = make_indicator(fine);
 }
 
@@ -175,7 +177,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
     WindingField coarse(indicator_grid(points, result.areas, cell));
-    solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
+    solve(coarse, points, result, kCyclesFromNothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     const std::vector<char> turned = turn_layers(coarse, points, free, apart(scale), result, run);

@@ -13,6 +13,10 @@
 
 namespace covol::cloud {
 
+/// Number of V-cycles for a solution without a close initial value. Half and twice as many changed no result of small
+/// clouds and scans.
+inline constexpr int kCyclesFromNothing = 8;
+
 class WindingField {
 public:
     explicit WindingField(std::shared_ptr<const GridStack> stack);

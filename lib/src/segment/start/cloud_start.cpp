@@ -82,7 +82,7 @@ void report_cloud(const CloudReport& report, std::size_t points, Remarks& remark
 }  // namespace
 
 Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<Vec3>& points) {
-    return problem.domain(h, points, kCommon.margin * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h);
+    return problem.domain(h, points, kCommon.margin * longest_side(bounding_box(points)) + kBeyondVoxels * h);
 }
 
 StartSurface start_from_cloud(const Problem& problem, const Choices& choices, MarkSets marks) {

@@ -16,7 +16,7 @@ namespace {
 /// would bend its wall until it is perpendicular to that end.
 Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     const WorldBox box = domain.world_box();
-    const int layers = int(kCommon.beyond_voxels);
+    const int layers = int(kBeyondVoxels);
     for (int a = 0; a < 3; ++a) {
         if (body.min[a] < box.min[a]) domain.min[a] -= layers;
         if (body.max[a] > box.max[a]) domain.max[a] += layers;
@@ -67,7 +67,7 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
     StartFacts& facts = start.facts;
     facts.report.remarks.choose("start", "contours",
                                 "the body between the contours; what inner contours enclose is outside", run);
-    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kCommon.beyond_voxels * choices.h);
+    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kBeyondVoxels * choices.h);
     if (!problem.options.roi) facts.domain = carried_beyond_image(facts.domain, body->box());
     {
         const Timed timed(facts.report.seconds.tag);
@@ -75,7 +75,7 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
     }
     if (!uses_points(facts.flow)) return start;
     if (problem.is_guided() && !loose.empty()) correct_start(problem, start);
-    const double range = std::max(facts.flow.attraction_range.value_or(0), kCommon.beyond_voxels * choices.h);
+    const double range = std::max(facts.flow.attraction_range.value_or(0), kBeyondVoxels * choices.h);
     start.distance =
         find_distance(facts.marks.attracting, facts.domain, range + band_slack(choices.h), 0, facts.report, run);
     return start;

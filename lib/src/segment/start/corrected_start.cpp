@@ -71,7 +71,7 @@ StartSurface start_from_corrected_guess(const Problem& problem, const Choices& c
     facts.origin = StartOrigin::Corrected;
     facts.marks = std::move(marks);
     facts.flow = choices.evolve;
-    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kCommon.beyond_voxels * choices.h);
+    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kBeyondVoxels * choices.h);
     {
         const Timed timed(facts.report.seconds.tag);
         start.u = start_grid(*problem.options.guess, facts.domain, problem.run);

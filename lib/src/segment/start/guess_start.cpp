@@ -124,11 +124,10 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     StartFacts& facts = start.facts;
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
-    facts.domain = problem.domain(h, points, kCommon.margin * longest_side(box) + kCommon.beyond_voxels * h);
+    facts.domain = problem.domain(h, points, kCommon.margin * longest_side(box) + kBeyondVoxels * h);
     // A body that the image cuts is continued beyond the image and clipped later: if it ended at the image's end, it
     // would be closed by a cap there, and the image would be evaluated at that cap.
-    if (problem.image != nullptr && !problem.options.roi)
-        facts.domain = widened(facts.domain, int(kCommon.beyond_voxels));
+    if (problem.image != nullptr && !problem.options.roi) facts.domain = widened(facts.domain, int(kBeyondVoxels));
     detail::require_band_memory(largest_area(box), h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);

@@ -17,8 +17,8 @@ StartSurface follow(StartOrigin origin, const Choices& choices, MarkSets marks) 
 }
 
 Domain choose_domain_of_flow(const Problem& problem, double h, const std::vector<Vec3>& points) {
-    const Domain domain = problem.domain(h, points, 2 * kCommon.beyond_voxels * h);
-    return problem.is_turned() && !problem.options.roi ? widened(domain, int(kCommon.beyond_voxels)) : domain;
+    const Domain domain = problem.domain(h, points, 2 * kBeyondVoxels * h);
+    return problem.is_turned() && !problem.options.roi ? widened(domain, int(kBeyondVoxels)) : domain;
 }
 
 FloatGridPtr carried_beyond_turned_image(const Problem& problem, const Domain& domain, FloatGridPtr u) {

@@ -91,12 +91,11 @@ std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& p
         body.tag.tag_distance = *given;
     } else {
         body.tag = tagger.choose(
-            closed,
-            around(domain, closed, 0.25 * longest_side(bounding_box(closed)) + kCommon.beyond_voxels * tagger.h));
+            closed, around(domain, closed, 0.25 * longest_side(bounding_box(closed)) + kBeyondVoxels * tagger.h));
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
-    const BandResult tagged = tagger.tag(closed, around(domain, closed, D + kCommon.beyond_voxels * tagger.h), D);
+    const BandResult tagged = tagger.tag(closed, around(domain, closed, D + kBeyondVoxels * tagger.h), D);
     if (tagged.report.leaks) return {};
     body.band = tagged.report;
     body.level_set = close_by_ball(*tagged.grid, D, tagger.problem.run);
@@ -118,7 +117,7 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
     };
     if (std::any_of(points.begin(), points.end(), is_at_end)) {
         std::optional<CutBody> body =
-            tag_with(tagger, points, domain, detail::carried_on(points, faces, kCommon.beyond_voxels * tagger.h),
+            tag_with(tagger, points, domain, detail::carried_on(points, faces, kBeyondVoxels * tagger.h),
                      "the marks' section on the image's end slices is continued beyond it");
         if (body) return body;
     }
@@ -171,7 +170,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
         // If the body ended at the image's end, the flow would bend its wall until it is perpendicular to that end.
-        facts.domain = widened(domain, int(kCommon.beyond_voxels));
+        facts.domain = widened(domain, int(kBeyondVoxels));
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
     Remarks& remarks = facts.report.remarks;
@@ -223,13 +222,13 @@ StartSurface start_by_tagging(const Problem& problem, const Choices& choices, Ma
         const Timed timed(facts.report.seconds.tag);
         // A domain that is wide enough for any D below a quarter of the cloud's size. The final one is made once D is
         // known.
-        const double margin = 0.25 * longest_side(bounding_box(points)) + kCommon.beyond_voxels * h;
+        const double margin = 0.25 * longest_side(bounding_box(points)) + kBeyondVoxels * h;
         facts.tag = tagger.choose(points, problem.domain_with_margin(h, points, margin));
         facts.tag_distance = facts.tag.tag_distance;
         remarks.choose("tag_distance", number(facts.tag.tag_distance), facts.tag.reason, run);
     }
     const double D = facts.tag.tag_distance = *facts.tag_distance;
-    facts.domain = problem.domain(h, points, D + kCommon.beyond_voxels * h);
+    facts.domain = problem.domain(h, points, D + kBeyondVoxels * h);
     start.distance = find_distance(points, facts.domain, D + band_slack(h), D, facts.report, run);
     const Timed timed(facts.report.seconds.tag);
     const BandResult tagged =

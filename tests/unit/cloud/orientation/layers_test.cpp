@@ -31,7 +31,7 @@ struct Layers {
         orientation.areas = areas_of(points, spacing);
         WindingField field(
             indicator_grid(points, {}, longest_side(bounding_box(points)) * (1 + 2 * kCommon.margin) / 80));
-        solve(field, points, orientation, kIndicator.cycles_from_nothing, {});
+        solve(field, points, orientation, kCyclesFromNothing, {});
         const double half = scale_to_half(field, points);
         for (double& area : orientation.areas) area *= half;
         const std::vector<char> turned = turn_layers(field, points, free, spacing, orientation, {});
