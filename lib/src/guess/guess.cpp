@@ -125,7 +125,7 @@ std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& m
 /// the plane of the face, is always less than kGuess.way_out pi.
 bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
     const auto [u, v] = detail::directions_in(face);
-    std::vector<std::array<double, 2>> around;  // of each other mark: squared distance, angle of the direction to it
+    std::vector<std::array<double, 2>> around;  // of the other marks: squared distance and angle, in the face's plane
     for (const Vec3& other : others) {
         const Vec3 to = minus(other, mark);
         const double x = dot(to, u), y = dot(to, v);

@@ -353,7 +353,7 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     return x;
 }
 
-/// The same if no edge is cut, so that q = 1 along all axes. @param a, b, c  the values v
+/// arrive() if the surface cuts no edge of the voxel: q is 1 along all axes. @param a, b, c  v of the three axes
 inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
     const Lanes lower = min(a, b), upper = max(a, b), first = min(lower, c);
     const Lanes second = max(lower, min(upper, c)) - first, third = max(upper, c) - first;

@@ -85,7 +85,8 @@ TEST_CASE("Overlapping structures are separated first, and then measured") {
         // The distances are within the band (3 voxels), so that the bias is the mean of the signed distances.
         CHECK(report.fit.bias == Approx(sign / double(s.marks.size())).margin(0.05));
         CHECK(report.fit.bias == Approx(sum / double(s.marks.size())).margin(0.15));
-        // Marks in the overlap are off one of the two surfaces by construction, and cause no warning.
+        // Where the two bodies overlap, each position goes to one of them, so the other one's marks there cannot lie on
+        // its surface. They cause no warning.
         CHECK(std::none_of(report.warnings.begin(), report.warnings.end(), [](const std::string& line) {
             return line.find("from the surface, the farthest") != std::string::npos;
         }));

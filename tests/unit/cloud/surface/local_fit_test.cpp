@@ -334,8 +334,8 @@ TEST_CASE("quadrics_over: wide neighbourhoods need fewer quadrics, and every pos
     INFO("farthest " << farthest / edge << ", beyond " << farthest_beyond / edge << " cells");
     CHECK(farthest < 3 * edge);
     CHECK(farthest_beyond < 2 * edge);
-    // Without noise no neighbourhood on a ball is so wide that nodes farther apart than `edge` would suffice for the
-    // quadrics.
+    // Quadrics fitted to wide neighbourhoods stand for wider cells (Quadric::apart). On a ball without noise no
+    // neighbourhood is that wide, so all quadrics keep the cells of edge `edge` that were requested.
     for (const Quadric& q : quadrics_over(places, places, edge, spacing, 0, bare, {})) CHECK(q.apart == edge);
 }
 
