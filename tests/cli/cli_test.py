@@ -255,7 +255,8 @@ class Configuration(Case):
                 ("model = other\n", 1, "--model: expected guided or paper, got 'other'")):
             with self.subTest(text):
                 config.write_text(text)
-                self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2,
+                code = 3 if "-1" in text else 2  # 3: a value of the right kind, but not in the range of the option
+                self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=code,
                             expected_text=f"--config {config}: line {line}: {expected_text}")
         # The command line takes precedence, and is then to blame.
         config.write_text("max-steps = many\n")

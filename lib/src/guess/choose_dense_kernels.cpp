@@ -14,12 +14,17 @@ extern const DenseKernels kDenseKernels;
 }
 #endif
 
-const DenseKernels& dense_kernels() {
+std::vector<const DenseKernels*> available_dense_kernels() {
+    std::vector<const DenseKernels*> sets{&baseline::kDenseKernels};
 #ifdef COVOL_X86
-    // With AVX-512, a system of 300 marks takes as long.
-    if (detail::kernels().name != std::string_view("baseline")) return avx2::kDenseKernels;
+    if (detail::available_kernels().size() > 1) sets.push_back(&avx2::kDenseKernels);
 #endif
-    return baseline::kDenseKernels;
+    return sets;
+}
+
+const DenseKernels& dense_kernels() {
+    const bool is_baseline = detail::kernels().name == std::string_view("baseline");
+    return is_baseline ? baseline::kDenseKernels : *available_dense_kernels().back();
 }
 
 }  // namespace covol::guess

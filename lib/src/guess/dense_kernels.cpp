@@ -6,6 +6,9 @@
 
 #include <Eigen/Cholesky>
 
+#define COVOL_TEXT_(x) #x
+#define COVOL_TEXT(x) COVOL_TEXT_(x)
+
 namespace covol::guess::COVOL_SIMD_NAME {
 namespace {
 
@@ -39,6 +42,6 @@ void times(const double* A, Size n, const double* x, double* y) {
 }  // namespace
 
 extern const DenseKernels kDenseKernels;
-const DenseKernels kDenseKernels{cholesky, solve_lower, add_transposed_product, times};
+const DenseKernels kDenseKernels{COVOL_TEXT(COVOL_SIMD_NAME), cholesky, solve_lower, add_transposed_product, times};
 
 }  // namespace covol::guess::COVOL_SIMD_NAME

@@ -1,12 +1,15 @@
 #pragma once
 // Dense linear algebra for systems of hundreds of marks: Eigen's, compiled once for each instruction set.
 #include <cstddef>
+#include <vector>
 
 namespace covol::guess {
 
 /// Matrices are stored by columns; `stride` is the distance between the first elements of successive columns. The
 /// results of the instruction sets differ by rounding.
 struct DenseKernels {
+    const char* name;  ///< "baseline" or "avx2"
+
     using Size = std::ptrdiff_t;
 
     /// Replaces the lower triangle of an n x n matrix by its Cholesky factor L.
@@ -24,7 +27,10 @@ struct DenseKernels {
     void (*times)(const double* A, Size n, const double* x, double* y);
 };
 
-/// The kernels of the instruction set that the solver uses, too: scheme/scheme.h.
+/// The kernels of the instruction set that the solver uses, too (scheme/scheme.h); those for AVX2 if it uses AVX-512.
 [[nodiscard]] const DenseKernels& dense_kernels();
+
+/// All kernels that this processor supports.
+[[nodiscard]] std::vector<const DenseKernels*> available_dense_kernels();
 
 }  // namespace covol::guess

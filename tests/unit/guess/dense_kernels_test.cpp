@@ -34,42 +34,55 @@ double difference(const MatrixXd& a, const MatrixXd& b) { return (a - b).cwiseAb
 MatrixXd lower(const MatrixXd& m) { return m.triangularView<Eigen::Lower>(); }
 
 TEST_CASE("Dense kernels: the product of the Cholesky factor and its transpose is the matrix") {
-    const MatrixXd m = some_matrix(kSize, kSize);
-    const MatrixXd positive = product(m.transpose(), m) + MatrixXd::Identity(kSize, kSize);
-    MatrixXd factor = positive;
-    REQUIRE(dense_kernels().cholesky(factor.data(), kSize));
-    const MatrixXd L = lower(factor);
-    CHECK(difference(product(L, L.transpose()), positive) < 1e-11 * positive.norm());
-    MatrixXd indefinite = positive;
-    indefinite(kSize - 1, kSize - 1) = -1;
-    CHECK_FALSE(dense_kernels().cholesky(indefinite.data(), kSize));
+    for (const DenseKernels* const set : available_dense_kernels()) {
+        const DenseKernels& dense = *set;
+        INFO(dense.name);
+        const MatrixXd m = some_matrix(kSize, kSize);
+        const MatrixXd positive = product(m.transpose(), m) + MatrixXd::Identity(kSize, kSize);
+        MatrixXd factor = positive;
+        REQUIRE(dense.cholesky(factor.data(), kSize));
+        const MatrixXd L = lower(factor);
+        CHECK(difference(product(L, L.transpose()), positive) < 1e-11 * positive.norm());
+        MatrixXd indefinite = positive;
+        indefinite(kSize - 1, kSize - 1) = -1;
+        CHECK_FALSE(dense.cholesky(indefinite.data(), kSize));
+    }
 }
 
 TEST_CASE("Dense kernels: a triangular system in blocks of larger matrices is solved in place") {
-    const Index n = kSize - 20, columns = 70;
-    MatrixXd whole = some_matrix(kSize, kSize);
-    whole.diagonal().array() += 20.0;
-    MatrixXd right = some_matrix(kSize, columns);
-    const MatrixXd before = right;
-    dense_kernels().solve_lower(&whole(20, 20), n, kSize, &right(20, 0), columns, kSize);
-    CHECK(difference(product(lower(whole.bottomRightCorner(n, n)), right.bottomRows(n)), before.bottomRows(n)) < 1e-11);
-    CHECK(difference(right.topRows(20), before.topRows(20)) == 0);
+    for (const DenseKernels* const set : available_dense_kernels()) {
+        const DenseKernels& dense = *set;
+        INFO(dense.name);
+        const Index n = kSize - 20, columns = 70;
+        MatrixXd whole = some_matrix(kSize, kSize);
+        whole.diagonal().array() += 20.0;
+        MatrixXd right = some_matrix(kSize, columns);
+        const MatrixXd before = right;
+        dense.solve_lower(&whole(20, 20), n, kSize, &right(20, 0), columns, kSize);
+        CHECK(difference(product(lower(whole.bottomRightCorner(n, n)), right.bottomRows(n)), before.bottomRows(n)) <
+              1e-11);
+        CHECK(difference(right.topRows(20), before.topRows(20)) == 0);
+    }
 }
 
 TEST_CASE("Dense kernels: products are those of the definition, also in blocks of larger matrices") {
-    const MatrixXd a = some_matrix(kSize, kSize), b = some_matrix(kSize, 64);
-    MatrixXd c = MatrixXd::Constant(kSize, 64, 7.0);
-    const Index n = kSize - 30;
-    dense_kernels().add_transposed_product(&a(30, 10), kSize, &b(30, 4), kSize, n, &c(50, 1), 90, 33, kSize);
-    const MatrixXd sum = product(a.block(30, 10, n, 90).transpose(), b.block(30, 4, n, 33)).array() + 7.0;
-    CHECK(difference(c.block(50, 1, 90, 33), sum) < 1e-12);
-    c.block(50, 1, 90, 33).setConstant(7.0);
-    CHECK(difference(c, MatrixXd::Constant(kSize, 64, 7.0)) == 0);
+    for (const DenseKernels* const set : available_dense_kernels()) {
+        const DenseKernels& dense = *set;
+        INFO(dense.name);
+        const MatrixXd a = some_matrix(kSize, kSize), b = some_matrix(kSize, 64);
+        MatrixXd c = MatrixXd::Constant(kSize, 64, 7.0);
+        const Index n = kSize - 30;
+        dense.add_transposed_product(&a(30, 10), kSize, &b(30, 4), kSize, n, &c(50, 1), 90, 33, kSize);
+        const MatrixXd sum = product(a.block(30, 10, n, 90).transpose(), b.block(30, 4, n, 33)).array() + 7.0;
+        CHECK(difference(c.block(50, 1, 90, 33), sum) < 1e-12);
+        c.block(50, 1, 90, 33).setConstant(7.0);
+        CHECK(difference(c, MatrixXd::Constant(kSize, 64, 7.0)) == 0);
 
-    const MatrixXd x = some_matrix(kSize, 1);
-    MatrixXd y = x;
-    dense_kernels().times(a.data(), kSize, x.data(), y.data());
-    CHECK(difference(y, product(a, x)) < 1e-12);
+        const MatrixXd x = some_matrix(kSize, 1);
+        MatrixXd y = x;
+        dense.times(a.data(), kSize, x.data(), y.data());
+        CHECK(difference(y, product(a, x)) < 1e-12);
+    }
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 
 #include "cli/options/option_names.h"
 #include "cli/output/report.h"
-#include "covol/error.h"
 #include "covol/file_kind.h"
 #include "covol/study.h"
 #include "jobs/brick_job.h"

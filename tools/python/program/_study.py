@@ -40,7 +40,10 @@ def read_options(folder):
 
 
 def _options_of(given):
-    options = {name: float(given[name]) for name in _NUMBERS if name in given}
+    options = {name: given[name] for name in _NUMBERS if name in given}
+    for value in options.values():
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ValueError(value)
     if "model" in given:
         if given["model"] not in ("guided", "paper"):
             raise ValueError(given["model"])

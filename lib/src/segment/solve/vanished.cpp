@@ -46,8 +46,8 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     if (is_flat) {
         // Small parts that are far apart nearly lie on a line or in a plane, too, although each may enclose a body.
         const double edge = 2 * kCloud.coarse * measure_spacing(points).median;
-        const std::vector<Vec3> part = cloud::largest_part(points, 1 / kCommon.negligible, edge);
-        if (can_enclose(part)) {
+        const std::vector<Vec3> part = edge > 0 ? cloud::largest_part(points, 1 / kCommon.negligible, edge) : points;
+        if (part.size() < points.size() && can_enclose(part)) {
             text << "the points form parts that are far apart compared to their size: the largest part is "
                  << longest_side(bounding_box(part)) << " long, all points together "
                  << longest_side(bounding_box(points)) << "; reconstruct each part alone, or try `init = cloud`";

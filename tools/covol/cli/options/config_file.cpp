@@ -237,7 +237,7 @@ const CLI::Option* find_option(const CLI::App& command, const std::string& name)
 std::string hint(const std::string& name, const std::vector<std::string>& known) {
     constexpr std::size_t kLongest = 60;  // no option and no command has a longer name
     const std::string close = name.size() > kLongest ? "" : nearest(name, known);
-    return close.empty() ? "." : "; did you mean " + close + "?";
+    return close.empty() ? "." : did_you_mean(close);
 }
 
 /// The option that an entry outside of sections, or in the section of the command, names.
@@ -274,10 +274,9 @@ void require_command(const std::string& section, const std::vector<const CLI::Ap
 }
 
 void require_count(const CLI::Option& option, const CLI::ConfigItem& item, const std::string& place) {
-    const auto maximum = std::size_t(std::max(1, option.get_items_expected_max()));
-    if (item.inputs.size() > maximum)
-        throw UsageError(place + in_quotes(item.name) + ": expected " +
-                         (maximum == 1 ? "one value" : "at most " + std::to_string(maximum) + " values") + ", got " +
+    // An option takes one value, or any number.
+    if (item.inputs.size() > std::size_t(std::max(1, option.get_items_expected_max())))
+        throw UsageError(place + in_quotes(item.name) + ": expected one value, got " +
                          std::to_string(item.inputs.size()) +
                          "; give the option once, with quotes around a value that has blanks or commas");
 }
@@ -315,7 +314,7 @@ std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const 
     const std::vector<CLI::App*> parsed = program_.get_subcommands();
     const CLI::App* const command = parsed.empty() ? nullptr : parsed.front();
     const std::vector<std::string>& files = program_.get_config_ptr()->results();
-    const std::string file = "--config" + (files.empty() ? "" : " " + files.front()), text = all_of(input, file);
+    const std::string file = "--config" + (files.size() == 1 ? " " + files.front() : ""), text = all_of(input, file);
     std::vector<CLI::ConfigItem> items;
     std::map<const CLI::Option*, std::size_t> lines;
     const CLI::Option* last = nullptr;

@@ -44,10 +44,12 @@ std::vector<std::string> names_of_options(const CLI::App& app) {
 }
 
 std::string with_hint(const std::string& message, const std::string& close, const std::string& help) {
-    return message + (close.empty() ? "." : "; did you mean " + close + "?") + " See " + help;
+    return message + (close.empty() ? "." : did_you_mean(close)) + " See " + help;
 }
 
 }  // namespace
+
+std::string did_you_mean(const std::string& close) { return close.empty() ? "" : "; did you mean " + close + "?"; }
 
 std::string nearest(const std::string& word, const std::vector<std::string>& known) {
     const std::size_t bound = std::max<std::size_t>(1, std::min<std::size_t>(3, word.size() / 3));

@@ -10,6 +10,9 @@ namespace covol::tool {
 /// that begins with the word; empty if none is close.
 [[nodiscard]] std::string nearest(const std::string& word, const std::vector<std::string>& known);
 
+/// "; did you mean X?" for a known name X; empty for an empty one.
+[[nodiscard]] std::string did_you_mean(const std::string& close);
+
 /// An error message that names the first unknown command or option and the nearest known one; empty if all are known.
 [[nodiscard]] std::string unknown_name(const CLI::App& program, const std::vector<std::string>& words);
 

@@ -78,15 +78,13 @@ std::string wrong_value(const CLI::Option& option) {
     for (std::size_t n = 0; n < words.size(); ++n)
         list += (n == 0 ? "" : n + 1 < words.size() ? ", " : " or ") + words[n];
     const std::string close = nearest(value, words);
-    return "expected " + list + got + (close.empty() ? "" : "; did you mean " + close + "?");
+    return "expected " + list + got + did_you_mean(close);
 }
 
 std::string wrong_count(const CLI::Option& option, bool too_many) {
     const std::string type = help_of(option).value;
     if (!too_many) return "expected a value" + (type.empty() ? "" : ", " + type) + ", got none";
-    const int maximum = std::max(1, option.get_items_expected_max());
-    return "expected " + (maximum == 1 ? std::string("one value") : "at most " + std::to_string(maximum) + " values") +
-           ", got " + std::to_string(option.results().size()) + " (" + list_of(option.results()) +
+    return "expected one value, got " + std::to_string(option.results().size()) + " (" + list_of(option.results()) +
            "); give the option once";
 }
 

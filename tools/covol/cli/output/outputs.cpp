@@ -121,31 +121,38 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
         throw Error(Errc::Io, flag + ": " + path +
                                   ": cannot write: it exists and is not a Zarr store; choose "
                                   "another name");
-    for (const std::string& input : inputs_) {
-        std::vector<std::string> files =
-            may_refer_elsewhere(input) ? files_of(input, target) : std::vector<std::string>{};
+    for (const Input& input : inputs_) {
+        std::vector<File> files = may_refer_elsewhere(input.path) ? files_of(input, {}) : std::vector<File>{};
         files.push_back(input);
-        for (const std::string& file : files)
-            if (lies_in(file, target))
-                throw Error(Errc::InvalidOptions, flag + ": " + path + ": " + file +
+        for (const File& file : files)
+            if (lies_in(file.path, target))
+                throw Error(Errc::InvalidOptions, flag + ": " + path + ": " + file.path +
                                                       ", an input of this run, lies in it; choose another name");
     }
 }
 
 void Outputs::protect(const std::vector<std::string>& inputs) {
-    inputs_.insert(inputs_.end(), inputs.begin(), inputs.end());
+    std::error_code status;
+    for (const std::string& path : inputs) {
+        const fs::path folder = fs::is_directory(path, status) ? fs::path(path) : fs::absolute(path).parent_path();
+        inputs_.push_back({{path, id_of(path)}, id_of(folder)});
+    }
     std::copy_if(inputs.begin(), inputs.end(), std::back_inserter(stores_), is_zarr_name);
 }
 
-const std::vector<std::string>& Outputs::files_of(const std::string& input, const fs::path& folder) {
-    static const std::vector<std::string> none;
-    std::error_code status;
-    const fs::path own = fs::is_directory(input, status) ? fs::path(input) : fs::absolute(input).parent_path();
-    if (!may_refer_elsewhere(input) && !fs::equivalent(own, folder, status)) return none;
-    const auto [entry, is_new] = files_of_.try_emplace(input);
+std::optional<Outputs::FileId> Outputs::id_of(const fs::path& path) {
+    struct stat entry {};
+    if (::stat(path.c_str(), &entry) != 0) return {};
+    return FileId{entry.st_dev, entry.st_ino};
+}
+
+const std::vector<Outputs::File>& Outputs::files_of(const Input& input, const std::optional<FileId>& folder) {
+    static const std::vector<File> none;
+    if (!may_refer_elsewhere(input.path) && input.folder != folder) return none;
+    const auto [entry, is_new] = files_of_.try_emplace(input.path);
     if (is_new) {
         try {
-            entry->second = list_image_files(input);
+            for (const std::string& path : list_image_files(input.path)) entry->second.push_back({path, id_of(path)});
         } catch (const Error& error) {
             // The input is not an image, or it is one that cannot be read; this error is reported when it is read.
             if (error.code() == Errc::Cancelled) throw;
@@ -159,14 +166,16 @@ void Outputs::check_inputs(const std::string& flag, const std::string& path, con
         throw Error(Errc::InvalidOptions, flag + ": " + path + ": " + why + "; choose another name");
     };
     std::error_code status;
-    // Only a file that exists can be an input. With thousands of frames, comparing each output with each input takes
-    // minutes.
-    if (fs::exists(target, status))
-        for (const std::string& input : inputs_) {
-            if (fs::equivalent(target, input, status)) refuse("is an input of this run");
-            for (const std::string& file : files_of(input, target.parent_path()))
-                if (fs::equivalent(target, file, status)) refuse("belongs to " + input + ", an input of this run");
+    // Only a file that exists can be an input. Each output is compared with each input, of which there can be
+    // thousands: the inputs' files are therefore examined once.
+    if (const std::optional<FileId> id = id_of(target)) {
+        const std::optional<FileId> folder = id_of(target.parent_path());
+        for (const Input& input : inputs_) {
+            if (input.id == id) refuse("is an input of this run");
+            for (const File& file : files_of(input, folder))
+                if (file.id == id) refuse("belongs to " + input.path + ", an input of this run");
         }
+    }
     for (const std::string& store : stores_)
         if (fs::is_directory(store, status) && lies_in(target, store))
             refuse("lies in " + store + ", an input of this run");
