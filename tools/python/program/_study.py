@@ -44,6 +44,7 @@ def _options_of(given):
     for value in options.values():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(value)
+    options = {name: float(value) for name, value in options.items()}
     if "model" in given:
         if given["model"] not in ("guided", "paper"):
             raise ValueError(given["model"])
