@@ -172,26 +172,6 @@ TEST_CASE("track_free_surface: the surface stays in place, and the band contains
 }
 
 // The band is examined in each third step.
-TEST_CASE("A free band is rebuilt if |grad u| on its surface is below 1/2 or above 2, otherwise it stays as it is") {
-    const double slope = GENERATE(0.25, 0.6, 1.7, 8.0);
-    INFO("slope " << slope);
-    // An obstacle and a floor with the same values hold u to them, so that the slope changes, but the surface does not
-    // move.
-    const FloatGridPtr held = over_cube([&](double x) { return slope * (x - kPlane); }, "obstacle");
-    EvolveFields fields;
-    fields.obstacle = fields.floor = held.get();
-    CHECK(slope_at_plane(*tracked(fields, 0, kH, 2)) == Approx(slope));
-    const FloatGridPtr u = tracked(fields, 0, kH, 3);
-    const bool is_rebuilt = slope < detail::kFlattest || slope > detail::kSteepest;
-    CHECK(slope_at_plane(*u) == Approx(is_rebuilt ? 1 : slope).margin(1e-3));
-    double maximum = 0;
-    for (auto value = u->cbeginValueOn(); value; ++value) {
-        const double x = world_of(kCube, value.getCoord())[0];
-        maximum = std::max(maximum, std::abs(double(*value) - (is_rebuilt ? 1 : slope) * (x - kPlane)) / kH);
-    }
-    CHECK(maximum < 0.1);
-}
-
 TEST_CASE("The level set of a surface held by points is redistanced once |grad u| on it is above 2") {
     const FloatGridPtr distance = over_cube([](double x) { return std::abs(x - kPlane); }, "distance");
     EvolveFields fields;
