@@ -55,16 +55,20 @@ class SphereHoles(unittest.TestCase):
 
     @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
     def test_points_complete_the_sphere_at_260(self):
-        # All three kinds at half the size are tested above; tests/verification.py runs them at this size, too.
         folder = pathlib.Path(DATA or "").resolve() / "phantoms"
-        shell = self.expect_points_met(folder / "sphere_slit.nrrd", folder / "sphere_slit_points.xyz", "slit", 0.01)
-        self.assertLess(shell, 0.3)
-
-    def test_marks_on_the_middle_of_a_shell_belong_to_the_image(self):
-        """The steepest slopes are beside a line, not on it, which is no reason to doubt the marks."""
         for kind in KINDS:
             with self.subTest(kind=kind):
-                self.run_covol("segment", f"{kind}.nrrd", "--points", f"{kind}.xyz", "-o", "s.vdb", "--json", "r.json")
+                shell = self.expect_points_met(folder / f"sphere_{kind}.nrrd", folder / f"sphere_{kind}_points.xyz", kind, 0.01)
+                self.assertLess(shell, 0.3)
+
+    @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
+    def test_marks_on_the_middle_of_a_shell_belong_to_the_image(self):
+        """The steepest slopes are beside a line, not on it, which is no reason to doubt the marks."""
+        folder = pathlib.Path(DATA or "").resolve() / "phantoms"
+        for kind in KINDS:
+            with self.subTest(kind=kind):
+                self.run_covol("segment", folder / f"sphere_{kind}.nrrd", "--points", folder / f"sphere_{kind}_points.xyz",
+                               "-o", "s.vdb", "--json", "r.json")
                 self.assertEqual(json.loads((self.out / "r.json").read_text()).get("warnings", []), [])
 
     def test_the_image_alone_spans_flat_discs(self):
