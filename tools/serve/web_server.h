@@ -50,8 +50,9 @@ struct Handlers {
     /// A POST with its body, one at a time, if Options::max_body_bytes > 0. Otherwise like `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
-    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, the client is closed (code 1011)
-    std::function<void(Client)> closed{};                     ///< exactly once for each client that was `opened`
+    std::function<void(Client, std::string_view)>
+        message{};                                       ///< UTF-8; if it throws, the WebSocket is closed (code 1011)
+    std::function<void(Client)> closed{};                ///< exactly once for each client that was `opened`
     std::function<void(const std::string&)> on_error{};  ///< errors in a handler or in accepting connections, for a log
 };
 
@@ -65,14 +66,15 @@ struct Options {
     std::vector<std::string> frame_origins{};
     std::string page_policy = "default-src 'none'";  ///< Content-Security-Policy of text/html, without frame-ancestors
     std::string live_path = "/live";                 ///< path of WebSockets
-    std::size_t max_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
-    std::size_t max_body_bytes = 0;                         ///< of a POST; 0: all POSTs are refused
-    std::size_t max_waiting_bytes = std::size_t(64) << 20;  ///< unsent data of a client; with more, it is closed
+    std::size_t max_message_bytes = std::size_t(4) << 20;  ///< of a message that a client sends, >= 1
+    std::size_t max_body_bytes = 0;                        ///< of a POST; 0: all POSTs are refused
+    std::size_t max_waiting_bytes = std::size_t(64)
+                                    << 20;  ///< maximum of a client's unsent data; with more, it is disconnected
     /// Maximum number of open connections, >= 1, including WebSockets. For a further one, the connection that has been
     /// waiting longest for a request is closed; if none is waiting, the new one is refused (503).
     std::size_t max_connections = 16;
     std::size_t max_clients = 8;                  ///< maximum number of open WebSockets
-    double messages_per_second = 200;             ///< > 0, of each client; with more, it is closed (code 1008)
+    double messages_per_second = 200;             ///< > 0, for each client; with more, it is disconnected (1008)
     double message_burst = 400;                   ///< >= 1, maximum number of messages at once
     std::chrono::milliseconds idle{30'000};       ///< >= 1, maximum time without request or progress of an answer
     std::chrono::milliseconds live_idle{60'000};  ///< >= 2, maximum time to answer a ping, and for handlers to catch up

@@ -82,7 +82,7 @@ struct Orientation {
 /// Information from files about points in addition to their positions. Each list is empty or has an entry for each
 /// point, which is 0 if it is unknown.
 struct PointHints {
-    std::vector<Vec3> normals;    ///< unit vectors; their sides may be wrong
+    std::vector<Vec3> normals;    ///< unit vectors; any of them may point inwards instead of outwards
     std::vector<Vec3> to_sensor;  ///< unit vectors from the points to the positions from which they were seen
     bool is_outward = false;      ///< the normals are known to point outwards, like those of a network's sections
 };

@@ -88,7 +88,7 @@ struct Painted {
 
 /// Joins the outlines to a body, as densify() does. Parts of outlines at the image's end are places where the body is
 /// cut, and not marks on its surface.
-/// @param lattice  of the label image. @pre the label has a view
+/// @param lattice  of the label image. @pre label.views is not empty
 [[nodiscard]] COVOL_API Contours connect_outlines(const PaintedLabel& label, const ImageGeometry& lattice, double step,
                                                   const RunContext& run = {});
 

@@ -30,7 +30,7 @@ struct LargeAllocator {
         void* memory = std::aligned_alloc(unit, bytes);
         if (memory == nullptr) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-        if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // optional: without huge pages it is only slower
+        if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // errors are ignored: small pages only cost time
 #endif
         return static_cast<T*>(memory);
     }

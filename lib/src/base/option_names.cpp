@@ -38,8 +38,8 @@ std::string replace_names(const std::string& message, const SpellOption& spell) 
         result.append(message, at, begin - at);
         if (end == std::string::npos) return begin == end ? result : result.append(message, begin);
         const auto named = spelled(std::string_view(message).substr(begin + 1, end - begin - 1), spell);
-        // If the text does not consist of option names, the second backquote may begin another pair; it is therefore
-        // searched again.
+        // If the text does not consist of option names, the second backquote may begin another pair. The search
+        // therefore continues at that backquote.
         result += named ? *named : message.substr(begin, end - begin);
         at = named ? end + 1 : end;
     }

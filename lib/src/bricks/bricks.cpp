@@ -368,7 +368,7 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
         StepReport before = choices.report;
         if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
         // The surface is extracted brick by brick and joined, even if u is requested and joined as well, so that it is
-        // bitwise equal in both cases. That of a cloud follows from its field and has no evolution.
+        // bitwise equal in both cases. The surface of a cloud, which does not evolve, follows from the cloud's field.
         FloatGridPtr surface;
         Solution solution = parts_->field ? parts_->join(plan, states) : parts_->solution_on(plan);
         if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);

@@ -235,7 +235,8 @@ public:
 
 private:
     /// Number of layers of voxels, counted from the face inward, whose distances are read. In up to three of them, the
-    /// face may be nearer than the wall, so that its distance is stored; two more are needed to determine the slope.
+    /// grid may contain the distance to the face, because the face is nearer than the wall. Two more layers are needed
+    /// to determine the slope of the distance to the wall.
     static constexpr int kDepth = 5;
 
     /// @return whether the solid meets this face.

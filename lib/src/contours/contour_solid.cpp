@@ -20,8 +20,8 @@ using detail::Vec2;
 
 namespace {
 
-/// The dome's profile: the distance by which the body's wall lies inside the last contour at the fraction t of the
-/// dome's height. A paraboloid: the area of its sections decreases linearly with the height.
+/// The dome's profile: the distance by which the body's lateral surface lies inside the last contour at the fraction t
+/// of the dome's height. A paraboloid: the area of its sections decreases linearly with the height.
 double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
 
 /// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, or
@@ -120,9 +120,10 @@ private:
         const double height = std::abs(w - slice().w);
         return slice().open ? std::max(carried_on(c, height), height - slice().end) : c.here + beyond(height);
     }
-    /// The level at a height beyond an open end. A wall that converges is continued linearly. A wall that diverges is
-    /// continued as a paraboloid, which becomes steeper with the height, with an outward slope of at most 45 degrees:
-    /// bodies are usually round, so that a section that grows fast does not grow indefinitely.
+    /// The level at a height beyond an open end. If the sections shrink towards the end, the lateral surface is
+    /// continued linearly. If they grow, it is continued as a paraboloid, which becomes steeper with the height, with
+    /// an outward slope of at most 45 degrees: bodies are usually round, so that a section that grows fast does not
+    /// grow indefinitely.
     [[nodiscard]] double carried_on(const Column& c, double height) const {
         const double t = height / std::abs(slice().w - inner().w), change = c.here - c.there;
         return c.here + (change > 0 ? t * change : std::max((std::sqrt(1 + t) - 1) * change, -height));
@@ -147,8 +148,8 @@ private:
     [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
     [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
-    /// Whether an end slice's section does not overlap that of its neighbour. The direction of the wall does not follow
-    /// from the two sections then.
+    /// Whether an end slice's section does not overlap that of its neighbour. If so, the direction of the lateral
+    /// surface does not follow from the two sections.
     [[nodiscard]] bool is_apart() const { return kind_ == Kind::Below ? slice().apart : inner().apart; }
     [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
@@ -319,8 +320,8 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    // Beyond an open end slice, the wall slopes outward by at most 45 degrees, so the body extends sideways beyond the
-    // grid by at most the height of its continuation.
+    // Beyond an open end slice, the lateral surface slopes outward by at most 45 degrees, so the body extends sideways
+    // beyond the grid by at most the height of its continuation.
     double wider = 0;
     for (const SolidSlice* end : {&slices.front(), &slices.back()})
         if (end->open) wider = std::max(wider, end->end);

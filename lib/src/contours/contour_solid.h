@@ -49,9 +49,9 @@ struct SolidSlice {
     std::size_t polygons = 0;
     double area = 0;   ///< area of the inside
     double depth = 0;  ///< maximum distance of a node inside from the contours
-    double cap = 0;    ///< first and last slice: height of the dome, or up to which an open end has surface points
+    double cap = 0;  ///< first and last slice: height of the dome, or height up to which an open end has surface points
     /// First and last slice: there is no dome, because the image ends here. The body continues beyond the image with
-    /// the slope of the wall between the last two sections.
+    /// the slope of its lateral surface between the last two sections.
     bool open = false;
     double end = 0;      ///< height at which an open end is cut off, so far outside that no narrow band reaches it
     bool apart = false;  ///< this section and the next slice's do not overlap

@@ -213,7 +213,7 @@ bool Densifier::choose_tilted_plane() {
     return true;
 }
 
-/// Chooses the axis across which most marks lie on lines; closed lines count twice, those across several axes 0.
+/// Chooses the axis with the largest number of marks on lines perpendicular to it alone; closed lines count twice.
 void Densifier::choose_plane() {
     std::array<std::size_t, 3> votes{0, 0, 0};
     for (const Line& line : lines_) {

@@ -227,7 +227,8 @@ std::vector<LeafNode*> leaves_of(FloatGrid& grid) {
     return leaves;
 }
 
-// The value of s at the percentile over the topology's active voxels; K = 1/s².
+// The given percentile of s, the argument of g(s), over the active voxels of `slopes`. K is then 1 over the square of
+// this value.
 double contrast_of(FloatGrid& slopes, double percentile) {
     const std::vector<LeafNode*> leaves = leaves_of(slopes);
     std::vector<std::size_t> first{0};

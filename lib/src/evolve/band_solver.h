@@ -26,7 +26,7 @@ public:
     struct Counts {
         std::int64_t passes = 0;        ///< number of passes over the leaves
         std::int64_t visits = 0;        ///< number of visits of a leaf
-        std::int64_t visits_saved = 0;  ///< visits fewer than if each pass visited all leaves
+        std::int64_t visits_saved = 0;  ///< number of visits that were omitted because a leaf had not changed
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 

@@ -165,8 +165,8 @@ private:
                     options_.tau ? "tau" : "delta");
     }
 
-    // A saved state lies between two steps. It consists of u from which the band was made and of what the steps since
-    // then have changed; this function writes or reads the latter.
+    // A state is saved between two steps. It consists of the level set from which the band was made, and of everything
+    // that steps have changed since the band was made. This function writes or reads the second part.
     void exchange(detail::StateFile& file) {
         file.value(is_finished_);
         file.value(tau_);
@@ -245,8 +245,8 @@ private:
             rebuild_band(left, largest);
         else if (!front.is_distance)
             solver_->redistance(tracking_clamp(options_));
-        // After the redistancing: a leaf that becomes inactive then keeps values of the phase of the cycle in which the
-        // evolution ends.
+        // This is done after the redistancing, because a leaf that becomes inactive keeps its present values: they are
+        // then from the same phase of the cycle as those of active leaves at the end of the evolution.
         if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
         return std::min(motion, front.moved / kCycle);
     }

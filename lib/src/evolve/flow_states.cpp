@@ -15,7 +15,8 @@ namespace {
 constexpr const char *kGrids = ".vdb", *kNumbers = ".state";
 
 FloatGridPtr named(const FloatGrid& grid, const char* name) {
-    FloatGridPtr copy = std::const_pointer_cast<FloatGrid>(grid.copy());  // shares the tree, only written to a file
+    // The copy shares its tree with `grid`, but it is only written to a file and never modified.
+    FloatGridPtr copy = std::const_pointer_cast<FloatGrid>(grid.copy());
     copy->setName(name);
     return copy;
 }

@@ -24,9 +24,9 @@ constexpr std::size_t kFewJumps = 8;
 // front between them) is unreliable: half the number of voxels of a leaf's face.
 constexpr int kFewCrossings = kLeafDim * kLeafDim / 2;
 
-// [voxels] Distance from the front, when the band was built, from which on a voxel counts as deep: it is at most a
-// voxel from the depth at which u is clamped. If the front has passed a deep voxel in any leaf, the band is rebuilt at
-// once.
+// [voxels] A voxel counts as deep if it was at least this far from the front when the band was built. This is one voxel
+// less than the distance at which u is clamped if the image is used. If the front has passed a deep voxel in any leaf,
+// the band is rebuilt at once.
 constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }

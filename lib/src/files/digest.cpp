@@ -102,7 +102,8 @@ bool is_dicom(const fs::path& path) {
 /// one. DICOM objects without an image, such as segmentations and structure sets, are left out, as the reader of series
 /// does. If together the files are larger than a file that is read as a whole, the middle of each is left out.
 void add_files(const fs::path& folder, Digest& hash) {
-    std::set<fs::path> all, dicom;  // other files are not a part of the image: results may be in the same folder
+    // If there are DICOM images, the other files are not parts of the image: results may be in the same folder.
+    std::set<fs::path> all, dicom;
     std::error_code status;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
         std::error_code is_gone;

@@ -75,8 +75,9 @@ struct FileSet::State {
         try {
             detail::write_commit(folders.begin()->second.scratch.path(), set, detail::SetOutcome::PutBack);
         } catch (const std::exception&) {
-            // The old commit then remains. It only matters if the process is killed from here on: the next run would
-            // then complete the set instead of undoing it.
+            // The previous commit, which states that the set is to be completed, remains. This matters only if the
+            // process is killed before the end of this function: the next run would complete the set instead of undoing
+            // it.
         }
         while (count-- > 0) static_cast<void>(detail::exchange_back(files[count].temporary, files[count].target));
     }

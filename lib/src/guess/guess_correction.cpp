@@ -50,8 +50,9 @@ public:
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
 
-    /// Maximum difference between at() at two positions minus the distance between them. It is not 0, because at()
-    /// interpolates the level set near the surface and computes the distance to the nearest crossing elsewhere.
+    /// Maximum amount by which the values of at() at two positions may differ by more than the distance between the
+    /// positions. It is not 0, because at() interpolates the level set near the surface and computes the distance to
+    /// the nearest crossing elsewhere.
     [[nodiscard]] double slack() const { return exact_; }
 
     /// The radius of the largest ball inside the guess, world units, accurate to the width of a leaf (8 voxels).

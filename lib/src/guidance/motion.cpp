@@ -32,7 +32,8 @@ constexpr int kParts = 8;  // offsets are compared at multiples of 1 / kParts of
 // [voxels] The smallest difference between offsets that are compared, and the smallest step in the search for a
 // translation.
 constexpr double kFinest = 1.0 / (kStepsPerVoxel * kParts);
-constexpr double kMinNoise = 1e-6;  // of the variance of intensity; the noise, a divisor, is 0 between equal images
+// [of the variance of intensity] Minimum noise. Between equal images, the measured noise, by which is divided, is 0.
+constexpr double kMinNoise = 1e-6;
 
 /// [voxels] Maximum movement of a part of the surface relative to the whole. It is smaller than that of the whole,
 /// which accounts for most of the movement of each part.

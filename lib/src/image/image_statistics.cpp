@@ -53,8 +53,9 @@ MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     return all;
 }
 
-constexpr double kSamples = 4e6;         ///< maximum number of values from which percentiles are computed
-constexpr double kQuickBytes = 1 << 28;  ///< amount that range() reads from a mapped file: a second or two
+constexpr double kSamples = 4e6;  ///< maximum number of values from which percentiles are computed
+/// [bytes] Amount that range() reads from a mapped file, which takes one or two seconds.
+constexpr double kQuickBytes = 1 << 28;
 
 }  // namespace
 

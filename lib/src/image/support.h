@@ -30,11 +30,14 @@ enum class BorderKind { Slope, Line };
 /// The position of the strongest border, in the mean over lines across a surface. If the marks of the surface are on a
 /// border, this position is 0.
 struct StrongestBorder {
-    std::size_t lines =
-        0;  ///< number of lines used: those on which both the surface and the strongest border are in the image
-    double fraction = 1;  ///< maximum absolute strength within a step of the surface, divided by the strongest
-    int at = 0;           ///< position in steps from the surface, along the normals
-    double errors = 0;    ///< mean over the lines of the difference of these two strengths, in standard errors
+    /// number of lines used: those on which both the surface and the strongest border are in the image
+    std::size_t lines = 0;
+    /// absolute mean strength of the strongest border within one step of the surface, divided by that of the strongest
+    /// border at any position
+    double fraction = 1;
+    int at = 0;  ///< position of the strongest border in steps from the surface, along the normals
+    /// mean over the lines of the difference between the strengths of these two borders, in standard errors
+    double errors = 0;
 };
 
 /// Computes the mean strength of a border at whole steps up to ten before and behind each place along its normal, from

@@ -127,7 +127,7 @@ private:
     }
 
     /// The contours of the only painted label, on the lattice of its image. Null if no label is painted, if there are
-    /// further painted labels or contours, which need a common lattice, or if the label has no view.
+    /// further painted labels or contours, which need a common lattice, or if all paint of the label is scribbles.
     std::shared_ptr<const Contours> own_contours(const Marks& marks, const RunContext& run) {
         if (marks.paint.size() != 1 || !marks.contours.empty()) return nullptr;
         const PaintedLabel& label = paint_.label_of(marks.paint.front(), run);

@@ -28,8 +28,9 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     }
     std::atomic<std::uint32_t> twice = kNone;
     tbb::parallel_for(std::uint32_t(0), corners, [&](std::uint32_t c) {
-        const std::uint32_t from = vertex(previous(c)),
-                            to = vertex(next(c));  // the side in the adjacent triangle's direction
+        // The side opposite to c leads from vertex(next(c)) to vertex(previous(c)); in the adjacent triangle, the same
+        // edge has the opposite direction, which is that of `from` and `to`.
+        const std::uint32_t from = vertex(previous(c)), to = vertex(next(c));
         for (std::uint32_t n = first[from]; n < first[from + 1]; ++n) {
             if (vertex(next(leaving[n])) != to) continue;
             if (opposite_[c] != kNone) twice = c;

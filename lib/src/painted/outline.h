@@ -33,7 +33,7 @@ struct Slice {
 /// A connected patch of a slice (neighbours by edge or corner).
 struct Patch {
     std::size_t area = 0;  ///< voxels
-    int width = 0;         ///< at its widest position, voxels; 1 also for 2 voxels
+    int width = 0;         ///< at its widest position, voxels; widths of 1 and 2 voxels both count as 1
     bool stroke = false;   ///< at most 4 voxels wide and 6 times as long
 };
 [[nodiscard]] std::vector<Patch> patches(const Slice& slice);

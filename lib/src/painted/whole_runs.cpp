@@ -17,8 +17,8 @@ struct End {
 };
 
 /// @param areas      of the slices, beginning with the end slice
-/// @param elongated  whether the sections are elongated: such sections of a tube shrink with its chord, not with the
-/// chord's square
+/// @param elongated  whether the sections are elongated, as if a tube were cut along its axis: the area of such
+/// sections decreases in proportion to their width, that of round ones in proportion to the square of their width
 End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     const auto largest = double(*std::max_element(areas.begin(), areas.end()));
     // The ellipsoid's middle is assumed at the first slice that is about as large as the largest, and its pole at most

@@ -140,8 +140,8 @@ private:
         const RunContext& run;
         bool operator()(double) const { return !run.cancelled(); }
     };
-    // Not a std::function, of which CGAL 5.5 makes a temporary copy and keeps a reference to that; it stores copies of
-    // other callables.
+    // This is not a std::function, because CGAL 5.5 would keep a reference to a temporary copy of it. Of other
+    // callables, CGAL stores a copy.
     const NotCancelled not_cancelled_{run_};
     std::vector<Entry> entries_;
 };

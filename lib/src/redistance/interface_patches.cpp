@@ -40,8 +40,9 @@ public:
         std::array<Block, 8> blocks;
         for (int block = 0; block < 8; ++block)
             blocks[block] = find_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
-        // A quick test, because most leaves of a wide band lie on one side of the surface. A leaf that is cut by the
-        // domain's end is outside there, so that it may have crossings even if all values of u are inside.
+        // A quick test, because most leaves of a wide band lie on one side of the surface. Voxels beyond the domain's
+        // end count as outside. A leaf that extends beyond this end may therefore have crossings even if all of its
+        // values are negative.
         const openvdb::CoordBBox box(origin, origin.offsetBy(kLeafDim));
         const bool is_cut = !domain_.isInside(box), first = blocks[0].first() < 0;
         if (!(is_cut && first) &&

@@ -56,7 +56,8 @@ private:
     const Domain& domain_;
     float clamp_, width_;
     LeafArray<float> far_;
-    Scratch scratch_;  // compute() at last replaces `cuts`, the cuts of voxel edges by the surface, by settled()
+    // `cuts` contains the cuts of voxel edges by the surface. At its end, compute() overwrites them with settled().
+    Scratch scratch_;
 };
 
 }  // namespace covol::detail

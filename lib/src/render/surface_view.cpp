@@ -20,14 +20,14 @@ namespace {
 
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
-constexpr int kMaxHits = 12;  // maximum number for one ray and one translucent body
+constexpr int kMaxHits = 12;  // maximum number of intersections of one ray with one translucent body
 // [voxels] Distance up to which a position counts as on the surface, and step of the search along a grazing ray.
 constexpr double kOnSurface = 0.02, kFinestStep = 0.25;
-constexpr double kOneWall = 1;  // [voxels] bodies closer than that have a common wall
+constexpr double kOneWall = 1;  // [voxels] walls of two bodies that are closer to each other count as one
 // Cosine between the ray and the normal: below it, the ray grazes the surface.
 constexpr double kGrazing = 0.2;
 constexpr int kFiner = 4;          // number of rays along each side of a pixel at an edge
-constexpr double kOpaque = 0.999;  // fraction from which on everything behind is hidden
+constexpr double kOpaque = 0.999;  // fraction of a pixel from which on everything behind the surface is hidden
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
 constexpr double kCosEdge = 0.8;  // cosine between neighbouring pixels' normals: below it, there is an edge
 constexpr int kRows = 8;
@@ -69,7 +69,7 @@ public:
             if (is_behind_neighbour(hit)) continue;
             const Body& body = bodies_[hit.body];
             const double facing = std::abs(dot(hit.normal, camera_.basis.to_eye));
-            // A slanted layer is more opaque, because the ray's way through it is longer.
+            // A surface that the ray meets obliquely is more opaque, because the ray's path through it is longer.
             const double fraction = body.opacity >= 1 ? 1 : 1 - std::pow(1 - body.opacity, 1 / std::max(0.2, facing));
             const double adds = (1 - seen.fraction) * fraction;
             seen.color = sum(seen.color, scaled(lights_.shade(body.color, hit.normal), adds));

@@ -12,7 +12,7 @@ namespace covol::figure {
 struct Body {
     const FloatGrid* surface = nullptr;
     Color color{};
-    double opacity = 1;  ///< of one layer seen perpendicularly; 1 hides everything behind
+    double opacity = 1;  ///< of the surface where a ray meets it perpendicularly; 1 hides everything behind the surface
 };
 
 /// The content of a view without background: colours multiplied by their fraction of each pixel.
@@ -20,7 +20,9 @@ struct Layer {
     int width = 0, height = 0;
     std::vector<Color> color;
     std::vector<float> fraction;
-    std::vector<float> depth;  ///< of the first surface, from the camera's center towards the eye; -infinity if none
+    /// By pixel: position of the first surface, measured from the camera's center towards the eye; -infinity if there
+    /// is none.
+    std::vector<float> depth;
     std::vector<float> solid;  ///< the same for the first surface that hides everything behind it
 };
 

@@ -114,8 +114,8 @@ PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, 
     PageSlice coded{width, height, *std::max_element(factor.begin(), factor.end()), {}};
     const std::size_t bytes_of_row = 2 * std::size_t(width);
     std::vector<std::uint8_t> bytes(bytes_of_row * std::size_t(height));
-    // For an image in chunks, the rows of one layer of chunks are coded at once, so that each chunk is looked up once;
-    // more rows would take much memory.
+    // For an image in chunks, the rows of one layer of chunks are encoded together, so that each chunk is looked up
+    // once. More rows at a time would take much memory.
     const int chunk = image.is_in_chunks() ? std::max(1, image.chunk_size(plan.level)[plan.down] / plan.rows) : 1;
     const int offset = plan.part.y % chunk;
     tbb::parallel_for(0, (offset + height - 1) / chunk + 1, [&](int n) {

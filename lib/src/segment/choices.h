@@ -30,7 +30,7 @@ enum class StartMethod {
 struct Choices {
     double h = 0;  ///< voxel size
     StartMethod start = StartMethod::Tagged;
-    EvolveOptions evolve;  ///< of the flow, unless the start sets its own; terms that cannot act have weight 0
+    EvolveOptions evolve;  ///< of the flow, unless the start sets its own; terms without an input have weight 0
     EdgeOptions edge;
     std::optional<CloudOrientation> cloud;  ///< only for a cloud
     std::vector<Vec3> measured_marks;       ///< marks at which the fit is measured

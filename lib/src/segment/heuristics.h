@@ -34,8 +34,8 @@ struct FlowHeuristics {
     /// [voxels a step] Minimum tolerance of a flow whose result is the start of another flow. A larger value would end
     /// it too early, because a surface far from edges and points also moves slowly.
     double rough_tolerance = heuristic("flow.rough_tolerance", 5e-3);
-    /// [voxels] Automatic time step of the flow on a coarse level. In approach(), the first flow after tagging, the
-    /// given time step is multiplied by this number if the band follows the surface.
+    /// [voxels] Automatic time step of the flow on a coarse level. Also the factor by which the time step of the first
+    /// flow after tagging, approach(), is longer than that of the main flow, if the band moves with the surface.
     double rough_tau = heuristic("flow.rough_tau", 2.0);
     /// [voxels] Minimum width of a domain for an automatic coarse level: in a smaller one it saves little time, and
     /// thin structures may be lost.

@@ -1,5 +1,5 @@
 #pragma once
-// What every step of segment() returns beside its result.
+// What every step of segment() returns in addition to its result.
 #include <chrono>
 #include <map>
 #include <string>
@@ -29,7 +29,7 @@ private:
     std::vector<std::string> warnings_;
 };
 
-/// Returned by every step beside its result.
+/// Returned by every step in addition to its result.
 struct StepReport {
     Remarks remarks;
     SegmentReport::Seconds seconds;

@@ -213,7 +213,7 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     // without a line: with the usual weak_edge, every position would count as supported by the image.
     if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
     FloatGridPtr g = result.edge;
-    if (!g) {  // edges that did not act were not computed
+    if (!g) {  // g was not computed, because the flow did not use the edges
         EdgeOptions edge = used.edge;
         if (!edge.sigma) edge.sigma = image.geometry().smallest_spacing();
         g = detect_edges(image, *around(*result.surface), edge, run).grid;

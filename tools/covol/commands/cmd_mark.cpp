@@ -118,7 +118,8 @@ struct MarkJob {
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
         const ImageLevels levels = open_image_levels(pixels, image.options, kMaxSliceBytes, session.run());
-        // Only images in chunks are opened again for computations: a compressed stream is slow to open.
+        // Only images in chunks are opened a second time for computations, and again when their decoded chunks exceed
+        // kMaxJobBytes. Other images are opened once, because a compressed stream is slow to open.
         const bool is_bounded = levels.is_in_chunks();
         BoundedImage for_jobs(is_bounded ? open() : pixels, open,
                               is_bounded ? kMaxJobBytes : std::numeric_limits<std::uint64_t>::max());

@@ -31,7 +31,7 @@ serve::Response refused(int status, const std::string& why) {
 }
 
 /// Positions on a surface that are far from the marks and from each other. They are suggested if assess_evidence()
-/// suggests none, because the surface is fully supported, or if only a kept mesh is available.
+/// suggests none, because the surface is fully supported, or if only a mesh from an earlier session is available.
 std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMesh& mesh, int count) {
     std::vector<Vec3> places;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) places.push_back(mesh.place(v));

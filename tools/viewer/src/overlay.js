@@ -137,7 +137,7 @@ export function marksOn(panel, most = FAINT_WITHIN) {
 
 export function drawMarks(panel, context) {
   const selected = panel.state.get('selected'), hover = panel.state.get('hover'), list = marksOn(panel);
-  const many = list.length > 300;  // so many marks are drawn smaller, because they would hide the outline
+  const many = list.length > 300;  // then they are drawn smaller, because they would hide the outline
   for (const {structure, mark, far, spot} of list.sort((a, b) => b.far - a.far)) {
     const isMeant = [selected, hover].some((t) => t?.mark === mark.id && t.structure === structure.id);
     drawMark(context, spot, mark.kind, inkOf(structure.color), {radius: (far ? 3 : 4) * (many ? 0.6 : 1), alpha: far ? 0.5 - 0.15 * far : 1, isMeant});

@@ -17,8 +17,9 @@ namespace {
 
 using Patch = std::vector<std::uint32_t>;  // indices of points
 
-/// Finds the cells of points whose mean free direction, in which the view from them is not blocked (free_directions()),
-/// is opposed to the sum of those of the cells around them, up to the distance kLayers.farthest_layer * between.
+/// Finds the cells whose mean free direction (free_directions()) forms an angle of more than 90 degrees with the sum of
+/// the mean free directions of the surrounding cells, those up to a distance of kLayers.farthest_layer * `between`.
+/// @param between  as in turn_layers(): distance from which on points are not of one sheet, world units
 class Opposed {
 public:
     Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)

@@ -33,8 +33,9 @@ std::vector<Vec3> directions() {
     return all;
 }
 
-/// The unit vectors of mean free directions; 0 if nearly as many directions are free on one side as on the other.
-std::vector<Vec3> towards(std::vector<Vec3> free) {
+/// The results of free_directions(), scaled to length 1; 0 where nearly as many directions are free on one side of the
+/// point as on the other.
+std::vector<Vec3> normalized_or_zero(std::vector<Vec3> free) {
     for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kCloud.some ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
@@ -131,7 +132,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
         sky = unit(sky);
     }
-    std::vector<Vec3> all = towards(free_directions(points, cell));
+    std::vector<Vec3> all = normalized_or_zero(free_directions(points, cell));
     for (Vec3& way : all) way = plus(sky, times(kCommon.minority, way));
     return all;
 }
@@ -175,7 +176,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     const std::vector<Vec3> free = free_directions(points, cell);
     run.check();
     result.areas = areas_of(points, scale.spacing);
-    result.normals = towards(free);
+    result.normals = normalized_or_zero(free);
     WindingField coarse(indicator_grid(points, result.areas, cell));
     solve(coarse, points, result, kCyclesFromNothing, run);
     const double half = scale_to_half(coarse, points);

@@ -5,8 +5,8 @@
 
 namespace covol::cloud {
 
-/// For each point, the mean of the directions in which the view from its cell is not blocked by another cell with
-/// points (the ray votes of Mullen et al., Signing the unsigned, SGP 2010); 0 if no direction is free.
+/// For each point, the mean of its free directions, those in which the view from its cell is not blocked by another
+/// cell with points (the ray votes of Mullen et al., Signing the unsigned, SGP 2010); 0 if no direction is free.
 /// @param cell  edge of the cells, wide enough for a sheet of points to have no holes
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 

@@ -12,7 +12,7 @@ struct BlendSheet {
 };
 
 struct BlendPiece {
-    float foot[3], reach, normal[3];
+    float foot[3], reach, normal[3];  ///< the piece applies up to the distance `reach` from its foot, see Sheet::foot()
     BlendSheet sheets[3];
     int count;                                ///< number of sheets
     bool first_is_convex, others_are_convex;  ///< as in Crease
@@ -20,7 +20,8 @@ struct BlendPiece {
 
 struct BlendLeaf {
     static constexpr float kNone = 1e30F;
-    alignas(32) std::array<float, 512> fraction;               ///< minimum of (distance from foot / reach)^2
+    /// By voxel: the minimum over the pieces of (distance from the piece's foot / its reach)^2.
+    alignas(32) std::array<float, 512> fraction;
     alignas(32) std::array<std::int32_t, 512> nearest;         ///< piece with that minimum; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< normal of that piece
     /// Sums of weight * distance and of the weights, over the pieces whose normals are less than 90 degrees from

@@ -13,10 +13,10 @@ namespace covol {
 class Creases {
 public:
     /// @param quadrics  those with a crease
-    /// @param reach     distance from the foot of each up to which it is valid
+    /// @param reach     for each quadric, the distance from its foot() up to which its crease applies
     Creases(std::vector<cloud::Quadric> quadrics, std::vector<double> reach);
     [[nodiscard]] std::size_t size() const { return quadrics_.size(); }
-    /// The valid crease with the nearest foot; null if there is none.
+    /// Of the creases that apply at a position, the one whose foot() is nearest to it; null if none applies.
     [[nodiscard]] const cloud::Crease* nearest(const Vec3& place) const;
 
 private:

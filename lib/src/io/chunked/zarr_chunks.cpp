@@ -39,7 +39,7 @@ public:
     }
 
 private:
-    /// Maximum number of objects ShardEntry that are kept; so many occupy 64 MiB.
+    /// Maximum number of ShardEntry objects that are kept; this number of them occupies 64 MiB.
     static constexpr std::uint64_t kMaxEntries = std::uint64_t(1) << 22;
 
     [[nodiscard]] std::shared_ptr<const ShardIndex> read(const std::string& path, const StoreFile& file) const {

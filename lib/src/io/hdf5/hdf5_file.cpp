@@ -19,7 +19,7 @@ std::mutex& library_mutex() {
     return mutex;
 }
 
-// Number of objects Hdf5Lock that this thread holds; only the first of them locks the mutex.
+// Number of Hdf5Lock objects that this thread holds; only the first of them locks the mutex.
 thread_local int held_locks = 0;
 
 herr_t refuse_link(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) { return -1; }

@@ -65,8 +65,9 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     return slope;
 }
 
-/// The largest distance up to `reach` at which, for most marks, the position that far inside the wall lies inside the
-/// body: in a thin body it would otherwise lie beyond the opposite wall.
+/// A distance from `minimum` to `reach`, as large as possible, such that for most marks the position at this distance
+/// from the mark along the inward normal lies inside the body. At larger distances, it would lie beyond the opposite
+/// side of a thin body.
 double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                     double reach, double minimum) {
     for (; reach > minimum; reach *= 0.75) {
@@ -74,7 +75,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
             for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
-            inside += body.level(side) < -0.5 * reach;  // inside, and no wall is closer than half of `reach`
+            inside += body.level(side) < -0.5 * reach;  // inside, and at least half of `reach` from the surface
         }
         if (2 * inside > places.size()) return reach;
     }

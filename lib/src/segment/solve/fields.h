@@ -22,7 +22,7 @@ inline constexpr double kTubeSlackVoxels = 2.0;  // the upwind scheme reads one 
                                                   const RunContext& run);
 
 /// The distance to the trusted marks, by which these outweigh the points between the slices of contours. Null unless
-/// there are contours and both points and image act, within an attraction range.
+/// there are contours, both points and image are used, and the attraction range is limited.
 [[nodiscard]] FloatGridPtr find_trusted_distance(const Problem& problem, const StartFacts& start, StepReport& report);
 
 /// The options of the edge detector g, with the feature that was chosen.
@@ -36,7 +36,7 @@ struct EdgeChoice {
 
 /// g on the band of a flow.
 struct Edges {
-    FloatGridPtr grid;    ///< null if the image does not act
+    FloatGridPtr grid;    ///< null if the image is not used
     EdgeOptions options;  ///< with the computed K and intensity range, which later calls use, too
     EdgeReport found;
     StepReport report;

@@ -13,7 +13,7 @@ namespace covol::pipeline {
 namespace {
 
 /// Extends the domain on the sides where the body extends beyond it: if the body ended at the image's end, the flow
-/// would bend its wall until it is perpendicular to that end.
+/// would bend its surface until it is perpendicular to that end.
 Domain carried_beyond_image(Domain domain, const WorldBox& body) {
     const WorldBox box = domain.world_box();
     const int layers = int(kBeyondVoxels);

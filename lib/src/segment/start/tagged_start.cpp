@@ -169,7 +169,7 @@ std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choi
         const Domain domain = problem.domain(tagger.h, marks.attracting, 0);
         body = find_cut_body(tagger, marks.attracting, domain, faces);
         if (!body) return {};
-        // If the body ended at the image's end, the flow would bend its wall until it is perpendicular to that end.
+        // If the body ended at the image's end, the flow would bend its surface until it is perpendicular to that end.
         facts.domain = widened(domain, int(kBeyondVoxels));
         start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }

@@ -43,7 +43,7 @@ export class Channels {
     const mix = {...this.state.get('mix')}, own = this.image.channel;
     if (n in mix) delete mix[n];
     else mix[n] = COLORS[n % COLORS.length];
-    // If another channel is added, the own one gets a colour, too: in grey it would hide the colour of the other one.
+    // If another channel is added, the channel of the marks gets a colour, too: in grey it would hide the other colour.
     if (n !== own && n in mix) mix[own] ??= COLORS[own % COLORS.length];
     if (Object.keys(mix).every((one) => Number(one) === own)) delete mix[own];
     return this.show(mix);
