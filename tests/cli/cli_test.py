@@ -396,7 +396,7 @@ class Tools(Case):
         for options in (("--up", "y"), ("--unit-scale", 2)):
             with self.subTest(options=options):
                 done = self.run_covol("segment", self.image, "--points", self.points, "-o", "s.vdb", *options, code=2)
-                self.assertIn(options[0] + ": it is about a mesh", done.stderr)
+                self.assertIn(options[0] + ": it applies to meshes only", done.stderr)
         self.assertEqual(self.files(), ["i.vdb"])
 
     def test_render(self):

@@ -66,8 +66,9 @@ private:
                 throw Error(Errc::InvalidInput,
                             "structures: expected unique names, got " + quoted(s.name) + " twice or empty");
             if (!s.surface || s.surface->transform() != structures_.front().surface->transform())
-                throw Error(Errc::InvalidInput, quoted(s.name) + " and " + quoted(structures_.front().name) +
-                                                    ": expected grids with one transform");
+                throw Error(Errc::InvalidInput,
+                            quoted(s.name) + " and " + quoted(structures_.front().name) +
+                                ": expected grids with the same transform; compute both on one domain");
         }
     }
 

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kMaxCode = 65535;
 constexpr int kFast = 1;  // zlib's level of compression: a user waits for the slice
+constexpr std::int32_t kMaxStep = 1 << 20;
 
 template <typename T>
 void append(std::vector<std::uint8_t>& bytes, T value) {
@@ -36,14 +37,20 @@ struct SlicePlan {
 };
 
 SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
-    if (wanted.axis < 0 || wanted.axis > 2) throw Error(Errc::InvalidOptions, "slice: expected an axis 0, 1 or 2");
+    if (wanted.axis < 0 || wanted.axis > 2)
+        throw Error(Errc::InvalidOptions, "slice: expected an axis 0, 1 or 2, got " + std::to_string(wanted.axis));
     SlicePlan plan;
     plan.along = std::size_t(wanted.axis);
     plan.right = wanted.axis == 0 ? 1 : 0;
     plan.down = wanted.axis == 2 ? 1 : 2;
     const Index3& whole = image.levels().front().size;
-    if (wanted.at < 0 || wanted.at >= whole[plan.along] || wanted.step < 1 || wanted.step > (1 << 20))
-        throw Error(Errc::InvalidOptions, "slice: it lies outside of the image");
+    if (wanted.at < 0 || wanted.at >= whole[plan.along])
+        throw Error(Errc::InvalidOptions, "slice: expected an index from 0 to " +
+                                              std::to_string(whole[plan.along] - 1) + ", got " +
+                                              std::to_string(wanted.at));
+    if (wanted.step < 1 || wanted.step > kMaxStep)
+        throw Error(Errc::InvalidOptions, "slice: expected a step from 1 to " + std::to_string(kMaxStep) +
+                                              " voxels, got " + std::to_string(wanted.step));
     plan.level = image.level_for(wanted.step);
     const ImageLevels::Level& level = image.levels()[plan.level];
     plan.size = level.size;
@@ -55,7 +62,10 @@ SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
     plan.part = wanted.part.value_or(SliceRequest::Part{0, 0, width, height});
     SliceRequest::Part& part = plan.part;
     if (part.x < 0 || part.y < 0 || part.x >= width || part.y >= height || part.width < 1 || part.height < 1)
-        throw Error(Errc::InvalidOptions, "slice: its part lies outside of the image");
+        throw Error(Errc::InvalidOptions, "slice: expected a part within its " + std::to_string(width) + " x " +
+                                              std::to_string(height) + " pixels, got " + std::to_string(part.width) +
+                                              " x " + std::to_string(part.height) + " from (" + std::to_string(part.x) +
+                                              ", " + std::to_string(part.y) + ") on");
     part.width = std::min(part.width, width - part.x);
     part.height = std::min(part.height, height - part.y);
     return plan;

@@ -80,7 +80,8 @@ StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points
     // These points cannot enclose a body. The error that refuse_flat() throws during tagging states what to add.
     if (problem.image == nullptr && !can_enclose(points)) return StartMethod::Tagged;
     remarks.choose("start", "guess",
-                   std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.max_guess_marks),
+                   std::to_string(points.size()) + " marks; with more than " +
+                       std::to_string(kAutomatic.max_guess_marks) + ", there is no guess",
                    problem.run);
     return StartMethod::Guess;
 }

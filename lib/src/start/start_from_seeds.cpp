@@ -60,7 +60,9 @@ FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& ins
     if (inside.empty()) throw Error(Errc::InvalidInput, "expected seeds inside, got none");
     if (std::none_of(inside.begin(), inside.end(), [&](const Vec3& seed) { return domain.contains(seed); }))
         throw Error(Errc::InvalidInput,
-                    "expected seeds inside the domain, got none of " + std::to_string(inside.size()) + " there");
+                    "expected seeds inside (`inside`) that lie in the domain, got none of " +
+                        std::to_string(inside.size()) + "; check their coordinates, or enlarge `roi`",
+                    "inside");
     const double h = domain.voxel_size;
     FloatGridPtr field;
     with_threads(run, [&] {

@@ -65,13 +65,21 @@ struct StudyHistory::Planning {
         if (outline.world.size() < fewest)
             refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
                    std::to_string(outline.world.size()));
-        if (outline.world.size() > kMaxCorners) refuse("an outline has too many corners");
+        if (outline.world.size() > kMaxCorners)
+            refuse("expected an outline of at most " + std::to_string(kMaxCorners) + " corners, got " +
+                   std::to_string(outline.world.size()));
         if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at))
             refuse("an outline does not lie on a slice");
         for (const Vec3& corner : outline.world) require_inside(corner);
     }
+    static void require_room_for_marks(const StudyStructure& structure, std::size_t count) {
+        if (count > kMaxMarks - std::min(structure.marks.size(), kMaxMarks))
+            refuse("'" + structure.name + "': expected at most " + std::to_string(kMaxMarks) + " marks, got " +
+                   std::to_string(structure.marks.size() + count));
+    }
     void add_outline(StudyStructure& structure, const StudyOutline& outline) {
-        if (structure.outlines.size() >= kMaxMarks) refuse("'" + structure.name + "' has too many outlines");
+        if (structure.outlines.size() >= kMaxMarks)
+            refuse("'" + structure.name + "' already has the maximum number of outlines, " + std::to_string(kMaxMarks));
         structure.outlines.push_back(outline);
         structure.outlines.back().id = next++;
     }
@@ -85,8 +93,13 @@ struct StudyHistory::Planning {
         edit(*after);
         return {before, after, place};
     }
+    void require_room_for_structures(std::size_t count) const {
+        if (count > kMaxStructures - history.state_.size())
+            refuse("expected at most " + std::to_string(kMaxStructures) + " structures, got " +
+                   std::to_string(history.state_.size() + count));
+    }
     [[nodiscard]] Change added(std::shared_ptr<StudyStructure> structure) {
-        if (history.state_.size() >= kMaxStructures) refuse("too many structures");
+        require_room_for_structures(1);
         structure->id = next++;
         return {nullptr, std::move(structure), history.state_.size()};
     }
@@ -144,7 +157,7 @@ struct StudyHistory::Planning {
     Changes operator()(const StudyActions::AddMark& a) {
         require_inside(a.world);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (s.marks.size() >= kMaxMarks) refuse("'" + s.name + "' has too many marks");
+            require_room_for_marks(s, 1);
             s.marks.push_back({next++, a.kind, a.world});
         })};
     }
@@ -159,7 +172,7 @@ struct StudyHistory::Planning {
         if (count + a.outlines.size() == 0) refuse("expected marks, got none");
         for (const StudyOutline& outline : a.outlines) require_outline(outline);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (count > kMaxMarks - std::min(s.marks.size(), kMaxMarks)) refuse("'" + s.name + "' has too many marks");
+            require_room_for_marks(s, count);
             for (const auto& [kind, places] : lists)
                 for (const Vec3& place : *places) s.marks.push_back({next++, kind, place});
             for (const StudyOutline& outline : a.outlines) add_outline(s, outline);
@@ -195,10 +208,13 @@ struct StudyHistory::Planning {
     }
     Changes operator()(const StudyActions::AddStroke& a) {
         if (a.stroke.world.empty()) refuse("a stroke needs at least one position");
-        if (a.stroke.world.size() > kMaxCorners) refuse("a stroke has too many corners");
+        if (a.stroke.world.size() > kMaxCorners)
+            refuse("expected a stroke of at most " + std::to_string(kMaxCorners) + " corners, got " +
+                   std::to_string(a.stroke.world.size()));
         for (const Vec3& corner : a.stroke.world) require_inside(corner);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (s.strokes.size() >= kMaxStrokes) refuse("'" + s.name + "' has too many strokes");
+            if (s.strokes.size() >= kMaxStrokes)
+                refuse("'" + s.name + "' already has the maximum number of strokes, " + std::to_string(kMaxStrokes));
             s.strokes.push_back(a.stroke);
             s.strokes.back().id = next++;
             detail::require_paintable(s, history.image_);
@@ -223,7 +239,7 @@ struct StudyHistory::Planning {
     Changes operator()(const StudyActions::AddLabels& a) {
         require_file(a.path, a.digest);
         if (a.labels.empty()) refuse("expected labels, got none");
-        if (a.labels.size() > kMaxStructures - history.state_.size()) refuse("too many structures");
+        require_room_for_structures(a.labels.size());
         Changes changes;
         std::set<std::string> names;
         for (const auto& one : a.labels) {

@@ -142,7 +142,9 @@ BandResult tag_interior(const FloatGrid& distance, const BandOptions& options, c
     require_valid(options, "tag_interior");
     if (distance.tree().leafCount() == 0)
         throw Error(Errc::InvalidInput,
-                    "expected a distance grid with active voxels, got none: no point lies near the domain");
+                    "expected a distance grid with active voxels, got none: no point lies near the domain; check the "
+                    "coordinates of the points, or enlarge `roi`",
+                    "roi");
     BandResult result;
     with_threads(run, [&] { result = make(distance, options, run); });
     return result;

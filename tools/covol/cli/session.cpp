@@ -184,7 +184,7 @@ int Session::execute() {
         if (threads.possible < threads.wanted)
             note("using " + std::to_string(threads.possible) + " of " + std::to_string(threads.wanted) +
                  " threads: " + kNoThread);
-        if (!guard->watches()) warn(std::string("memory is not watched: ") + kNoThread);
+        if (!guard->watches()) warn(std::string("the memory of this run is not monitored: ") + kNoThread);
         bodies_.at(command_)();
         run_.check();
         finish();

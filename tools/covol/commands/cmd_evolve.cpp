@@ -57,7 +57,8 @@ struct EvolveJob {
             session.warn("the surface vanished after " + std::to_string(result.steps) +
                          " steps; lower --delta, or start closer to the edges");
         else if (result.stop_reason != StopReason::Steady)
-            session.warn("not steady after " + std::to_string(result.steps) + " steps");
+            session.warn("not steady after " + std::to_string(result.steps) +
+                         " steps; increase --max-steps to continue until the surface is steady");
         session.add_grid(output, u, vdb.options);
     }
 };

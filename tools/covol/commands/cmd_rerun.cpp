@@ -104,7 +104,9 @@ public:
     /// The value of an option, with the current path of the input instead of its file name.
     /// @throws Error if the value names a file that is not an input of the run, or is "-", standard input
     [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
-        if (value == "-") refuse(source_, "an input of that run came through a pipe");
+        if (value == "-")
+            refuse(source_,
+                   "an input of that run came through a pipe, which cannot be read again; repeat the run with a file");
         const std::size_t begin = path_within(value).first;
         for (const auto& [name, path] : found_)
             for (const std::size_t from : {begin, std::size_t(0)}) {

@@ -192,7 +192,7 @@ void MeshFlags::check_plain(const std::string& path) const {
 void MeshFlags::check_used(bool writes) const {
     if (!writes && (options.y_up || has("unit_scale")))
         throw UsageError(std::string(options.y_up ? "--up" : "--unit-scale") +
-                         ": it is about a mesh, and this run writes none");
+                         ": it applies to meshes only, and this run writes none; write a mesh, or leave it out");
 }
 
 WriteMeshOptions MeshFlags::write_options(const Session& session) const {

@@ -26,7 +26,9 @@ void CloudFlags::check() const { require_valid_flags(cleanup(1)); }
 
 void CloudFlags::check_used(bool has_cloud) const {
     if (!has_cloud && cleanup(1).any())
-        throw UsageError("--remove-outliers, --simplify, --smooth: they are about points, and this run reads none");
+        throw UsageError(
+            "--remove-outliers, --simplify, --smooth: they apply to points only, and this run reads none; leave them "
+            "out");
 }
 
 Json to_json(const CloudCleanupReport& r) {

@@ -17,7 +17,8 @@ struct VdbFlags : Given<WriteVdbOptions> {
     /// @throws UsageError if an option of .vdb files is given, but none is written.
     void check_used(bool writes) const {
         if (!writes && !names.empty())
-            throw UsageError(flag_of(*names.begin()) + ": it is about .vdb files, and this run writes none");
+            throw UsageError(flag_of(*names.begin()) +
+                             ": it applies to .vdb files only, and this run writes none; write one, or leave it out");
     }
     [[nodiscard]] WriteVdbOptions with(const std::map<std::string, std::string>& metadata) const {
         return {options.half, metadata, options.compression};

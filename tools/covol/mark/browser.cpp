@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -33,7 +35,9 @@ std::string find_opener() {
 
 BrowserLink::BrowserLink(const std::string& url) {
     std::string name = (std::filesystem::temp_directory_path() / "covol-open-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw Error(Errc::Io, "mark: cannot create the folder " + name);
+    if (::mkdtemp(name.data()) == nullptr)
+        throw Error(Errc::Io, "mark: cannot create the folder " + name + ": " + std::strerror(errno) +
+                                  "; set TMPDIR to a writable folder");
     folder_ = name;
     std::ofstream page(folder_ / "open.html");
     page << "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\"><title>covol "

@@ -195,9 +195,9 @@ std::vector<DicomVolume> dicom_volumes(const std::string& path, Slices slices) {
         if (slice.size == first.size && slice.components == first.components &&
             (one_file || same_direction(slice, first)))
             continue;
-        throw read_error(
-            Errc::Unsupported, path,
-            "the slices of the series differ in size or orientation: " + name_of(first) + " and " + name_of(slice));
+        throw read_error(Errc::Unsupported, path,
+                         "the slices of the series differ in size or orientation: " + name_of(first) + " and " +
+                             name_of(slice) + "; give a folder with the slices of one volume");
     }
     std::vector<DicomVolume> volumes = split_by_direction({std::move(slices), ""});
     volumes = split_by(volumes, "stack", &DicomSlice::stack, false);

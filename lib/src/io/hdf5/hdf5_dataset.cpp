@@ -207,7 +207,8 @@ void Hdf5Dataset::check_chunk() const {
     for (const std::uint64_t n : array_.chunk) {
         if (n == 0) throw damaged("its header claims chunks with a side of 0");
         if (bytes > kMaxChunkBytes / n)
-            throw read_error(Errc::Unsupported, path_, "expected chunks of 1 GiB at most, got larger ones");
+            throw read_error(Errc::Unsupported, path_,
+                             "expected chunks of 1 GiB at most, got larger ones; write it with smaller chunks");
         bytes *= n;
     }
 }

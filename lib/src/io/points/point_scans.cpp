@@ -224,7 +224,8 @@ std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_
     constexpr std::uint64_t kLargestRatio = 264;
     const std::uint64_t stride = header.stride();
     if (size > kLargestRatio * packed || stride == 0 || size / stride < header.points)
-        fail(path, std::to_string(packed) + " packed bytes cannot hold " + std::to_string(header.points) + " points");
+        fail(path, std::to_string(packed) + " packed bytes cannot hold " + std::to_string(header.points) +
+                       " points; the file is damaged");
     std::string content(size, '\0');
     if (!lzf_decompress(bytes.part(8, packed), content)) fail(path, "its packed points are damaged");
     return content;

@@ -157,14 +157,14 @@ private:
         report_.image_border = {border.at, border.fraction, border.errors};
         const char* const look = ": check whether the marks belong to this image, channel and coordinate system";
         if (support.fraction + kDoubts.support_errors * support.error < kDoubts.image_support)
-            warn("the image varies more at five voxels from the marks than at the marks (in " +
+            warn("the image varies more five voxels away from the marks than at the marks (in " +
                  number(std::round(100 * (1 - support.fraction))) + " of 100 pairs)" + look);
         else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
             warn("the image at some marks hardly predicts where the others lie (a gain of " + number(guidance.gain) +
                  " nats per mark)" + look);
         else if (border.fraction < kDoubts.border_fraction && border.errors > kCommon.errors)
-            warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
-                 (border.at < 0 ? "inside" : "outside") + " the marks, everywhere (at the marks they have " +
+            warn("on average, borders in the image are steeper " + std::to_string(std::abs(border.at)) + " voxels " +
+                 (border.at < 0 ? "inside" : "outside") + " of the marks than at the marks (where they have " +
                  number(std::round(100 * border.fraction)) + " % of that steepness)" + look + ", and have its scale");
     }
 

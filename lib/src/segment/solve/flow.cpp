@@ -186,7 +186,8 @@ void check_flow(const Problem& problem, const Choices& choices, Solution& soluti
                     "delta");
     if (solved.stop_reason == StopReason::MaxSteps)
         solution.report.remarks.warn("not steady after " + std::to_string(solved.steps) +
-                                         " steps: the last change was " + number(solved.last_change) + " voxels",
+                                         " steps: the last change was " + number(solved.last_change) +
+                                         " voxels; increase `max_steps` to continue until the surface is steady",
                                      problem.run);
 }
 

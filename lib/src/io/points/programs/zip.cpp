@@ -77,7 +77,7 @@ std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::
     const std::string_view packed = bytes.part(begin, entry.packed);
     if (entry.size > kLargestRatio * entry.packed + 1024 || (entry.method == 0 && entry.size != entry.packed))
         fail(path, "entry " + quote(entry.name) + ": " + std::to_string(entry.packed) + " bytes cannot hold " +
-                       std::to_string(entry.size));
+                       std::to_string(entry.size) + " unpacked bytes; the archive is damaged");
     return packed;
 }
 
