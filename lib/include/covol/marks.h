@@ -26,8 +26,8 @@ struct PaintedImage {
     PaintedOptions options;
     std::vector<LabelName> labels;  ///< the labels that belong to structures
     std::string name;  ///< name of the structure to which all labels belong; empty: each label has its own name
-    /// Several structures share the image: each one's paint is outside of the others, and the labels are also the
-    /// structures' values in masks. false: the image belongs to one structure.
+    /// Several structures share the image: paint of one structure is outside of the others, and the labels are also
+    /// the structures' values in masks. false: the image belongs to one structure.
     bool is_shared = true;
 };
 /// Makes a painted image and finds its labels. @throws Error as find_painted_labels().

@@ -231,8 +231,8 @@ private:
             const Coord at = leaf.origin().offsetBy(p >> 6, p >> 3 & 7, p & 7);
             if (!(between <= 0) && !is_between(i, other, at, phi)) continue;
             values[p] = (mine - other) / 2;
-            // The surface of structure i is unchanged if the structures touch exactly (between == 0), or if the voxel
-            // is farther than two voxels from it.
+            // The new value does not move the surface of structure i if the structures touch exactly (between == 0), or
+            // if this voxel is more than two voxels away from that surface.
             moved = moved || (between != 0 && std::abs(mine) < 2 * h_);
         }
         return moved;

@@ -6,8 +6,8 @@ namespace covol {
 
 /// Holes of a cloud: holes.cpp.
 struct HolesHeuristics {
-    /// [spacings, and voxels] Automatic distance from the points beyond which a surface is a hole: so many spacings of
-    /// the points or so many voxels, whichever is longer.
+    /// [spacings, and voxels] Automatic distance from the points beyond which a surface is a hole: this number of
+    /// spacings of the points or this number of voxels, whichever is longer.
     double far = heuristic("holes.far", 3);
     /// [fraction of that distance] Standard deviation of the smoothing of a hole's rim, relative to the distance beyond
     /// which a surface is a hole. It removes undulations shorter than about three standard deviations.

@@ -121,7 +121,7 @@ struct StudySolver::State {
     struct Job {
         std::shared_ptr<const StudyStructure> structure;
         std::uint64_t sequence = 0;
-        bool is_known = false;  ///< whether its surface is known, see confirm()
+        bool is_known = false;  ///< the caller already has its surface: confirm()
     };
 
     State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,

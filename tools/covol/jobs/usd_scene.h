@@ -23,7 +23,7 @@ struct UsdScene {
 void add_to_scene(UsdScene& scene, const SegmentJob& job, const StructuresOutput& output, const NameTag& tagged);
 
 /// The text of the scene, which refers to files relative to the folder of `path`.
-/// @param unit  unit of length; unknown units are taken for metres
+/// @param unit  unit of length; unknown units are treated as metres
 [[nodiscard]] std::string to_usda(const UsdScene& scene, const std::string& path, const std::string& unit);
 
 /// @throws UsageError if --usda is given without a .vdb output that it could refer to; Error as Outputs::check().

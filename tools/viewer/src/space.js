@@ -3,7 +3,7 @@
 export const AXIS_COLORS = ['#d9574a', '#4f9e57', '#4a7fd1'];
 const PLANES = ['sagittal', 'coronal', 'axial'];
 
-const ROUNDING = 1e-3;  // cosines between axes up to this are taken for rounding errors of files
+const ROUNDING = 1e-3;  // cosines between axes up to this are treated as rounding errors of files
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 

@@ -48,7 +48,7 @@ Consistency::Consistency(const std::vector<Vec3>& points, std::vector<double> ar
       cells_(points, reach),
       beside_(neighbours_of(cells_)) {}
 
-void Consistency::solve(const std::vector<Vec3>& normals) {  // starts from the solution for the former normals
+void Consistency::solve(const std::vector<Vec3>& normals) {  // starts from the solution for the previous normals
     std::vector<Vec3> vectors(points_.size());
     tbb::parallel_for(std::size_t(0), points_.size(),
                       [&](std::size_t n) { vectors[n] = times(areas_[n], normals[n]); });

@@ -42,10 +42,10 @@ COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
 /// Poisson surface reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022; the reversal of whole patches is added here.
 struct IterationHeuristics {
     /// [indicator] Deviation of a cell's mean indicator from 1/2 from which on the cell belongs to a patch whose
-    /// normals are reversed on trial.
+    /// normals are reversed tentatively.
     double patch_off = heuristic("iteration.patch_off", 0.12);
-    /// [V-cycles] Number of multigrid cycles for each solution while patches are reversed on trial: few, because the
-    /// solution for the former normals is the initial value.
+    /// [V-cycles] Number of multigrid cycles for each solution while patches are reversed tentatively: few, because the
+    /// solution for the previous normals is the initial value.
     int patch_cycles = heuristic("iteration.patch_cycles", 2);
     /// [1 - cosine] Mean change of the normals in one update, below which the updates end.
     double steady = heuristic("iteration.steady", 1e-4);

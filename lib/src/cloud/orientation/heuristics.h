@@ -96,7 +96,7 @@ COVOL_HEURISTICS ViewsHeuristics kViews{};
 struct LayersHeuristics {
     /// [distances between sheets] Maximum depth of a layer below the one that hides it.
     double farthest_layer = heuristic("layers.farthest_layer", 6);
-    /// [patches] Maximum number of patches that are reversed on trial; each trial requires a solution of the indicator.
+    /// [patches] Maximum number of patches that are reversed tentatively; each requires a solution of the indicator.
     int max_patches = limit("layers.max_patches", 12);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};

@@ -9,8 +9,8 @@ namespace covol::cloud {
 
 /// Reverses the normals of layers that face inwards because the layer above hides them: their only free directions lead
 /// through the inside of the scan and a gap in it. Each patch of points whose free directions oppose those of the
-/// points around it is reversed on trial, the largest first. It remains reversed if its points are still close to the
-/// surface and the area without points decreases by at most about the area of the patch, as it does if a cavity
+/// points around it is reversed tentatively, the largest first. It remains reversed if its points are still close to
+/// the surface and the area without points decreases by at most about the area of the patch, as it does if a cavity
 /// vanishes. The inner wall of a cup is not reversed, because the area without points would increase, nor is that of a
 /// ring, whose hole would close.
 /// @param field    in/out: the indicator of `orientation`, scaled to 1/2

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Maximum number of planes. No microscope acquires so many; more can only be the claim of a damaged description.
+// Maximum number of planes. No microscope acquires that many: a larger number means that the description is damaged.
 constexpr std::uint64_t kMaxPlanes = std::uint64_t(1) << 24;
 
 double to_number(const std::string& text) {

@@ -95,7 +95,7 @@ public:
     virtual ~Receiver() = default;
     [[nodiscard]] virtual bool wants_faces() const { return false; }
     [[nodiscard]] virtual bool wants_normals() const { return false; }
-    /// Announces the maximum number of vertices. The file is large enough for so many, so memory may be reserved.
+    /// Announces the maximum number of vertices. The file is large enough for this number, so memory may be reserved.
     virtual void expect_vertices(std::size_t count, bool with_normals) = 0;
     virtual void vertex(const Vec3& position) = 0;
     /// The normal, of any length, of the first vertex that has no normal yet.

@@ -17,7 +17,7 @@ export function linkBar(state) {
     if (tell) text.textContent = tell(state.get('waiting'));
     again.hidden = link !== 'other';
     clearTimeout(timer);
-    // A page that is loading is soon connected as a rule: the bar is shown only if there is no connection after 1.2 s.
+    // A page that is loading is usually connected soon: the bar is shown only if there is no connection after 1.2 s.
     if (link === 'connecting' && element.hidden) timer = setTimeout(() => { element.hidden = !LINKS[state.get('link')]; }, 1200);
     else element.hidden = !tell;
   };

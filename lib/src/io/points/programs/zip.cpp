@@ -61,7 +61,7 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
     return content;
 }
 
-/// The compressed bytes of an entry, after checking that the entry's stated size is possible for so many bytes.
+/// The compressed bytes of an entry, after checking that this number of bytes can expand to the entry's stated size.
 std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
         throw Error(Errc::Unsupported, path + ": entry " + quote(entry.name) + " is " + what);
