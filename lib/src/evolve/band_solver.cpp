@@ -127,9 +127,8 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
     gather_fields(fields);
     previous_ = field_.values;
     motions_.resize(band_.size());
-    tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-        motions_[leaf] = motion_of(previous_.leaf(leaf), previous_.leaf(leaf), false);
-    });
+    tbb::parallel_for(std::size_t(0), band_.size(),
+                      [&](std::size_t leaf) { motions_[leaf] = without_comparison(previous_.leaf(leaf)); });
     rows_.resize(band_.size() * kRowBytes);
     active_counts_.resize(band_.size());
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) active_counts_[leaf] = count_on(band_.active(leaf));
@@ -381,7 +380,7 @@ Motion BandSolver::measure() {
             motion = motion.without_motion();
             return;
         }
-        motion = motion_of(field_.values.leaf(leaf), previous_.leaf(leaf), true);
+        motion = motion_of(field_.values.leaf(leaf), previous_.leaf(leaf), band_.active(leaf));
     });
     return total(motions_);
 }

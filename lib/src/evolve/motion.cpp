@@ -31,9 +31,9 @@ constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
-int crossed_edges(const LeafMask& negative) {
+int crossed_edges(const LeafMask& negative, const LeafMask& active) {
     int crossed = 0;
-    for (int axis = 0; axis < 3; ++axis) crossed += count_on(sign_changes(negative, axis));
+    for (int axis = 0; axis < 3; ++axis) crossed += count_on(sign_changes(negative, active, axis));
     return crossed;
 }
 
@@ -41,6 +41,13 @@ struct Flips {
     std::int64_t flipped = 0, crossed = 0;
     Flips operator+(const Flips& o) const { return {flipped + o.flipped, crossed + o.crossed}; }
 };
+
+void find_signs(const LeafMask& negative, LeafMotion& motion) {
+    for (int word = 0; word < 8; ++word) {
+        motion.negative |= negative[word] != 0;
+        motion.positive |= ~negative[word] != 0;
+    }
+}
 
 template <typename Count>
 Flips sum_over_leaves(std::size_t leaves, Count count) {
@@ -55,21 +62,23 @@ Flips sum_over_leaves(std::size_t leaves, Count count) {
 
 }  // namespace
 
-LeafMotion motion_of(const float* now, const float* before, bool is_active) {
+LeafMotion without_comparison(const float* values) {
+    LeafMotion motion;
+    find_signs(negative_mask(values), motion);
+    return motion;
+}
+
+LeafMotion motion_of(const float* now, const float* before, const LeafMask& active) {
     LeafMotion motion;
     const Change change = change_of(now, before);
     motion.finite = change.finite;
     motion.largest = change.largest;
     const LeafMask negative = negative_mask(now);
-    for (int word = 0; word < 8; ++word) {
-        motion.negative |= negative[word] != 0;
-        motion.positive |= ~negative[word] != 0;
-    }
-    if (!is_active) return motion;
+    find_signs(negative, motion);
     const LeafMask was_negative = negative_mask(before);
     if (negative == was_negative && !(motion.negative && motion.positive)) return motion;
     for (int axis = 0; axis < 3; ++axis) {
-        const LeafMask after = sign_changes(negative, axis), first = sign_changes(was_negative, axis);
+        const LeafMask after = sign_changes(negative, active, axis), first = sign_changes(was_negative, active, axis);
         const int step = 64 >> (3 * axis);
         for (int word = 0; word < 8; ++word)
             for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
@@ -101,14 +110,16 @@ Motion total(const std::vector<LeafMotion>& leaves) {
     return motion;
 }
 
-double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
+double NetMotion::per_step(const LeafArray<float>& u, const LeafBand& band) {
     if (++age_ < kWindow && !signs_.empty()) return std::numeric_limits<double>::infinity();
-    const bool is_first = signs_.size() != leaves;
-    signs_.resize(leaves);
-    const Flips flips = sum_over_leaves(leaves, [&](std::size_t leaf) {
+    const bool is_first = signs_.size() != band.size();
+    signs_.resize(band.size());
+    const Flips flips = sum_over_leaves(band.size(), [&](std::size_t leaf) {
         const LeafMask negative = negative_mask(u.leaf(leaf));
-        Flips here{0, crossed_edges(negative)};
-        for (int word = 0; word < 8; ++word) here.flipped += __builtin_popcountll(negative[word] ^ signs_[leaf][word]);
+        const LeafMask& active = band.active(leaf);
+        Flips here{0, crossed_edges(negative, active)};
+        for (int word = 0; word < 8; ++word)
+            here.flipped += __builtin_popcountll((negative[word] ^ signs_[leaf][word]) & active[word]);
         signs_[leaf] = negative;
         return here;
     });
@@ -122,26 +133,27 @@ void NetMotion::exchange(StateFile& file) {
     file.value(age_);
 }
 
-CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u) {
+CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u, const LeafMask& active) {
     std::vector<Crossing> now;
-    double jumps = 0.0, squared_counts = 0.0;
+    double squared_slope = 0.0;
     const LeafMask negative = negative_mask(u);
     for (int axis = 0; axis < 3; ++axis) {
-        const LeafMask changes = sign_changes(negative, axis);
+        const LeafMask changes = sign_changes(negative, active, axis);
         const int step = 64 >> (3 * axis);
-        const auto first = double(now.size());
+        const std::size_t first = now.size();
+        double jumps = 0.0;
         for (int word = 0; word < 8; ++word)
             for (std::uint64_t bits = changes[word]; bits != 0; bits &= bits - 1) {
                 const int n = word << 6 | __builtin_ctzll(bits);
                 now.push_back({std::uint16_t(axis * kLeafSize + n), float(crossing(u[n], u[n + step]))});
                 jumps += std::abs(double(u[n]) - u[n + step]);
             }
-        squared_counts += (double(now.size()) - first) * (double(now.size()) - first);
+        // If the front is a plane, the jump of u on each edge along an axis that it crosses is the component of grad u
+        // along that axis; it crosses no such edge only if the component is small.
+        const auto crossed = double(now.size() - first);
+        if (crossed > 0) squared_slope += (jumps / crossed) * (jumps / crossed);
     }
-    // The number of edges along an axis that a plane crosses is proportional to its normal's component along that axis,
-    // and so are the jumps of u on these edges. Thus the sum of the jumps over the root of the sum of squared numbers
-    // is |grad u|.
-    const double slope = now.size() >= kFewJumps ? jumps / std::sqrt(squared_counts) : 1.0;
+    const double slope = now.size() >= kFewJumps ? std::sqrt(squared_slope) : 1.0;
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
     int edges = 0;
@@ -181,25 +193,26 @@ void CrossingMarks::exchange(StateFile& file) {
     }
 }
 
-FrontDisplacement::Reference::Reference(const float* values)
-    : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
+FrontDisplacement::Reference::Reference(const float* values, const LeafMask& active)
+    : negative(negative_mask(values)), crossed(crossed_edges(negative, active)) {
     for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
 }
 
-void FrontDisplacement::set_references(const LeafArray<float>& u, std::size_t leaves) {
-    references_.resize(leaves);
-    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { references_[leaf] = Reference(u.leaf(leaf)); });
+void FrontDisplacement::set_references(const LeafArray<float>& u, const LeafBand& band) {
+    remake(std::vector<std::int32_t>(band.size(), -1), u, band);
 }
 
-void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
+void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u,
+                               const LeafBand& band) {
     std::vector<Reference> references(old_leaf.size());
     tbb::parallel_for(std::size_t(0), old_leaf.size(), [&](std::size_t leaf) {
-        references[leaf] = old_leaf[leaf] >= 0 ? references_[old_leaf[leaf]] : Reference(u.leaf(leaf));
+        references[leaf] =
+            old_leaf[leaf] >= 0 ? references_[old_leaf[leaf]] : Reference(u.leaf(leaf), band.active(leaf));
     });
     references_ = std::move(references);
 }
 
-std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u) const {
+std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u, const LeafBand& band) const {
     enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
     std::vector<State> states(references_.size());
     tbb::parallel_for(std::size_t(0), references_.size(), [&](std::size_t leaf) {
@@ -208,7 +221,7 @@ std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u
         int flips = 0;
         bool deep = false;
         for (int word = 0; word < 8; ++word) {
-            const std::uint64_t flipped = negative[word] ^ made.negative[word];
+            const std::uint64_t flipped = (negative[word] ^ made.negative[word]) & band.active(leaf)[word];
             deep |= (flipped & ~made.near[word]) != 0;
             flips += __builtin_popcountll(flipped);
         }

@@ -28,7 +28,10 @@ struct LeafMotion {
 /// Compares the zero crossings of u on the edges of a leaf before and after a step. An edge that is crossed before and
 /// after contributes the distance between the two crossings, and one that is crossed only before or only after
 /// contributes half an edge. Unlike the change of u, the sum is 0 for a profile that becomes steeper without moving.
-[[nodiscard]] LeafMotion motion_of(const float* now, const float* before, bool is_active);
+/// @param active  voxels of the band; beyond the domain u is not part of the solution, but may have other signs
+[[nodiscard]] LeafMotion motion_of(const float* now, const float* before, const LeafMask& active);
+/// For a leaf whose values have not changed and do not have to be compared.
+[[nodiscard]] LeafMotion without_comparison(const float* values);
 
 /// The whole band's motion in a step.
 struct Motion {
@@ -49,7 +52,7 @@ public:
     static constexpr int kWindow = 10;  ///< number of steps in a window
     /// To be called once in each step. @return mean motion per step over the window of steps that this step completes,
     /// voxels; infinity if it completes none
-    double per_step(const LeafArray<float>& u, std::size_t leaves);
+    double per_step(const LeafArray<float>& u, const LeafBand& band);
     void exchange(StateFile& file);
 
 private:
@@ -65,7 +68,8 @@ public:
         double slope = 1.0;                ///< |grad u| on the front, mean over the leaf; 1 if there are few crossings
     };
     /// Stores the current crossings. @return their displacement since those stored before; infinity the first time
-    Displacement renew(std::size_t leaf, const float* u);
+    /// @param active  voxels of the band
+    Displacement renew(std::size_t leaf, const float* u, const LeafMask& active);
     void resize(std::size_t leaves) { leaves_.resize(leaves); }
     /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one at the same position, or
     /// -1
@@ -90,20 +94,20 @@ private:
 /// once the front has passed a voxel that was 2 voxels deep.
 class FrontDisplacement {
 public:
-    void set_references(const LeafArray<float>& u, std::size_t leaves);
+    void set_references(const LeafArray<float>& u, const LeafBand& band);
     /// To be called when the band was rebuilt. @param old_leaf  for each new leaf the old one with the same values, or
     /// -1
-    void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
+    void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u, const LeafBand& band);
     /// The leaves to rebuild: those that are due, and those in which the front has moved at least half as far. Empty as
     /// long as less than kCommon.minority of the leaves with a front are due and the front has passed no deep voxel.
-    [[nodiscard]] std::vector<std::size_t> due_leaves(const LeafArray<float>& u) const;
+    [[nodiscard]] std::vector<std::size_t> due_leaves(const LeafArray<float>& u, const LeafBand& band) const;
     void exchange(StateFile& file);
 
 private:
     struct Reference {
         LeafMask negative{}, near{};
         int crossed = 0;
-        explicit Reference(const float* values);
+        Reference(const float* values, const LeafMask& active);
         Reference() = default;
     };
     std::vector<Reference> references_;

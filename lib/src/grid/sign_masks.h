@@ -41,4 +41,12 @@ inline LeafMask sign_changes(const LeafMask& negative, int axis) {
     return changes;
 }
 
+/// The same for pairs of voxels that are both among the given ones.
+inline LeafMask sign_changes(const LeafMask& negative, const LeafMask& among, int axis) {
+    LeafMask changes = sign_changes(negative, axis);
+    const LeafMask next = beside_marked(among, LeafMask{}, axis, 1);
+    for (int word = 0; word < 8; ++word) changes[word] &= among[word] & next[word];
+    return changes;
+}
+
 }  // namespace covol::detail

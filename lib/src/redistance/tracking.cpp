@@ -116,6 +116,15 @@ bool recompute(const LeafBand& region, const std::vector<unsigned char>& zone, F
     return true;
 }
 
+/// Removes the leaves for which `is_removed` is true.
+template <typename Condition>
+void remove_leaves(Condition is_removed, FloatGrid& u) {
+    std::vector<Coord> removed;
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
+        if (is_removed(*leaf)) removed.push_back(leaf->origin());
+    for (const Coord& origin : removed) remove_leaf(origin, u.tree().getValue(origin) < 0, u);
+}
+
 constexpr float kNear = 1.5F;  // [voxels] near_distance() is used up to this distance
 
 /// The distance of a voxel next to the front, to second order: |u| / |grad u|, in voxels. Infinity if u is not close to
@@ -158,10 +167,8 @@ void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
         throw NoSurface("grid '" + u.getName() +
                         "' has no zero crossing: nothing in the domain is inside, or nothing "
                         "outside");
-    std::vector<Coord> far;
-    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
-        if (!std::binary_search(near.begin(), near.end(), leaf->origin())) far.push_back(leaf->origin());
-    for (const Coord& origin : far) remove_leaf(origin, u.tree().getValue(origin) < 0, u);
+    remove_leaves([&](const LeafNode& leaf) { return !std::binary_search(near.begin(), near.end(), leaf.origin()); },
+                  u);
     clamp_values(u.tree(), LeafBand(u), static_cast<float>(clamp * domain.voxel_size));
 }
 
@@ -171,6 +178,8 @@ void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& ru
     constexpr double kReach = kFreeWidth + 0.9;
     static_assert(kReach < kLeafDim);
     const FloatGridPtr next = redistance(u, domain, kReach, DomainEnd::Open, u.getName().c_str(), run);
+    const CoordBBox box = box_of(domain);
+    remove_leaves([&](const LeafNode& leaf) { return !box.hasOverlap(leaf.getNodeBoundingBox()); }, *next);
     const LeafBand band(*next);
     const auto h = static_cast<float>(domain.voxel_size);
     const HaloField before = gather(band, u, false, [h](const LeafNode* leaf, float tile, float* block) {

@@ -6,10 +6,13 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+#include <random>
 
+#include "base/geometry.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
 #include "covol/start.h"
+#include "evolve/motion.h"
 #include "redistance/redistance.h"
 #include "support/clouds.h"
 
@@ -171,7 +174,61 @@ TEST_CASE("track_free_surface: the surface stays in place, and the band contains
     CHECK(std::abs(values.getValue(corner) - level(world_of(kDomain, corner))) < kH / kRadius);
 }
 
+TEST_CASE("CrossingMarks: the measured |grad u| of a distance is 1 at planes, and within a fifth of 1 at small balls") {
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> uniform(-6, 6);
+    detail::LeafMask all;
+    all.fill(~std::uint64_t(0));
+    std::vector<float> u(detail::kLeafSize);
+    const double radius = GENERATE(1e6, 30.0, 8.0);
+    // Across a leaf with a small ball, the mean of the components along an axis is larger than that of one normal.
+    const double tolerance = radius > 1e5 ? 0.01 : radius > 20 ? 0.04 : 0.2;
+    double lowest = 1, highest = 1;
+    for (int n = 0; n < 2000; ++n) {
+        const Vec3 direction = unit({normal(random), normal(random), normal(random)});
+        Vec3 at{3.5, 3.5, 3.5};  // a position on the surface
+        for (double& x : at) x += uniform(random);
+        for (int v = 0; v < detail::kLeafSize; ++v) {
+            const Vec3 to = minus({double(v >> 6), double(v >> 3 & 7), double(v & 7)}, at);
+            const double along = dot(to, direction), square = dot(to, to);
+            // The distance from a ball that touches the plane at `at`, without the cancellation of a large radius.
+            u[v] = float((2 * radius * along + square) /
+                         (std::sqrt(radius * radius + 2 * radius * along + square) + radius));
+        }
+        detail::CrossingMarks marks;
+        marks.resize(1);
+        const double slope = marks.renew(0, u.data(), all).slope;
+        lowest = std::min(lowest, slope);
+        highest = std::max(highest, slope);
+    }
+    INFO("radius " << radius << ": " << lowest << " to " << highest);
+    CHECK(lowest > 1 - tolerance);
+    CHECK(highest < 1 + tolerance);
+    CHECK(highest > lowest);
+}
+
 // The band is examined in each third step.
+TEST_CASE("A free band is rebuilt if |grad u| on its surface is below 1/2 or above 2, otherwise it stays as it is") {
+    const double slope = GENERATE(0.25, 0.6, 1.7, 8.0);
+    INFO("slope " << slope);
+    // An obstacle and a floor with the same values hold u to them, so that the slope changes, but the surface does not
+    // move.
+    const FloatGridPtr held = over_cube([&](double x) { return slope * (x - kPlane); }, "obstacle");
+    EvolveFields fields;
+    fields.obstacle = fields.floor = held.get();
+    CHECK(slope_at_plane(*tracked(fields, 0, kH, 2)) == Approx(slope));
+    const FloatGridPtr u = tracked(fields, 0, kH, 3);
+    const bool is_rebuilt = slope < detail::kFlattest || slope > detail::kSteepest;
+    CHECK(slope_at_plane(*u) == Approx(is_rebuilt ? 1 : slope).margin(1e-3));
+    double maximum = 0;
+    for (auto value = u->cbeginValueOn(); value; ++value) {
+        const double x = world_of(kCube, value.getCoord())[0];
+        maximum = std::max(maximum, std::abs(double(*value) - (is_rebuilt ? 1 : slope) * (x - kPlane)) / kH);
+    }
+    CHECK(maximum < 0.1);
+}
+
 TEST_CASE("The level set of a surface held by points is redistanced once |grad u| on it is above 2") {
     const FloatGridPtr distance = over_cube([](double x) { return std::abs(x - kPlane); }, "distance");
     EvolveFields fields;
