@@ -52,7 +52,7 @@ inline constexpr auto kOptions<EvolveOptions> = std::tuple{
     Option{"theta", &EvolveOptions::theta, kFraction, Group::Flow, "weight of the points, 0 to 1"},
     Option{"rho", &EvolveOptions::rho, kFraction, with_image(Group::Flow), "weight of the image, 0 to 1"},
     Option{"delta", &EvolveOptions::delta, kLength, Group::Flow, "weight of curvature",
-           "0.5vx after tagging, for contours or a guess, 0.1vx after growth, else 1vx", "1vx"},
+           "0.25vx after tagging, for contours or a guess, 0.1vx after growth, else 1vx", "1vx"},
     Option{"tau", &EvolveOptions::tau, kPositiveLength, Group::Flow,
            "time step; the flow's speed is 1 world unit per unit of time", "1vx or more"},
     Option{"epsilon", &EvolveOptions::epsilon, kPositive, Group::Numerics, "regularises the norm of grad u"},
