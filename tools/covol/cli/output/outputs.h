@@ -1,11 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "covol/file_set.h"
@@ -60,21 +57,19 @@ public:
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
 
 private:
-    using FileId = std::pair<std::uint64_t, std::uint64_t>;  ///< device and number of a file or folder
     struct File {
         std::string path;
-        std::optional<FileId> id;  ///< none if there is no such file
+        FileId id;
     };
     struct Input : File {
-        std::optional<FileId> folder;  ///< the folder that contains the file or, if the input is a folder, the input
+        FileId folder;  ///< the folder that contains the file or, if the input is a folder, the input
     };
-    [[nodiscard]] static std::optional<FileId> id_of(const std::filesystem::path& path);
 
     /// Checks that an existing folder is a Zarr store that contains no input, because it will be replaced.
     void check_store(const std::string& flag, const std::string& path, const std::filesystem::path& target);
     void check_inputs(const std::string& flag, const std::string& path, const std::filesystem::path& target);
     /// The files that the file of an image refers to; empty if none of them can be in `folder`.
-    const std::vector<File>& files_of(const Input& input, const std::optional<FileId>& folder);
+    const std::vector<File>& files_of(const Input& input, const FileId& folder);
 
     struct Pending {
         std::string path;
