@@ -39,6 +39,8 @@ class Usage(Case):
                 ((*job, "--checkpoint-every", "x"), "--checkpoint-every: expected a number (SECONDS), got 'x'"),
                 ((*job, "--half=maybe"), "--half: expected true or false, got 'maybe'"),
                 ((*job, "--model", "pper"), "--model: expected guided or paper, got 'pper'; did you mean paper?"),
+                ((*job, "--config", "a.toml", "--config", "b.toml"),
+                 "--config: expected one file of options, got 2 ('a.toml', 'b.toml'); write all options into one file"),
                 ((*job, "--config", "none.toml"), "--config none.toml: no such file"),
                 ((*job, "--config", self.inputs), "expected a file of options, got a folder"),
                 (("segment", self.image), "expected -o, --output OUT.vdb|..., which is required"),

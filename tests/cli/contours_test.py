@@ -8,14 +8,13 @@ import json
 import math
 import os
 import pathlib
-import struct
 import unittest
 import zipfile
 
 import numpy as np
 import tifffile
 
-from covol_case import COVOL, Case
+from covol_case import Case
 from points_test import roi
 from structures_case import rows_of
 

@@ -2,7 +2,6 @@
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/kinds_test.py
 """
-import json
 import unittest
 
 import numpy as np

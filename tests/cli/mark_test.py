@@ -13,7 +13,7 @@ import struct
 import subprocess
 import time
 
-from covol_case import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, ball_bytes, radius_of, sphere_points, write_nrrd
+from covol_case import CENTER, COVOL, H, RADIUS, SIZE, Case, ball_bytes, radius_of, sphere_points, write_nrrd
 from live_client import Live, Page
 
 MARKS = sphere_points(25)

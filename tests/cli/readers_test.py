@@ -3,7 +3,6 @@ find the same vertices, orientation, box and spacing in every format, and the bo
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/readers_test.py
 """
-import pathlib
 import re
 import shutil
 import subprocess

@@ -14,7 +14,7 @@ import unittest
 
 import numpy as np
 
-from covol_case import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
+from covol_case import CENTER, COVOL, H, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
 
 OUTPUTS = ["-o", "s.vdb", "--mesh", "s.ply", "--mask", "s.nrrd", "--table", "s.csv", "--json", "s.json"]
 

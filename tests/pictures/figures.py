@@ -4,7 +4,6 @@ import base64
 import html
 import io
 import json
-import pathlib
 import re
 import shutil
 import subprocess

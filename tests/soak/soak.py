@@ -21,8 +21,6 @@ import tempfile
 import time
 import warnings
 
-import numpy as np
-
 COVOL = os.environ.get("COVOL", "build/bin/covol")
 ALLOWED = {0, 3, 130}  # accepted exit codes: success, input refused, interrupted
 LOADING = 0.4          # seconds that the program may take to load its libraries on a busy machine

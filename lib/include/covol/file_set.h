@@ -1,4 +1,6 @@
 #pragma once
+#include <compare>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -21,6 +23,16 @@ struct OutputPlace {
 /// an output whose name is a symbolic link is written to the link's target, whether the target exists or not.
 /// @throws Error Io (the folder does not exist, too many links, another user's link in a folder like /tmp).
 [[nodiscard]] COVOL_API OutputPlace place_of_output(const std::string& path);
+
+/// Identifies a file or folder independently of its path. 0, 0: there is none.
+struct FileId {
+    std::uint64_t device = 0;
+    std::uint64_t inode = 0;
+    auto operator<=>(const FileId&) const = default;
+};
+
+/// The identity of the file or folder that is opened at the path: symbolic links are followed.
+[[nodiscard]] COVOL_API FileId file_id(const std::filesystem::path& path);
 
 /// Opens a regular file for reading. Other files, such as named pipes, are not opened, because opening them may block
 /// forever; the returned stream is then in the failed state.

@@ -244,10 +244,10 @@ double contrast_of(FloatGrid& slopes, double percentile) {
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 
-double automatic_contrast(FloatGrid& s, const EdgeOptions& options, bool is_line) {
+double automatic_contrast(FloatGrid& s, const EdgeOptions& options, EdgeFeature feature) {
     if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
-    return is_line ? kEdge.line_fraction * contrast_of(s, 0.5)  // the median
-                   : contrast_of(s, kEdge.slope_percentile);
+    return is_line(feature) ? kEdge.line_fraction * contrast_of(s, 0.5)  // the median
+                            : contrast_of(s, kEdge.slope_percentile);
 }
 
 }  // namespace
@@ -260,6 +260,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
+    report.feature = options.feature == EdgeFeature::Automatic ? EdgeFeature::Slope : options.feature;
     report.sigma = options.sigma.value_or(domain.voxel_size);
     with_threads(run, [&] {
         Window window = sample_window(image, topology, domain, report.sigma, run);
@@ -279,15 +280,14 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         detail::require_memory_of_tiles(*result.grid, "detect_edges", run);
         result.grid->tree().voxelizeActiveTiles();
         const detail::SchemeKernels& kernels = detail::kernels();
-        const bool is_line = options.feature == EdgeFeature::BrightLine || options.feature == EdgeFeature::DarkLine;
         const auto per_length = static_cast<float>(1.0 / domain.voxel_size);
         for_each_padded(window, domain, [&](std::size_t leaf, float* values) {
             auto* node = result.grid->tree().probeLeaf(window.band.origin(leaf));
             if (node == nullptr) return;
             float slope[kLeafSize];
-            if (is_line) {
+            if (is_line(report.feature)) {
                 detail::store_inner(values, slope);
-                if (options.feature == EdgeFeature::DarkLine)
+                if (report.feature == EdgeFeature::DarkLine)
                     for (float& s : slope) s = 1.0F - s;
             } else {
                 kernels.mean_gradient(values, slope);
@@ -301,7 +301,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         else if (options.edge_contrast)
             report.edge_contrast = *options.edge_contrast;
         else
-            report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
+            report.edge_contrast = automatic_contrast(*result.grid, options, report.feature);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput, image.path() +
                                                 ": constant throughout the band, so there is no edge; check "

@@ -3,9 +3,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <compare>
 #include <filesystem>
 #include <utility>
+
+#include "covol/file_set.h"
 
 namespace covol::detail {
 
@@ -29,14 +30,7 @@ private:
     int file_;
 };
 
-/// Identifies a file or folder independently of its path. 0, 0: there is none.
-struct FileId {
-    dev_t device = 0;
-    ino_t inode = 0;
-    auto operator<=>(const FileId&) const = default;
-};
-
-/// The identity of the entry at the path itself, without following a symbolic link.
+/// The identity of the entry at the path itself, without following a symbolic link as file_id() does.
 inline FileId id_of(const std::filesystem::path& path) {
     struct stat entry {};
     return ::lstat(path.c_str(), &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};

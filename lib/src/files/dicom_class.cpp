@@ -1,27 +1,37 @@
 #include "files/dicom_class.h"
 
-#include <algorithm>
-#include <cstddef>
 #include <filesystem>
 #include <fstream>
-#include <string_view>
 
 namespace covol::detail {
+namespace {
 
-std::string dicom_class(const std::string& path) {
+/// The first `count` bytes of a file, or fewer if it is shorter; none if it is not a regular file or cannot be read.
+std::string first_bytes(const std::string& path, std::size_t count) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status)) return {};  // opening a named pipe would wait for a writer
-    // [bytes] Size of the part of the file that is searched for the SOP class, which is near the beginning.
-    constexpr std::size_t kMeta = 1024, kPreamble = 128;
-    std::string begin(kMeta, '\0');
+    std::string begin(count, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), std::streamsize(begin.size()));
     begin.resize(static_cast<std::size_t>(file.gcount()));
+    return begin;
+}
+
+}  // namespace
+
+bool has_dicom_marker(std::string_view begin) {
+    return begin.size() >= kFirstDicomElement && begin.substr(kDicomPreamble, kDicomMarker.size()) == kDicomMarker;
+}
+
+bool is_marked_dicom(const std::string& path) { return has_dicom_marker(first_bytes(path, kFirstDicomElement)); }
+
+std::string dicom_class(const std::string& path) {
+    // [bytes] Size of the part of the file that is searched for the SOP class, which is near the beginning.
+    constexpr std::size_t kMeta = 1024;
+    const std::string begin = first_bytes(path, kMeta);
     constexpr std::string_view kMediaClass("\x02\x00\x02\x00UI", 6);
-    const std::size_t at = begin.find(kMediaClass, kPreamble + 4);
-    if (begin.compare(std::min<std::size_t>(kPreamble, begin.size()), 4, "DICM") != 0 || at == std::string::npos ||
-        at + 8 > begin.size())
-        return {};
+    const std::size_t at = begin.find(kMediaClass, kFirstDicomElement);
+    if (!has_dicom_marker(begin) || at == std::string::npos || at + 8 > begin.size()) return {};
     const auto length = std::size_t(static_cast<unsigned char>(begin[at + 6]));
     std::string uid = begin.substr(at + 8, length);
     if (!uid.empty() && uid.back() == '\0') uid.pop_back();

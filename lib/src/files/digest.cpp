@@ -90,14 +90,6 @@ bool add_metadata(const fs::path& folder, Digest& hash) {
     return !found.empty();
 }
 
-/// Whether a file can be read and begins as DICOM files do: with 128 arbitrary bytes and "DICM".
-bool is_dicom(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    char bytes[4] = {};
-    file.seekg(128);
-    return file.read(bytes, 4) && std::string(bytes, 4) == "DICM";
-}
-
 /// Adds the names, sizes and contents of the DICOM images directly in a folder, or of all its files if none of them is
 /// one. DICOM objects without an image, such as segmentations and structure sets, are left out, as the reader of series
 /// does. If together the files are larger than a file that is read as a whole, the middle of each is left out.
@@ -109,7 +101,7 @@ void add_files(const fs::path& folder, Digest& hash) {
         std::error_code is_gone;
         if (!entry.is_regular_file(is_gone) || detail::holds_no_image(entry.path().string())) continue;
         all.insert(entry.path());
-        if (is_dicom(entry.path())) dicom.insert(entry.path());
+        if (detail::is_marked_dicom(entry.path().string())) dicom.insert(entry.path());
     }
     if (status) throw Error(Errc::Io, folder.string() + ": cannot read");
     const std::set<fs::path>& found = dicom.empty() ? all : dicom;

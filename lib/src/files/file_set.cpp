@@ -43,7 +43,7 @@ struct FileSet::State {
     };
     /// Sorted by their identities, so that all processes lock folders in the same order and none waits for another that
     /// waits for it.
-    std::map<detail::FileId, Folder> folders;
+    std::map<FileId, Folder> folders;
     std::vector<File> files;
     File writing;
 
@@ -88,7 +88,7 @@ struct FileSet::State {
             const fs::path& scratch = folder->second.scratch.path();
             ::unlink((scratch / detail::kManifest).c_str());
             const fs::path commit = scratch / detail::kCommit;
-            if (detail::id_of(commit) != detail::FileId{}) ::unlink(commit.c_str());
+            if (detail::id_of(commit) != FileId{}) ::unlink(commit.c_str());
         }
     }
 };

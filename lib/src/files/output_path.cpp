@@ -72,6 +72,11 @@ OutputPlace place_of_output(const std::string& path) {
     refuse(path, std::strerror(ELOOP));
 }
 
+FileId file_id(const fs::path& path) {
+    struct stat entry {};
+    return ::stat(path.c_str(), &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};
+}
+
 namespace detail {
 
 fs::path path_of_output(const std::string& path) {

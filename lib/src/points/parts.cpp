@@ -37,29 +37,31 @@ std::vector<Vec3> largest_of(const PointCells& cells) {
     return std::move(grouped[largest]);
 }
 
-/// The points of largest_part(), or none if the cloud is in one part, and the longest side of their box.
 struct LargestPart {
-    LargestPart(const std::vector<Vec3>& all, double resolution, double edge) : side(longest_side(bounding_box(all))) {
-        while (side > resolution * edge) {
-            std::vector<Vec3> next = largest_of(PointCells(points.empty() ? all : points, side / resolution));
-            const double longest = longest_side(bounding_box(next));
-            if (kCommon.clear_ratio * longest > side) break;
-            points = std::move(next);
-            side = longest;
-        }
-    }
-    std::vector<Vec3> points;
-    double side;
+    std::vector<Vec3> points;  ///< none if the cloud is in one part
+    double side = 0;           ///< longest side of the part's bounding box, world units
 };
+
+LargestPart find_largest_part(const std::vector<Vec3>& all, double resolution, double edge) {
+    LargestPart part{{}, longest_side(bounding_box(all))};
+    while (part.side > resolution * edge) {
+        std::vector<Vec3> next =
+            largest_of(PointCells(part.points.empty() ? all : part.points, part.side / resolution));
+        const double longest = longest_side(bounding_box(next));
+        if (kCommon.clear_ratio * longest > part.side) break;
+        part = {std::move(next), longest};
+    }
+    return part;
+}
 
 }  // namespace
 
 double largest_part_side(const std::vector<Vec3>& points, double resolution, double edge) {
-    return LargestPart(points, resolution, edge).side;
+    return find_largest_part(points, resolution, edge).side;
 }
 
 std::vector<Vec3> largest_part(const std::vector<Vec3>& points, double resolution, double edge) {
-    LargestPart part(points, resolution, edge);
+    LargestPart part = find_largest_part(points, resolution, edge);
     return part.points.empty() ? points : std::move(part.points);
 }
 

@@ -112,7 +112,7 @@ double largest_error_of_marks(const Problem& problem, double h, double noise) {
 bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGrid& u) {
     const double beyond = std::min(largest_error_of_marks(problem, start.domain.voxel_size, start.cloud.noise),
                                    0.9 * double(u.background()));
-    // The points that continue a cut body beyond the image lie partly beyond the domain, where u is not known.
+    // A region of interest can exclude marks. They lie beyond the domain, where u is not known.
     std::vector<Vec3> marks = start.marks.trusted;
     std::erase_if(marks, [&](const Vec3& mark) { return !start.domain.contains(mark); });
     const std::vector<double> levels = detail::levels_at(u, marks);

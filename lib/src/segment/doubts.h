@@ -30,7 +30,8 @@ void require_outside(const Problem& problem, const FloatGrid& u, const std::vect
 /// @param noise  standard deviation of a cloud's noise; 0 for other points
 [[nodiscard]] double largest_error_of_marks(const Problem& problem, double h, double noise);
 
-/// Whether so many trusted marks in the domain lie off the zero level set of `u` that it cannot be the marked surface.
+/// Whether so many trusted marks in the domain lie off the zero level set of `u` that it cannot be the marked surface;
+/// false if there are none in the domain.
 [[nodiscard]] bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGrid& u);
 
 }  // namespace covol::pipeline

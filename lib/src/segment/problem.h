@@ -9,8 +9,10 @@ namespace covol::pipeline {
 
 /// Marks by what they are used for; world units.
 struct MarkSets {
-    std::vector<Vec3> attracting;  ///< all marks that attract, including points interpolated between slices of contours
-    std::vector<Vec3> trusted;     ///< the attracting marks that are not interpolated between slices
+    /// All marks that attract, including points interpolated between slices of contours, and points that continue a cut
+    /// body beyond the image.
+    std::vector<Vec3> attracting;
+    std::vector<Vec3> trusted;  ///< the attracting marks that were given: without such points
 };
 
 /// The input of one structure, as given. The objects that it refers to must outlive it.

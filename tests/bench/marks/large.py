@@ -5,7 +5,6 @@
 Without an image it is that of large_image.py, which is made first: 2048 x 2048 x 2048 voxels in chunks, with a ball to mark.
 """
 import argparse
-import pathlib
 import tempfile
 import time
 

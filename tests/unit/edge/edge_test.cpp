@@ -158,6 +158,7 @@ TEST_CASE("g is 1/2 at the contrast, whether given or chosen by percentile") {
     std::int64_t steeper = 0;
     for (auto v = chosen.grid->cbeginValueOn(); v; ++v) steeper += *v < 0.5F;
     CHECK(static_cast<double>(steeper) / static_cast<double>(domain.voxel_count()) == Approx(0.2).margin(0.002));
+    CHECK(chosen.report.feature == EdgeFeature::Slope);  // Automatic was requested
     CHECK(chosen.report.edge_k == Approx(1 / (chosen.report.edge_contrast * chosen.report.edge_contrast)));
 }
 
@@ -259,6 +260,7 @@ TEST_CASE("g of a line has its minimum in the middle of the line, g of a slope a
     o.feature = EdgeFeature::BrightLine;
     o.sigma = 0;
     const EdgeResult exact = detect_edges(bright, *band, o);
+    CHECK(exact.report.feature == EdgeFeature::BrightLine);
     for (auto v = exact.grid->cbeginValueOn(); v; ++v) {
         const openvdb::Vec3d x = exact.grid->indexToWorld(v.getCoord());
         const double s = sheet({x[0], x[1], x[2]});

@@ -1,11 +1,14 @@
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "covol/error.h"
 #include "covol/start.h"
 #include "segment/doubts.h"
+#include "segment/start/starts.h"
+#include "support/clouds.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -63,4 +66,22 @@ TEST_CASE("A surface that is inside out is rejected, unless marks, seeds or the 
     const Problem named(&image, none, plain, run);
     CHECK_THROWS_AS(pipeline::require_outside(named, *inverted, {}), Error);
     CHECK_NOTHROW(pipeline::require_outside(named, *inverted, pipeline::inside_on_border(named, *inverted)));
+}
+
+TEST_CASE("Points that continue a cut body beyond the image attract, but are not among the marks that can be missed") {
+    const Image image = blank_image();
+    const RunContext run;
+    std::vector<Vec3> marks = test::sphere_cloud(1000, 8, 1, {3, 15.5, 15.5});
+    std::erase_if(marks, [](const Vec3& mark) { return mark[0] < 0; });
+    SegmentOptions options;
+    options.start = TagStart{};
+    const Problem problem(&image, marks, options, run);
+    const pipeline::Resolved resolved = pipeline::resolve(problem);
+    const pipeline::StartSurface start = pipeline::make_start(problem, resolved.choices, resolved.marks);
+    const auto is_beyond = [](const Vec3& mark) { return mark[0] < -0.5; };
+    const std::vector<Vec3>&attracting = start.facts.marks.attracting, &trusted = start.facts.marks.trusted;
+    CHECK(std::any_of(attracting.begin(), attracting.end(), is_beyond));
+    CHECK(std::none_of(trusted.begin(), trusted.end(), is_beyond));
+    CHECK(trusted.size() > 500);
+    CHECK_FALSE(pipeline::misses_marks(problem, start.facts, *start.u));
 }

@@ -94,13 +94,14 @@ private:
     }
 
     void check() {
+        std::vector<std::string> read;
         for (const Frame& frame : frames_) {
-            std::vector<std::string> read{frame.path};
+            read.push_back(frame.path);
             for (const Marks& marks : structures_)
                 for (const auto* paths : {&marks.files.points, &marks.files.contours})
                     for (const std::string& path : *paths) read.push_back(with_frame(path, frame.number));
-            session_.outputs().protect(read);
         }
+        session_.outputs().protect(read);
         for (const Frame& frame : frames_) check_outputs(job_, structures_, tag(frame), session_.outputs());
         session_.outputs().check("--table", job_.table_path, OutputKind::Table);
         check_scene(job_, session_.outputs());

@@ -10,6 +10,7 @@
 #include "covol/digest.h"
 #include "covol/error.h"
 #include "covol/version.h"
+#include "files/dicom_class.h"
 
 namespace covol::detail {
 namespace {
@@ -172,7 +173,7 @@ void write_dicom_instance(const std::string& path, DicomItem& file, bool with_vr
     const std::string rest = meta.encoded(true);
     DicomItem size;
     size.put_longs(0x00020000, {std::uint32_t(rest.size())});
-    const std::string begin = std::string(128, '\0') + "DICM" + size.encoded(true) + rest;
+    const std::string begin = std::string(kDicomPreamble, '\0').append(kDicomMarker) + size.encoded(true) + rest;
     const std::string elements = file.encoded(with_vr);
     std::ofstream out(path, std::ios::binary | std::ios::trunc);
     out.write(begin.data(), std::streamsize(begin.size()));

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "files/dicom_class.h"
 #include "io/dicom/dicom_elements.h"
 
 namespace covol::detail {
@@ -29,7 +30,6 @@ constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT",
                                        "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
 
 constexpr std::uint64_t kLongestValue = 1 << 12;
-constexpr std::uint64_t kPreamble = 128;
 
 constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 /// Sequences outside functional groups that give the position or spacing of frames: detectors of nuclear medicine
@@ -85,10 +85,10 @@ public:
     [[nodiscard]] const DicomHeader& header() const { return header_; }
 
     bool is_sound() {
-        go_to(kPreamble);
-        char mark[4] = {};
-        const bool is_marked = size_ > kPreamble + 4 && file_.read(mark, 4) && std::memcmp(mark, "DICM", 4) == 0;
-        go_to(is_marked ? kPreamble + 4 : 0);
+        std::string start(kFirstDicomElement, '\0');
+        const bool is_marked =
+            size_ > start.size() && file_.read(start.data(), std::streamsize(start.size())) && has_dicom_marker(start);
+        go_to(is_marked ? kFirstDicomElement : 0);
         std::string syntax;
         for (std::uint32_t last = 0; at_ < size_;) {
             const std::uint64_t begin = at_;
@@ -316,10 +316,10 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 
 bool is_dicom(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
-    std::array<char, kPreamble + 4> begin{};
+    std::array<char, kFirstDicomElement> begin{};
     file.read(begin.data(), begin.size());
     const auto bytes = static_cast<std::size_t>(file.gcount());
-    if (bytes == begin.size() && std::memcmp(begin.data() + kPreamble, "DICM", 4) == 0) return true;
+    if (has_dicom_marker({begin.data(), bytes})) return true;
     if (bytes < 12) return false;
     // Without "DICM", the file must begin with an element of group 0002 or 0008, with a known VR or a plausible length.
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(begin[at]); };

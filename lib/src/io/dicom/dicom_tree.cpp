@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "covol/error.h"
+#include "files/dicom_class.h"
 #include "io/dicom/dicom_elements.h"
 
 namespace covol::detail {
@@ -25,9 +26,8 @@ public:
         : path_(path), bytes_(bytes), wanted_(wanted) {}
 
     DicomTree parse() {
-        constexpr std::size_t kPreambleBytes = 128;
-        const bool is_marked = bytes_.size() > kPreambleBytes + 4 && bytes_.substr(kPreambleBytes, 4) == "DICM";
-        at_ = is_marked ? kPreambleBytes + 4 : 0;
+        const bool is_marked = bytes_.size() > kFirstDicomElement && has_dicom_marker(bytes_);
+        at_ = is_marked ? kFirstDicomElement : 0;
         std::string_view syntax;
         while (at_ + 2 <= bytes_.size() && number<std::uint16_t>(at_) == 2) {
             const Head head = read_head(true);

@@ -171,17 +171,17 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
     Remarks& remarks = edges.report.remarks;
     if (!options.edge_k && !options.edge_contrast)
         remarks.choose("edge_k", number(e.edge_k),
-                       std::string("g = 1/2 at a ") + (is_line(options.feature) ? "brightness" : "gradient") + " of " +
+                       std::string("g = 1/2 at a ") + (is_line(e.feature) ? "brightness" : "gradient") + " of " +
                            number(e.edge_contrast),
                        problem.run);
     if (!options.intensities)
         remarks.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles",
                        problem.run);
-    // K and the intensity range are fixed from here on, because g must keep its meaning while the band moves.
+    // These settings are fixed from here on, because g must keep its meaning while the band moves.
+    edges.options.feature = e.feature;
     edges.options.edge_k = e.edge_k;
     edges.options.edge_contrast.reset();
     edges.options.intensities = {e.low, e.high};
-    if (options.feature == EdgeFeature::Automatic) edges.options.feature = EdgeFeature::Slope;  // as detect_edges() did
     return edges;
 }
 

@@ -37,7 +37,7 @@ struct EdgeChoice {
 /// g on the band of a flow.
 struct Edges {
     FloatGridPtr grid;    ///< null if the image is not used
-    EdgeOptions options;  ///< with the computed K and intensity range, which later calls use, too
+    EdgeOptions options;  ///< with the feature, K and intensity range as used, which later calls use, too
     EdgeReport found;
     StepReport report;
 };

@@ -129,8 +129,9 @@ std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec
                     "together with their mirror image beyond the image's end, the marks enclose a body");
 }
 
-/// The marks and the points that continue them beyond the image, without those at an end slice that lie deep inside the
-/// body: these only show that the body extends beyond the image, and do not lie on the surface.
+/// The marks, of which those that attract also include the points that continue them beyond the image. Marks at an end
+/// slice that lie deep inside the body are left out: these only show that the body extends beyond the image, and do not
+/// lie on the surface.
 /// @param beyond  the points that continue the marks beyond the image
 MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
                   const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
@@ -143,10 +144,8 @@ MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSu
                level.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) < -deep;
     };
     const auto dropped = std::count_if(marks.attracting.begin(), marks.attracting.end(), caps);
-    for (std::vector<Vec3>* const set : {&marks.attracting, &marks.trusted}) {
-        append(beyond, *set);
-        std::erase_if(*set, caps);
-    }
+    append(beyond, marks.attracting);
+    for (std::vector<Vec3>* const set : {&marks.attracting, &marks.trusted}) std::erase_if(*set, caps);
     if (dropped > 0)
         remarks.choose(
             "cap_marks", std::to_string(dropped),

@@ -313,8 +313,8 @@ std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const 
     const std::vector<const CLI::App*> commands = program_.get_subcommands([](const CLI::App*) { return true; });
     const std::vector<CLI::App*> parsed = program_.get_subcommands();
     const CLI::App* const command = parsed.empty() ? nullptr : parsed.front();
-    const std::vector<std::string>& files = program_.get_config_ptr()->results();
-    const std::string file = "--config" + (files.size() == 1 ? " " + files.front() : ""), text = all_of(input, file);
+    // More than one file of --config is refused before this function is called.
+    const std::string file = "--config " + program_.get_config_ptr()->results().front(), text = all_of(input, file);
     std::vector<CLI::ConfigItem> items;
     std::map<const CLI::Option*, std::size_t> lines;
     const CLI::Option* last = nullptr;

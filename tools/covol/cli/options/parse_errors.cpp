@@ -81,11 +81,12 @@ std::string wrong_value(const CLI::Option& option) {
     return "expected " + list + got + did_you_mean(close);
 }
 
-std::string wrong_count(const CLI::Option& option, bool too_many) {
+std::string wrong_count(const CLI::Option& option, bool too_many, bool is_config) {
     const std::string type = help_of(option).value;
     if (!too_many) return "expected a value" + (type.empty() ? "" : ", " + type) + ", got none";
-    return "expected one value, got " + std::to_string(option.results().size()) + " (" + list_of(option.results()) +
-           "); give the option once";
+    return std::string("expected one ") + (is_config ? "file of options" : "value") + ", got " +
+           std::to_string(option.results().size()) + " (" + list_of(option.results()) + "); " +
+           (is_config ? "write all options into one file" : "give the option once");
 }
 
 std::string missing(const CLI::Option& option) {
@@ -130,7 +131,8 @@ std::string text_of(const CLI::ParseError& error, const CLI::App& program) {
     if (kind == "RequiredError") return missing(*option);
     if (kind == "ConversionError") return origin + name + ": " + wrong_value(*option);
     if (kind == "ArgumentMismatch")
-        return origin + name + ": " + wrong_count(*option, text.find("At Most") != std::string::npos);
+        return origin + name + ": " +
+               wrong_count(*option, text.find("At Most") != std::string::npos, option == program.get_config_ptr());
     if (kind == "ValidationError")
         return origin + name + ": " +
                (words_of(help_of(*option).value).empty() ? after(text, ": ") : wrong_value(*option));

@@ -11,7 +11,6 @@
 #include <climits>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
 #include <thread>
 
 #include "covol/error.h"
@@ -121,7 +120,7 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
         throw Error(Errc::Io, flag + ": " + path +
                                   ": cannot write: it exists and is not a Zarr store; choose "
                                   "another name");
-    for (const Input& input : inputs_) {
+    for (Input& input : inputs_) {
         std::vector<File> files = may_refer_elsewhere(input.path) ? files_of(input, {}) : std::vector<File>{};
         files.push_back(input);
         for (const File& file : files)
@@ -134,31 +133,27 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
 void Outputs::protect(const std::vector<std::string>& inputs) {
     std::error_code status;
     for (const std::string& path : inputs) {
+        if (!protected_.insert(path).second) continue;
         const fs::path folder = fs::is_directory(path, status) ? fs::path(path) : fs::absolute(path).parent_path();
-        inputs_.push_back({{path, id_of(path)}, id_of(folder)});
+        inputs_.push_back({{path, file_id(path)}, file_id(folder), {}});
+        if (is_zarr_name(path)) stores_.push_back(path);
     }
-    std::copy_if(inputs.begin(), inputs.end(), std::back_inserter(stores_), is_zarr_name);
 }
 
-std::optional<Outputs::FileId> Outputs::id_of(const fs::path& path) {
-    struct stat entry {};
-    if (::stat(path.c_str(), &entry) != 0) return {};
-    return FileId{entry.st_dev, entry.st_ino};
-}
-
-const std::vector<Outputs::File>& Outputs::files_of(const Input& input, const std::optional<FileId>& folder) {
+const std::vector<Outputs::File>& Outputs::files_of(Input& input, const FileId& folder) {
     static const std::vector<File> none;
     if (!may_refer_elsewhere(input.path) && input.folder != folder) return none;
-    const auto [entry, is_new] = files_of_.try_emplace(input.path);
-    if (is_new) {
+    if (!input.refers_to) {
+        input.refers_to.emplace();
         try {
-            for (const std::string& path : list_image_files(input.path)) entry->second.push_back({path, id_of(path)});
+            for (const std::string& path : list_image_files(input.path))
+                input.refers_to->push_back({path, file_id(path)});
         } catch (const Error& error) {
             // The input is not an image, or it is one that cannot be read; this error is reported when it is read.
             if (error.code() == Errc::Cancelled) throw;
         }
     }
-    return entry->second;
+    return *input.refers_to;
 }
 
 void Outputs::check_inputs(const std::string& flag, const std::string& path, const fs::path& target) {
@@ -168,9 +163,9 @@ void Outputs::check_inputs(const std::string& flag, const std::string& path, con
     std::error_code status;
     // Only a file that exists can be an input. Each output is compared with each input, of which there can be
     // thousands: the inputs' files are therefore examined once.
-    if (const std::optional<FileId> id = id_of(target)) {
-        const std::optional<FileId> folder = id_of(target.parent_path());
-        for (const Input& input : inputs_) {
+    if (const FileId id = file_id(target); id != FileId{}) {
+        const FileId folder = file_id(target.parent_path());
+        for (Input& input : inputs_) {
             if (input.id == id) refuse("is an input of this run");
             for (const File& file : files_of(input, folder))
                 if (file.id == id) refuse("belongs to " + input.path + ", an input of this run");

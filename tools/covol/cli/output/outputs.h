@@ -1,11 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <optional>
+#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "covol/file_set.h"
@@ -36,6 +34,7 @@ public:
     explicit Outputs(const RunContext& run) : run_(run) {}
 
     /// Adds files and folders that this run reads: no output may replace one of them, or a file that it refers to.
+    /// Paths that were added before are left out.
     void protect(const std::vector<std::string>& inputs);
 
     /// Checks the ending of the name, that the folder exists, is writable and is not locked, and that the path is
@@ -60,21 +59,20 @@ public:
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
 
 private:
-    using FileId = std::pair<std::uint64_t, std::uint64_t>;  ///< device and number of a file or folder
     struct File {
         std::string path;
-        std::optional<FileId> id;  ///< none if there is no such file
+        FileId id;
     };
     struct Input : File {
-        std::optional<FileId> folder;  ///< the folder that contains the file or, if the input is a folder, the input
+        FileId folder;  ///< the folder that contains the file or, if the input is a folder, the input
+        std::optional<std::vector<File>> refers_to;  ///< result of files_of(), once it was needed
     };
-    [[nodiscard]] static std::optional<FileId> id_of(const std::filesystem::path& path);
 
     /// Checks that an existing folder is a Zarr store that contains no input, because it will be replaced.
     void check_store(const std::string& flag, const std::string& path, const std::filesystem::path& target);
     void check_inputs(const std::string& flag, const std::string& path, const std::filesystem::path& target);
     /// The files that the file of an image refers to; empty if none of them can be in `folder`.
-    const std::vector<File>& files_of(const Input& input, const std::optional<FileId>& folder);
+    static const std::vector<File>& files_of(Input& input, const FileId& folder);
 
     struct Pending {
         std::string path;
@@ -82,8 +80,8 @@ private:
     };
     const RunContext& run_;
     std::vector<Input> inputs_;
-    std::vector<std::string> stores_;                    ///< those of the inputs whose names end in .zarr
-    std::map<std::string, std::vector<File>> files_of_;  ///< results of files_of(), by input
+    std::set<std::string> protected_;  ///< the paths of inputs_
+    std::vector<std::string> stores_;  ///< those of the inputs whose names end in .zarr
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
     std::vector<Pending> devices_;  ///< outputs to devices and pipes; written last, because they cannot be undone
