@@ -138,7 +138,7 @@ class Verification:
         return rows
 
     def embryo(self):
-        """The paper's two tissues in the embryo phantom; overlap with the truth. Passes: a Dice coefficient of at least 0.98."""
+        """The paper's two tissues in the embryo phantom, each in a run of its own; overlap with the truth. Passes: a Dice coefficient of at least 0.98."""
         import tifffile
         data, rows = pathlib.Path(os.environ["COVOL_DATA"]) / "phantoms", []
         truth = tifffile.imread(data / "embryo_labels.tif")

@@ -422,7 +422,7 @@ def write_tables(results):
 
 
 def summary(results):
-    """The tables of docs/benchmarks.md."""
+    """The tables of docs/benchmarks_speed.md."""
     blocks = []
     if found := read_results(results, "sphere"):
         machine, rows = found
@@ -450,7 +450,7 @@ def summary(results):
 
 
 def update_docs(results):
-    page = HERE.parent.parent / "docs/benchmarks.md"
+    page = HERE.parent.parent / "docs/benchmarks_speed.md"
     begin, end = "<!-- bench: written by tests/bench/run.sh --update-docs -->\n", "<!-- bench: end -->"
     text = page.read_text()
     head, rest = text.split(begin)
@@ -465,7 +465,7 @@ def main():
     parser.add_argument("--results", help="where tables and plot go [tests/bench/results; quick: build folder/quick]")
     parser.add_argument("--only", default=",".join(PARTS), help="parts to run, separated by commas; '' makes tables and plot again")
     parser.add_argument("--quick", action="store_true", help="small sizes, one repetition")
-    parser.add_argument("--update-docs", action="store_true", help="put the main tables into docs/benchmarks.md")
+    parser.add_argument("--update-docs", action="store_true", help="put the main tables into docs/benchmarks_speed.md")
     options = parser.parse_args()
     if options.results is None:
         options.results = pathlib.Path(options.build) / "quick" if options.quick else HERE / "results"

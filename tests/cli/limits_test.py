@@ -345,7 +345,7 @@ class LargeImages(Limited):
 
     def test_plan_knows_of_mapped_pages(self):
         # The bounds of `ratio` are wide, because the peak of memory depends on earlier runs: if the system still has
-        # pages of the image in memory, it maps more of them at once. docs/benchmarks.md states how accurate plans are.
+        # pages of the image in memory, it maps more of them at once. docs/benchmarks_speed.md states how accurate plans are.
         job = ["segment", self.large, "--points", self.inputs / "large.xyz", "-o", "s.vdb", "--quiet", "--json"]
         self.run_covol("plan", *job, "plan.json")
         planned = json.loads((self.out / "plan.json").read_text())["plan"]

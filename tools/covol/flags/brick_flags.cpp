@@ -6,7 +6,7 @@
 namespace covol::tool {
 namespace {
 
-// Memory in bytes; measured, see docs/benchmarks.md, Bricks.
+// Memory in bytes; measured, see docs/benchmarks_speed.md, Bricks.
 constexpr double kBandBytes = 200;    ///< peak memory for each voxel of a band that is solved
 constexpr double kJoinBytes = 30;     ///< peak memory for each voxel of a band whose bricks are joined
 constexpr double kMeshBytes = 80;     ///< peak memory for each voxel if bricks are joined and the whole mesh is made

@@ -19,7 +19,7 @@
 namespace covol::tool {
 namespace {
 
-// Measured, see docs/benchmarks.md, Plans. Memory in bytes.
+// Measured, see docs/benchmarks_speed.md, Plans. Memory in bytes.
 constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, including mesh and files
 constexpr double kTubeBytes = 12;        ///< memory for each voxel of the tube in which the distance is stored
 constexpr double kBaseBytes = 6.5e7;     ///< memory of the program itself
