@@ -226,7 +226,7 @@ TEST_CASE("separate() rejects missing, repeated or incompatible surfaces and opt
     Domain finer = space();
     finer.voxel_size /= 2;
     const FloatGridPtr other = extract_surface(*start_from_sphere(finer, {0, 0, 0}, 3));
-    CHECK_THROWS_WITH(separate({{"a", a}, {"b", other}}), Catch::Contains("one transform"));
+    CHECK_THROWS_WITH(separate({{"a", a}, {"b", other}}), Catch::Contains("the same transform"));
     CHECK_THROWS_AS(separate({{"a", a}}, {std::nan(""), 0.9}), Error);
     CHECK_THROWS_AS(separate({{"a", a}}, {0, 0.3}), Error);
     CHECK(separate({{"a", a}}).surfaces[0] == a);

@@ -64,7 +64,7 @@ TEST_CASE("segment: points alone give a closed sphere, and automatic choices are
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * h);
     CHECK(result.report.fit.mean < 0.05 * h);
     CHECK(result.report.resolved.evolve.rho == 0);
-    CHECK(result.report.resolved.evolve.delta.value() == Approx(0.5 * h));
+    CHECK(result.report.resolved.evolve.delta.value() == Approx(0.25 * h));
     CHECK(result.report.automatic.count("rho") == 1);
     CHECK(result.report.automatic.count("guess") == 1);
     CHECK(result.report.guess.marks == 1200);
