@@ -117,6 +117,11 @@ def make_clouds(folder):
     write_points(folder / "normals_plate.csv", points, -normals)
     points, normals = draw("spikes", 14, 0.2)
     write_points(folder / "normals_wrong.csv", points, np.where(points[:, :1] > 0.3, -1, 1) * normals)
+    points, normals = draw("plate", 17, 0.9)  # noise moves points across the plate
+    write_points(folder / "normals_thin.csv", points, normals)
+    points, normals = draw("torus", 18, 0.2)
+    normals = np.random.default_rng(18).normal(size=normals.shape)
+    write_points(folder / "normals_random.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
     write_points(folder / "few.csv", draw("torus", 16, 0.1, count=700)[0])
 
@@ -161,6 +166,18 @@ def read_nrrd(path):
 MOVED = {"round": (2, -3, 1), "torus": (1, 2, 2), "two": (-2, 1, 0), "box": (1, -1, 2), "sphere": (3, 0, -2), "many": (0, 2, -2)}  # voxels along z, y and x, from one image of a time-lapse to the next
 
 
+def write_torus_lines(folder, head):
+    """An image of the torus whose surface is a bright line, and scribbles inside the torus on every sixth slice."""
+    at = (np.arange(44) - 21.5) * 2.6 / 44
+    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    off = (np.hypot(np.hypot(x, y) - 0.75, z) - 0.3) * 44 / 2.6  # voxels
+    line = 20 + 150 * np.exp(-(off / 1.5) ** 2) + np.random.default_rng(19).normal(0, 15, off.shape)
+    (folder / "p_line.nrrd").write_bytes(head + line.clip(0, 255).astype("u1").tobytes())
+    inside = (off < -1) & (np.abs(np.hypot(x, y) - 0.75) < 0.07) & (np.arctan2(y, x) > -2)
+    inside[np.arange(44) % 6 != 3] = False
+    (folder / "s_scribbles.nrrd").write_bytes(head + inside.astype("u1").tobytes())
+
+
 def make_phantoms(folder, covol):
     for name, kind, count, noise in (("round", "sphere-round", 60, 0.1), ("torus", "torus", 80, 0.3), ("two", "two-spheres", 60, 0.2), ("slit", "sphere-slit", 60, 0),
                                      ("many", "torus", 350, 0.2), ("dense", "torus", 1500, 0.2), ("box", "box", 60, 0.2), ("sphere", "sphere", 300, 0.2)):
@@ -176,9 +193,13 @@ def make_phantoms(folder, covol):
             raw = head.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n"
             wrong = np.roll(labels, (1, 2, 0), (0, 1, 2)) if name == "torus" else labels & np.roll(labels, 3, 0)
             (folder / f"g_{name}.nrrd").write_bytes(raw + np.ascontiguousarray(wrong).tobytes())
+            grown = np.max([np.roll(labels, by, axis) for axis in range(3) for by in (-2, 0, 2)], axis=0)
+            (folder / f"g_{name}_large.nrrd").write_bytes(raw + np.ascontiguousarray(grown).tobytes())
             painted = np.zeros_like(labels)
             painted[::6] = labels[::6]
             (folder / f"s_{name}.nrrd").write_bytes(raw + painted.tobytes())
+        if name == "torus":
+            write_torus_lines(folder, raw)
         points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
         np.savetxt(folder / f"ten_{name}.csv", points[::max(1, len(points) // 10)], "%.6f", ",", header="x,y,z", comments="")
     rows = []
@@ -214,6 +235,7 @@ REAL_DRAW = 11
 # For the jobs that compare right with wrong marks: number of marks, and shift of the wrong marks along each axis as a
 # fraction of the extent of the marks.
 DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4
+ASTRAY = 0.25  # shift of single wrong marks, in the same unit
 
 
 def real_name(structure, count):
@@ -244,7 +266,12 @@ def make_real(folder):
                 arguments = ["segment", str(structure.image), *structure.options, "--points", f"../in/{name}.csv", "--points-space", "index",
                              "-o", "s.vdb", "--mask", "m.tif"]
                 JOBS[name] = (shlex.join(arguments), "real", structure.name)
+                JOBS[f"{name} alone"] = (shlex.join([*arguments, "--rho", "0"]), "real", structure.name)
                 if count == DOUBT_COUNT:
+                    astray = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
+                    astray[::10] += ASTRAY * np.ptp(astray, 0)  # a tenth of the marks is wrong
+                    np.savetxt(folder / f"{name}_astray.csv", astray, "%.5f", ",", header="x,y,z", comments="")
+                    JOBS[f"{name} astray"] = (shlex.join(arguments).replace(f"{name}.csv", f"{name}_astray.csv"), "real", structure.name)
                     moved = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
                     moved += DOUBT_SHIFT * np.ptp(moved, 0)
                     np.savetxt(folder / f"{name}_wrong.csv", moved, "%.5f", ",", header="x,y,z", comments="")
@@ -282,6 +309,8 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "normals": (RECONSTRUCT.format("normals.csv"), "cloud", "torus"),
     "normals plate": (RECONSTRUCT.format("normals_plate.csv"), "cloud", "plate"),
     "normals wrong": (RECONSTRUCT.format("normals_wrong.csv"), "cloud", "spikes"),
+    "normals thin": (RECONSTRUCT.format("normals_thin.csv"), "cloud", "plate"),
+    "normals random": (RECONSTRUCT.format("normals_random.csv"), "cloud", "torus"),
     "thick tag": (RECONSTRUCT.format("thick.csv").replace("cloud", "tag"), "cloud", "torus"),
     "spikes tag": (RECONSTRUCT.format("spikes1.csv").replace("cloud", "tag"), "cloud", "spikes"),
     "twins tag": (RECONSTRUCT.format("twins7.csv").replace("cloud", "tag"), "cloud", "twins"),
@@ -311,6 +340,11 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m guess box": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --rho 0", "mask", "box"),
     "m guess many": (MARKS.format("torus") + " --guess ../in/g_torus.nrrd --rho 0", "mask", "torus"),
     "m guess many round": (MARKS.format("round") + " --guess ../in/g_round.nrrd --rho 0", "mask", "round"),
+    "m guess large": (MARKS.format("torus") + " --guess ../in/g_torus_large.nrrd --rho 0", "mask", "torus"),
+    "m line": ("segment ../in/p_line.nrrd --contours ../in/contours.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m line marks": ("segment ../in/p_line.nrrd --points ../in/p_torus.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m line tag": ("segment ../in/p_line.nrrd --points ../in/p_dense.csv --init tag -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m scribbles": ("segment ../in/p_torus.nrrd --painted ../in/s_scribbles.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m grow torus": ("segment ../in/p_torus.nrrd --theta 0 --inside 0.75,0,0 -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m grow round": ("segment ../in/p_round.nrrd --theta 0 --inside 0,0,0 -o s.vdb --mask m.nrrd", "mask", "round"),
     "m grow wide": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,1.15 -o s.vdb --mask m.nrrd", "mask", "sphere"),
@@ -327,28 +361,31 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
 # Lists of jobs for the steps in PLAN, the most informative job first.
 CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins", "torus noisy", "hole", "spikes", "plate"]
 SCANS = ["front", "layers", "front sensor", "half open", "hole", "half flat"]
-GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "half open", "twins"]
+GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "normals thin", "normals random", "half open", "twins"]
 TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere", "spikes tag"]
 ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours alone"]
 GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
-CONTOURS = ["m contours", "m contours alone", "m painted", "m painted box", "m contours sphere", "m painted round"]
-CORRECTED = ["m guess", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
+CONTOURS = ["m contours", "m contours alone", "m painted", "m scribbles", "m line", "m painted box", "m contours sphere", "m painted round"]
+CORRECTED = ["m guess", "m guess large", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
 GROWN = ["m grow", "m grow box", "m grow torus", "m grow round", "m grow wide", "m grow slit"]
 LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
+LINES = ["m line", "m line marks", "m line tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
 REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
+REAL_ALONE = [f"{real_name(name, 20)} alone" for name in ("spinal cord", "left atrium", "thalamus")] if REAL_JOBS else []
+REAL_ASTRAY = [f"{real_name(name, DOUBT_COUNT)} astray" for name in REAL[::4]] if REAL_JOBS else []
 DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
-    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "orientation", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
-    **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
+    **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
+    "orientation": [*CLOUDS, "normals random"], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface", "isolated"), ALONE), "correction": CORRECTED,
-    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": REAL_FEW, "doubts": DOUBTED,
+    **dict.fromkeys(("guess", "marks_surface", "isolated"), [*ALONE, *REAL_ALONE]), "correction": CORRECTED,
+    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY], "doubts": DOUBTED,
     **dict.fromkeys(("contours", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
-    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, "m contours"]),
+    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, *LINES, "m contours"]),
     "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
     **dict.fromkeys(("holes", "cut", "relax", "decimate"), MESHES),
 }
