@@ -63,11 +63,11 @@ inline constexpr auto kOptions<EdgeOptions> = std::tuple{
                       [](const EdgeOptions& o) { return !o.edge_k || !o.edge_contrast; }}};
 
 struct EdgeReport {
-    EdgeFeature feature = EdgeFeature::Slope;  ///< as used, never Automatic
     double sigma = 0;                          ///< width of the presmoothing, world units
     double edge_k = 0;                         ///< K as used
     double edge_contrast = 0;                  ///< 1/sqrt(K)
     double low = 0, high = 0;                  ///< intensities that were mapped to 0 and 1
+    EdgeFeature feature = EdgeFeature::Slope;  ///< as used, never Automatic
 };
 
 struct EdgeResult {

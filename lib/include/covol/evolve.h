@@ -89,7 +89,7 @@ struct EvolveReport {
     std::vector<float> changes;  ///< that displacement for each step
     double sweeps_per_step = 0;
     std::int64_t leaf_visits = 0;        ///< number of visits of a leaf, over all steps and sweeps
-    std::int64_t leaf_visits_saved = 0;  ///< visits that were skipped because the leaf did not change
+    std::int64_t leaf_visits_saved = 0;  ///< visits skipped: the leaf was inactive or had converged
     std::int64_t active_voxels = 0;      ///< after the last step
     std::int64_t leaf_count = 0;
     double seconds_assembly = 0;

@@ -127,8 +127,10 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
     gather_fields(fields);
     previous_ = field_.values;
     motions_.resize(band_.size());
-    tbb::parallel_for(std::size_t(0), band_.size(),
-                      [&](std::size_t leaf) { motions_[leaf] = without_comparison(previous_.leaf(leaf)); });
+    const BandValues start = values();
+    tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+        motions_[leaf] = without_comparison(start.leaf(leaf), start.in_domain(leaf));
+    });
     rows_.resize(band_.size() * kRowBytes);
     active_counts_.resize(band_.size());
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) active_counts_[leaf] = count_on(band_.active(leaf));
@@ -374,13 +376,14 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
 }
 
 Motion BandSolver::measure() {
+    const BandValues now = values();
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         LeafMotion& motion = motions_[leaf];
         if (!leaf_active_[leaf]) {
             motion = motion.without_motion();
             return;
         }
-        motion = motion_of(field_.values.leaf(leaf), previous_.leaf(leaf), band_.active(leaf));
+        motion = motion_of(now.leaf(leaf), previous_.leaf(leaf), now.in_domain(leaf));
     });
     return total(motions_);
 }

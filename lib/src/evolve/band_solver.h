@@ -26,7 +26,7 @@ public:
     struct Counts {
         std::int64_t passes = 0;        ///< number of passes over the leaves
         std::int64_t visits = 0;        ///< number of visits of a leaf
-        std::int64_t visits_saved = 0;  ///< number of visits that were omitted because a leaf had not changed
+        std::int64_t visits_saved = 0;  ///< visits omitted: the leaf was inactive or had converged
         double seconds_assembly = 0, seconds_sweeps = 0;
     };
 
@@ -72,6 +72,7 @@ public:
 
     [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
     [[nodiscard]] const LeafArray<float>& u() const noexcept { return field_.values; }
+    [[nodiscard]] BandValues values() const { return {field_.values, band_, domain_}; }
     [[nodiscard]] std::int64_t active_count() const noexcept { return active_count_; }
 
 private:

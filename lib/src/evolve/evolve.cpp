@@ -216,7 +216,7 @@ private:
         is_band_new_ = true;
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         if (!options_.follow) return;
-        front_displacement_.set_references(solver_->u(), solver_->band());
+        front_displacement_.set_references(solver_->values());
         marks_.resize(solver_->band().size());
     }
 
@@ -226,7 +226,7 @@ private:
     // smaller one of `motion` and its net motion
     double keep_band(double motion) {
         solver_->update_active_leaves(solver_->largest_changes(), inactive_below());
-        return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band()));
+        return std::min(motion, net_motion_.per_step(solver_->values()));
     }
 
     // Whether points or edges of the image hold the surface. Then only its steady state matters, not the path to it.
@@ -240,7 +240,7 @@ private:
         if (report_.steps % kCycle != 0) return motion;
         std::vector<float> largest;
         const Front front = measure_front(largest);
-        const std::vector<std::size_t> left = front_displacement_.due_leaves(solver_->u(), solver_->band());
+        const std::vector<std::size_t> left = front_displacement_.due_leaves(solver_->values());
         if (!left.empty() || (!is_held() && !front.is_distance))
             rebuild_band(left, largest);
         else if (!front.is_distance)
@@ -257,13 +257,13 @@ private:
     };
     // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
     Front measure_front(std::vector<float>& largest) {
-        const std::size_t leaves = solver_->band().size();
+        const detail::BandValues u = solver_->values();
+        const std::size_t leaves = u.size();
         std::vector<float> mean(leaves, 0.0F), slope(leaves, 1.0F);
         largest.assign(leaves, 0.0F);
         tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
             if (!solver_->is_leaf_active(leaf)) return;
-            const detail::CrossingMarks::Displacement moved =
-                marks_.renew(leaf, solver_->u().leaf(leaf), solver_->band().active(leaf));
+            const detail::CrossingMarks::Displacement moved = marks_.renew(leaf, u.leaf(leaf), u.in_domain(leaf));
             largest[leaf] = static_cast<float>(moved.largest);
             mean[leaf] = static_cast<float>(moved.mean);
             slope[leaf] = static_cast<float>(moved.slope);
@@ -310,7 +310,7 @@ private:
         for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
             if (place[leaf] >= 0) moved[leaf] = largest[place[leaf]];
         largest = std::move(moved);
-        front_displacement_.remake(same, solver_->u(), band);
+        front_displacement_.remake(same, solver_->values());
         marks_.remake(place);
         if (is_held()) solver_->redistance(tracking_clamp(options_));
     }

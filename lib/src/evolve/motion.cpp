@@ -31,9 +31,9 @@ constexpr auto kDeep = float(kHalfWidthVoxels - 1);
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
-int crossed_edges(const LeafMask& negative, const LeafMask& active) {
+int crossed_edges(const LeafMask& negative, const LeafMask& in_domain) {
     int crossed = 0;
-    for (int axis = 0; axis < 3; ++axis) crossed += count_on(sign_changes(negative, active, axis));
+    for (int axis = 0; axis < 3; ++axis) crossed += count_on(sign_changes(negative, in_domain, axis));
     return crossed;
 }
 
@@ -42,10 +42,10 @@ struct Flips {
     Flips operator+(const Flips& o) const { return {flipped + o.flipped, crossed + o.crossed}; }
 };
 
-void find_signs(const LeafMask& negative, LeafMotion& motion) {
+void find_signs(const LeafMask& negative, const LeafMask& in_domain, LeafMotion& motion) {
     for (int word = 0; word < 8; ++word) {
-        motion.negative |= negative[word] != 0;
-        motion.positive |= ~negative[word] != 0;
+        motion.negative |= (negative[word] & in_domain[word]) != 0;
+        motion.positive |= (~negative[word] & in_domain[word]) != 0;
     }
 }
 
@@ -62,23 +62,24 @@ Flips sum_over_leaves(std::size_t leaves, Count count) {
 
 }  // namespace
 
-LeafMotion without_comparison(const float* values) {
+LeafMotion without_comparison(const float* values, const LeafMask& in_domain) {
     LeafMotion motion;
-    find_signs(negative_mask(values), motion);
+    find_signs(negative_mask(values), in_domain, motion);
     return motion;
 }
 
-LeafMotion motion_of(const float* now, const float* before, const LeafMask& active) {
+LeafMotion motion_of(const float* now, const float* before, const LeafMask& in_domain) {
     LeafMotion motion;
     const Change change = change_of(now, before);
     motion.finite = change.finite;
     motion.largest = change.largest;
     const LeafMask negative = negative_mask(now);
-    find_signs(negative, motion);
+    find_signs(negative, in_domain, motion);
     const LeafMask was_negative = negative_mask(before);
     if (negative == was_negative && !(motion.negative && motion.positive)) return motion;
     for (int axis = 0; axis < 3; ++axis) {
-        const LeafMask after = sign_changes(negative, active, axis), first = sign_changes(was_negative, active, axis);
+        const LeafMask after = sign_changes(negative, in_domain, axis),
+                       first = sign_changes(was_negative, in_domain, axis);
         const int step = 64 >> (3 * axis);
         for (int word = 0; word < 8; ++word)
             for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
@@ -110,16 +111,16 @@ Motion total(const std::vector<LeafMotion>& leaves) {
     return motion;
 }
 
-double NetMotion::per_step(const LeafArray<float>& u, const LeafBand& band) {
+double NetMotion::per_step(const BandValues& u) {
     if (++age_ < kWindow && !signs_.empty()) return std::numeric_limits<double>::infinity();
-    const bool is_first = signs_.size() != band.size();
-    signs_.resize(band.size());
-    const Flips flips = sum_over_leaves(band.size(), [&](std::size_t leaf) {
+    const bool is_first = signs_.size() != u.size();
+    signs_.resize(u.size());
+    const Flips flips = sum_over_leaves(u.size(), [&](std::size_t leaf) {
         const LeafMask negative = negative_mask(u.leaf(leaf));
-        const LeafMask& active = band.active(leaf);
-        Flips here{0, crossed_edges(negative, active)};
+        const LeafMask in_domain = u.in_domain(leaf);
+        Flips here{0, crossed_edges(negative, in_domain)};
         for (int word = 0; word < 8; ++word)
-            here.flipped += __builtin_popcountll((negative[word] ^ signs_[leaf][word]) & active[word]);
+            here.flipped += __builtin_popcountll((negative[word] ^ signs_[leaf][word]) & in_domain[word]);
         signs_[leaf] = negative;
         return here;
     });
@@ -133,12 +134,12 @@ void NetMotion::exchange(StateFile& file) {
     file.value(age_);
 }
 
-CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u, const LeafMask& active) {
+CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u, const LeafMask& in_domain) {
     std::vector<Crossing> now;
     double squared_slope = 0.0;
     const LeafMask negative = negative_mask(u);
     for (int axis = 0; axis < 3; ++axis) {
-        const LeafMask changes = sign_changes(negative, active, axis);
+        const LeafMask changes = sign_changes(negative, in_domain, axis);
         const int step = 64 >> (3 * axis);
         const std::size_t first = now.size();
         double jumps = 0.0;
@@ -193,35 +194,32 @@ void CrossingMarks::exchange(StateFile& file) {
     }
 }
 
-FrontDisplacement::Reference::Reference(const float* values, const LeafMask& active)
-    : negative(negative_mask(values)), crossed(crossed_edges(negative, active)) {
+FrontDisplacement::Reference::Reference(const float* values, const LeafMask& in_domain)
+    : negative(negative_mask(values)), crossed(crossed_edges(negative, in_domain)) {
     for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
 }
 
-void FrontDisplacement::set_references(const LeafArray<float>& u, const LeafBand& band) {
-    remake(std::vector<std::int32_t>(band.size(), -1), u, band);
-}
+void FrontDisplacement::set_references(const BandValues& u) { remake(std::vector<std::int32_t>(u.size(), -1), u); }
 
-void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u,
-                               const LeafBand& band) {
+void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const BandValues& u) {
     std::vector<Reference> references(old_leaf.size());
     tbb::parallel_for(std::size_t(0), old_leaf.size(), [&](std::size_t leaf) {
         references[leaf] =
-            old_leaf[leaf] >= 0 ? references_[old_leaf[leaf]] : Reference(u.leaf(leaf), band.active(leaf));
+            old_leaf[leaf] >= 0 ? references_[old_leaf[leaf]] : Reference(u.leaf(leaf), u.in_domain(leaf));
     });
     references_ = std::move(references);
 }
 
-std::vector<std::size_t> FrontDisplacement::due_leaves(const LeafArray<float>& u, const LeafBand& band) const {
+std::vector<std::size_t> FrontDisplacement::due_leaves(const BandValues& u) const {
     enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
     std::vector<State> states(references_.size());
     tbb::parallel_for(std::size_t(0), references_.size(), [&](std::size_t leaf) {
         const Reference& made = references_[leaf];
-        const LeafMask negative = negative_mask(u.leaf(leaf));
+        const LeafMask negative = negative_mask(u.leaf(leaf)), in_domain = u.in_domain(leaf);
         int flips = 0;
         bool deep = false;
         for (int word = 0; word < 8; ++word) {
-            const std::uint64_t flipped = (negative[word] ^ made.negative[word]) & band.active(leaf)[word];
+            const std::uint64_t flipped = (negative[word] ^ made.negative[word]) & in_domain[word];
             deep |= (flipped & ~made.near[word]) != 0;
             flips += __builtin_popcountll(flipped);
         }

@@ -31,7 +31,7 @@ private:
 };
 
 /// The identity of the entry at the path itself, without following a symbolic link as file_id() does.
-inline FileId id_of(const std::filesystem::path& path) {
+inline FileId id_of_entry(const std::filesystem::path& path) {
     struct stat entry {};
     return ::lstat(path.c_str(), &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};
 }

@@ -58,7 +58,8 @@ struct FileSet::State {
     [[nodiscard]] std::string write_manifests() const {
         detail::Manifest manifest{detail::new_set_id(), {}, {}};
         for (const auto& [id, folder] : folders)
-            manifest.scratches.push_back({folder.scratch.path(), detail::id_of(folder.scratch.path()).inode, id.inode});
+            manifest.scratches.push_back(
+                {folder.scratch.path(), detail::id_of_entry(folder.scratch.path()).inode, id.inode});
         for (const auto& [id, folder] : folders) {
             manifest.files.clear();
             for (const File& file : files)
@@ -88,7 +89,7 @@ struct FileSet::State {
             const fs::path& scratch = folder->second.scratch.path();
             ::unlink((scratch / detail::kManifest).c_str());
             const fs::path commit = scratch / detail::kCommit;
-            if (detail::id_of(commit) != FileId{}) ::unlink(commit.c_str());
+            if (detail::id_of_entry(commit) != FileId{}) ::unlink(commit.c_str());
         }
     }
 };
@@ -103,7 +104,8 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
         throw Error(Errc::Io, path + ": cannot write: names that begin with " + detail::kHiddenPrefix +
                                   " are reserved for covol; choose another name");
     const fs::path folder = target.parent_path();
-    ScratchFolder& scratch = state_->folders.try_emplace(detail::id_of(folder), folder, run).first->second.scratch;
+    ScratchFolder& scratch =
+        state_->folders.try_emplace(detail::id_of_entry(folder), folder, run).first->second.scratch;
     const fs::path temporary = scratch.path() / target.filename();
     scratch.list(target.filename().string());
     state_->writing = {path, target, temporary};

@@ -121,7 +121,7 @@ public:
 
 private:
     [[nodiscard]] std::size_t own_number() const {
-        const ino_t own = id_of(scratch_).inode;
+        const ino_t own = id_of_entry(scratch_).inode;
         std::size_t n = 0;
         while (n < manifest_->scratches.size() && manifest_->scratches[n].inode != own) ++n;
         return n;
@@ -138,9 +138,9 @@ private:
     /// @param known  becomes false if that folder's parent is inaccessible and no file is in place
     [[nodiscard]] std::optional<SetOutcome> fate_elsewhere(bool& known) const {
         const ScratchPlace& first = manifest_->scratches.front();
-        known = id_of(first.path.parent_path()).inode == first.folder;
+        known = id_of_entry(first.path.parent_path()).inode == first.folder;
         if (known) {
-            if (id_of(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
+            if (id_of_entry(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
             // Without the folder of the commit, either the commit was never written, and no file is in place, or it was
             // removed after all files of the other folders had been put in place.
             if (!any_in_place()) return std::nullopt;
@@ -174,10 +174,10 @@ private:
     /// @param may_remove  whether that scratch folder is then removed
     [[nodiscard]] bool finish_other(const ScratchPlace& place, SetOutcome fate, bool may_remove) const {
         const fs::path folder = place.path.parent_path();
-        if (id_of(folder).inode != place.folder) return false;
+        if (id_of_entry(folder).inode != place.folder) return false;
         try {
             const FolderLock lock(folder, run_, kShortPatience);
-            const FileId id = id_of(place.path);
+            const FileId id = id_of_entry(place.path);
             if (id == FileId{}) return true;
             if (!lock.is_locked() || id.inode != place.inode) return false;
             const AbandonedScratch dead(place.path);
@@ -245,12 +245,12 @@ void write_commit(const fs::path& first, const std::string& set, SetOutcome fate
 }
 
 bool exchange(const fs::path& from, const fs::path& to) {
-    if (id_of(to) == FileId{}) return ::rename(from.c_str(), to.c_str()) == 0;
+    if (id_of_entry(to) == FileId{}) return ::rename(from.c_str(), to.c_str()) == 0;
     return swap_paths(from.string(), to.string());
 }
 
 bool exchange_back(const fs::path& from, const fs::path& to) {
-    if (id_of(from) == FileId{}) return ::rename(to.c_str(), from.c_str()) == 0;
+    if (id_of_entry(from) == FileId{}) return ::rename(to.c_str(), from.c_str()) == 0;
     return swap_paths(from.string(), to.string());
 }
 

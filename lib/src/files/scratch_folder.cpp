@@ -76,7 +76,7 @@ ScratchFolder::ScratchFolder(const fs::path& beside, const RunContext& run, Clea
     detail::Descriptor lock(path_ / detail::kScratchLock, O_WRONLY | O_CREAT | O_EXCL | O_APPEND);
     if (lock.get() >= 0) static_cast<void>(::flock(lock.get(), LOCK_EX | LOCK_NB));
     if (lock.get() < 0 ||
-        !write_all(lock.get(), detail::scratch_mark(detail::id_of(path_).inode, clears == Clears::All))) {
+        !write_all(lock.get(), detail::scratch_mark(detail::id_of_entry(path_).inode, clears == Clears::All))) {
         const int why = errno;
         keep_for_next_run();
         detail::remove_scratch(path_);

@@ -166,6 +166,10 @@ LeafMask mask_in_box(const Coord& origin, const CoordBBox& box) {
     const Coord lo = Coord::maxComponent(box.min() - origin, Coord(0));
     const Coord hi = Coord::minComponent(box.max() - origin, Coord(kLeafDim - 1));
     LeafMask mask{};
+    if (lo == Coord(0) && hi == Coord(kLeafDim - 1)) {
+        mask.fill(~std::uint64_t(0));
+        return mask;
+    }
     for (int i = lo.x(); i <= hi.x(); ++i)
         for (int j = lo.y(); j <= hi.y(); ++j)
             for (int k = lo.z(); k <= hi.z(); ++k) set_on(mask, leaf_offset(i, j, k));

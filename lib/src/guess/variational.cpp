@@ -25,7 +25,7 @@ using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // number of the polynomials 1, x, y, z, whose energy is 0
 constexpr double kLocalFractions[] = {0.5, 0.25, 0.125};
-constexpr std::size_t kMinLocal = 4;  // minimum number of marks of a neighbourhood: they span a space
+constexpr std::size_t kMinLocal = 4;  // minimum size of a neighbourhood: fewer marks lie in one plane
 constexpr int kMaxSteps = 500;        // maximum number of L-BFGS iterations; it converges earlier
 constexpr int kAmplitudeRounds = 3;  // number of estimates of the amplitude of f's covariance, which has then converged
 constexpr int kDirections = 64;      // points on an ellipsoid around the marks; half or twice as many change no surface
@@ -308,10 +308,9 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
     return positive == 0 || positive == count;
 }
 
-/// For each mark the vector from the centroid of its neighbourhood, a `fraction` of all marks, but at least kMinLocal
-/// of them, to the mark. It is along the normal if these marks are all around a tube or on both sides of a sheet.
-Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double fraction) {
-    const auto count = std::min(std::size_t(marks), std::max(kMinLocal, std::size_t(fraction * double(marks))));
+/// For each mark the vector from the centroid of its neighbourhood, which are the `count` marks closest to it, itself
+/// included, to the mark. It is along the normal if these marks are all around a tube or on both sides of a sheet.
+Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, std::size_t count) {
     Vector directions(3 * marks);
     for (Index n = 0; n < marks; ++n) {
         std::vector<std::pair<double, Index>> others;
@@ -332,8 +331,13 @@ Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Ve
                      const std::vector<Vector>& known, const Inside& in_world) {
     std::vector<Vector> initial_values{outward};
     initial_values.insert(initial_values.end(), known.begin(), known.end());
-    for (const double fraction : kLocalFractions)
-        initial_values.push_back(away_from_neighbours(nodes, marks, fraction));
+    std::size_t last = 0;
+    for (const double fraction : kLocalFractions) {
+        const std::size_t count = std::max(kMinLocal, std::size_t(fraction * double(marks)));
+        if (count == last || count > std::size_t(marks)) continue;
+        initial_values.push_back(away_from_neighbours(nodes, marks, count));
+        last = count;
+    }
     std::vector<Gradients> ends(initial_values.size());
     tbb::parallel_for(std::size_t(0), initial_values.size(), [&](std::size_t n) {
         Gradients& end = ends[n] = descend(energy, c, initial_values[n]);

@@ -22,7 +22,7 @@ struct AutomaticHeuristics {
     double max_box_voxels = limit("automatic.max_box_voxels", 3e5);
     /// [voxels] Maximum number of voxels on the surface per point; clouds on closed surfaces have 4 to 8.
     double max_facets = limit("automatic.max_facets", 20);
-    /// [voxels] Weight of curvature after tagging with an image.
+    /// [voxels] Weight of curvature after tagging, for contours and for a guess.
     double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.25);
     /// [voxels] Presmoothing of the image after tagging.
     double tag_sigma_voxels = heuristic("automatic.tag_sigma_voxels", 2.0);

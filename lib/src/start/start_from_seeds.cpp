@@ -60,8 +60,8 @@ FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& ins
     if (inside.empty()) throw Error(Errc::InvalidInput, "expected seeds inside, got none");
     if (std::none_of(inside.begin(), inside.end(), [&](const Vec3& seed) { return domain.contains(seed); }))
         throw Error(Errc::InvalidInput,
-                    "expected seeds inside (`inside`) that lie in the domain, got none of " +
-                        std::to_string(inside.size()) + "; check their coordinates, or enlarge `roi`",
+                    "inside: expected at least one seed in the domain, got none of " + std::to_string(inside.size()) +
+                        "; check their coordinates and `roi`",
                     "inside");
     const double h = domain.voxel_size;
     FloatGridPtr field;

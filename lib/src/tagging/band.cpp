@@ -143,8 +143,7 @@ BandResult tag_interior(const FloatGrid& distance, const BandOptions& options, c
     if (distance.tree().leafCount() == 0)
         throw Error(Errc::InvalidInput,
                     "expected a distance grid with active voxels, got none: no point lies near the domain; check the "
-                    "coordinates of the points, or enlarge `roi`",
-                    "roi");
+                    "coordinates of the points and `roi`");
     BandResult result;
     with_threads(run, [&] { result = make(distance, options, run); });
     return result;

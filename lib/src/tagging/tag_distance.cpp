@@ -27,10 +27,8 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
         box.min[a] = std::max(box.min[a], limit.min[a]);
         box.max[a] = std::min(box.max[a], limit.max[a]);
         if (!(box.max[a] > box.min[a]))
-            throw Error(Errc::InvalidInput,
-                        "points: expected at least one in the domain, got none of " + std::to_string(points.size()) +
-                            "; check their coordinates, or enlarge `roi`",
-                        "roi");
+            throw Error(Errc::InvalidInput, "points: expected at least one in the domain, got none of " +
+                                                std::to_string(points.size()) + "; check their coordinates and `roi`");
     }
     return make_domain(box, voxel_size);
 }

@@ -406,30 +406,6 @@ TEST_CASE("file_set: files written under two names of one folder are all publish
     CHECK(bytes_of(folder.path("one/b")) == "new b");
 }
 
-TEST_CASE("place_of_output: links are resolved as by the system, and missing folders and link cycles are errors") {
-    const Scratch folder;
-    const fs::path root = fs::canonical(folder.path(""));
-    fs::create_directories(root / "deep/inner");
-    fs::create_directory_symlink(root / "deep/inner", root / "link");
-    std::ofstream(root / "file") << "old";
-    fs::create_symlink("file", root / "to_file");
-    fs::create_symlink("deep/nothing", root / "dangling");
-    fs::create_symlink("no/nothing", root / "nowhere");
-    fs::create_symlink("round", root / "round");
-    fs::create_directory_symlink("deep", root / "to_folder");
-    const auto place = [&](const char* name) { return place_of_output((root / name).string()).path; };
-    CHECK(place("link/../q") == root / "deep/q");
-    CHECK(place("to_file") == root / "file");
-    CHECK(place("dangling") == root / "deep/nothing");
-    CHECK(place("to_folder/") == root / "deep");
-    CHECK(place("new") == root / "new");
-    CHECK((place_of_output("/dev/stdout").is_stream && !place_of_output("/dev/null").is_stream));
-    CHECK((file_id(root / "to_file") == file_id(root / "file") && file_id(root / "nowhere") == FileId{}));
-    CHECK(message_of([&] { place("nowhere"); }).find("does not exist") != std::string::npos);
-    CHECK(message_of([&] { place("round"); }).find("symbolic links") != std::string::npos);
-    CHECK(message_of([&] { place("no/q"); }).find("does not exist") != std::string::npos);
-}
-
 TEST_CASE("file_set, write_text_file: a link is kept and its target replaced, and permissions are kept") {
     const Scratch folder;
     const fs::path root = folder.path("");

@@ -66,7 +66,7 @@ TEST_CASE("start_from_seeds: no seeds inside, or none of them in the domain, is 
           }).find("expected seeds inside, got none") != std::string::npos);
     CHECK(message_of([] {
               (void)start_from_seeds(cube(8), {{100, 0, 0}}, {});
-          }).find("that lie in the domain, got none of 1") != std::string::npos);
+          }).find("at least one seed in the domain, got none of 1") != std::string::npos);
 }
 
 TEST_CASE("check_seeds: seeds on the wrong side of a surface are counted and reported", "[seeds]") {

@@ -103,7 +103,7 @@ class Study:
 
     @property
     def marks(self):
-        """The current structures and their marks, as from read_study()."""
+        """The current structures and their marks, as from read_study(); not available with the wheel, which lacks it."""
         return _covol.read_study(self.folder)
 
     @property

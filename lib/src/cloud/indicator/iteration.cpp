@@ -97,8 +97,8 @@ double Iteration::turn(WindingField& field, Orientation& result, int cycles) {
 }
 
 /// The iteration cannot correct a patch whose normals are all reversed, because their indicator reproduces them; but
-/// the mean of the indicator over such a patch differs from 1/2. All such patches are therefore reversed at once on
-/// trial, and those remain reversed in which the mean comes closer to 1/2.
+/// the mean of the indicator over such a patch differs from 1/2. All such patches are therefore reversed
+/// tentatively, at once, and those remain reversed in which the mean comes closer to 1/2.
 void Iteration::turn_patches(WindingField& field, Orientation& result) {
     const PointCells cells(points_, kCloud.coarse * field.indicator().stack().cell());
     const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);

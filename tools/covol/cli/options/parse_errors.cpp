@@ -81,12 +81,16 @@ std::string wrong_value(const CLI::Option& option) {
     return "expected " + list + got + did_you_mean(close);
 }
 
-std::string wrong_count(const CLI::Option& option, bool too_many, bool is_config) {
+std::string no_value(const CLI::Option& option) {
     const std::string type = help_of(option).value;
-    if (!too_many) return "expected a value" + (type.empty() ? "" : ", " + type) + ", got none";
-    return std::string("expected one ") + (is_config ? "file of options" : "value") + ", got " +
-           std::to_string(option.results().size()) + " (" + list_of(option.results()) + "); " +
-           (is_config ? "write all options into one file" : "give the option once");
+    return "expected a value" + (type.empty() ? "" : ", " + type) + ", got none";
+}
+
+std::string several_values(const CLI::Option& option, bool is_config) {
+    const std::string got =
+        ", got " + std::to_string(option.results().size()) + " (" + list_of(option.results()) + "); ";
+    return is_config ? "expected one file of options" + got + "write all options into one file"
+                     : "expected one value" + got + "give the option once";
 }
 
 std::string missing(const CLI::Option& option) {
@@ -132,7 +136,9 @@ std::string text_of(const CLI::ParseError& error, const CLI::App& program) {
     if (kind == "ConversionError") return origin + name + ": " + wrong_value(*option);
     if (kind == "ArgumentMismatch")
         return origin + name + ": " +
-               wrong_count(*option, text.find("At Most") != std::string::npos, option == program.get_config_ptr());
+               (text.find("At Most") == std::string::npos
+                    ? no_value(*option)
+                    : several_values(*option, option == program.get_config_ptr()));
     if (kind == "ValidationError")
         return origin + name + ": " +
                (words_of(help_of(*option).value).empty() ? after(text, ": ") : wrong_value(*option));
