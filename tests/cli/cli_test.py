@@ -124,7 +124,7 @@ class Segment(Case):
         metadata = grids[0]["metadata"]
         self.assertRegex(metadata["covol_version"], r"\d+\.\d+")
         self.assertEqual(json.loads(metadata["covol_options"])["theta"], 0.75)
-        self.assertEqual(json.loads(metadata["covol_resolved"])["delta"], 0.5 * H)
+        self.assertEqual(json.loads(metadata["covol_resolved"])["delta"], 0.25 * H)
         self.assertFalse(metadata.get("creator", "").startswith("Houdini"))
         self.assertIn(b"covol_options", (self.out / "m.ply").read_bytes()[:4000])
 

@@ -91,7 +91,7 @@ class Help(Case):
 
     def test_a_single_step_has_its_own_defaults(self):
         self.assertIn("weight of curvature [1vx]", self.first["evolve"])
-        self.assertIn("weight of curvature [0.5vx after tagging, for contours or a guess, 0.1vx after growth, else 1vx]",
+        self.assertIn("weight of curvature [0.25vx after tagging, for contours or a guess, 0.1vx after growth, else 1vx]",
                       " ".join(self.all["segment"].split()))
 
 

@@ -66,7 +66,7 @@ class TimeLapse(Case):
             self.assertEqual((frame["status"], row["status"]), ("ok", "ok"))
             self.assertEqual(row["structure"], "surface")
             self.assertEqual(frame["input"]["points"]["count"], 100 if t == 0 else 0)
-            self.assertEqual(frame["resolved"]["delta"], 0.5 * H)
+            self.assertEqual(frame["resolved"]["delta"], 0.25 * H)
             self.check_radius(frame["surface"]["volume"], t)
             self.assertAlmostEqual(float(row["volume (um^3)"]), frame["surface"]["volume"], delta=1e-5 * frame["surface"]["volume"])
             self.assertAlmostEqual(float(row["sphericity"]), 1, delta=0.02)

@@ -176,7 +176,7 @@ class Plans(Stranger):
 
     def test_a_plan_is_settings_and_inputs(self):
         printed = self.run_covol("brick", "plan", "segment", "ball.nrrd", "--points", "ball.xyz", "--model", "paper", "--mesh", "m.ply", "-o", "plan",
-                              "--json", "r.json", "--threads", "2", "--save-config", "c.toml", "--strict", code=5).stderr
+                              "--json", "r.json", "--threads", "2", "--save-config", "c.toml", "--strict").stderr
         self.assertIn("brick join: --mesh", printed)
         job = json.loads((self.out / "plan/plan.json").read_text())["job"]
         self.assertEqual(job, {"command": "segment", "options": {"image": ["ball.nrrd"], "points": ["ball.xyz"], "model": ["paper"]}})

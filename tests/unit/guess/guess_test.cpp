@@ -107,6 +107,29 @@ TEST_CASE("Exact marks are interpolated without bias, however few they are") {
                 }
 }
 
+TEST_CASE("Twenty marks along most of a ring enclose about the volume of its tube") {
+    // With initial normals from the centre and from the ten nearest marks only, the surface also fills the ring: up to
+    // ten times the volume.
+    constexpr double kRing = 3, kTube = 0.5, kAngle = 5;
+    constexpr double kVolume = kPi * kTube * kTube * kRing * kAngle + 4.0 / 3 * kPi * kTube * kTube * kTube;
+    for (unsigned seed = 0; seed < 6; ++seed) {
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<double> uniform;
+        std::vector<Vec3> marks;
+        for (int n = 0; n < 20; ++n) {
+            const double along = (n + uniform(random)) / 20 * kAngle, around = 2 * kPi * uniform(random),
+                         ring = kRing + kTube * std::cos(around);
+            marks.push_back({ring * std::cos(along), ring * std::sin(along), kTube * std::sin(around)});
+        }
+        const Domain domain = make_domain({{-5, -5, -2.5}, {5, 5, 2.5}}, 0.15);
+        const Guess guess = guess_from_marks(domain, marks, {});
+        const double volume = measure(extract_mesh(*extract_surface(*guess.u), {})).volume / kVolume;
+        INFO("seed " << seed << ": volume " << volume);
+        CHECK(volume > 0.6);
+        CHECK(volume < 1.4);
+    }
+}
+
 TEST_CASE("Inaccurate marks in thick slices enclose a body of half to twice the true volume") {
     // The marks are scattered, so that the body is bumpy. By bending energy alone, many surfaces through such marks run
     // to infinity and do not close.
