@@ -331,12 +331,10 @@ Gradients min_energy(const HermiteSystem& system, const Matrix& energy, const Ve
                      const std::vector<Vector>& known, const Inside& in_world) {
     std::vector<Vector> initial_values{outward};
     initial_values.insert(initial_values.end(), known.begin(), known.end());
-    std::size_t last = 0;
-    for (const double fraction : kLocalFractions) {
+    for (std::size_t last = 0; const double fraction : kLocalFractions) {
         const std::size_t count = std::max(kMinLocal, std::size_t(fraction * double(marks)));
         if (count == last || count > std::size_t(marks)) continue;
-        initial_values.push_back(away_from_neighbours(nodes, marks, count));
-        last = count;
+        initial_values.push_back(away_from_neighbours(nodes, marks, last = count));
     }
     std::vector<Gradients> ends(initial_values.size());
     tbb::parallel_for(std::size_t(0), initial_values.size(), [&](std::size_t n) {
