@@ -50,9 +50,8 @@ struct Handlers {
     /// A POST with its body, one at a time, if Options::max_body_bytes > 0. Otherwise like `get`.
     std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
-    std::function<void(Client, std::string_view)>
-        message{};                                       ///< UTF-8; if it throws, the WebSocket is closed (code 1011)
-    std::function<void(Client)> closed{};                ///< exactly once for each client that was `opened`
+    std::function<void(Client, std::string_view)> message{};  ///< UTF-8; if it throws, its WebSocket is closed (1011)
+    std::function<void(Client)> closed{};                     ///< exactly once for each client that was `opened`
     std::function<void(const std::string&)> on_error{};  ///< errors in a handler or in accepting connections, for a log
 };
 
@@ -68,8 +67,8 @@ struct Options {
     std::string live_path = "/live";                 ///< path of WebSockets
     std::size_t max_message_bytes = std::size_t(4) << 20;  ///< of a message that a client sends, >= 1
     std::size_t max_body_bytes = 0;                        ///< of a POST; 0: all POSTs are refused
-    std::size_t max_waiting_bytes = std::size_t(64)
-                                    << 20;  ///< maximum of a client's unsent data; with more, it is disconnected
+    /// Maximum of a client's unsent data; with more, the client is disconnected.
+    std::size_t max_waiting_bytes = std::size_t(64) << 20;
     /// Maximum number of open connections, >= 1, including WebSockets. For a further one, the connection that has been
     /// waiting longest for a request is closed; if none is waiting, the new one is refused (503).
     std::size_t max_connections = 16;

@@ -71,7 +71,6 @@ public:
     void store(FloatGrid& u) const;
 
     [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
-    [[nodiscard]] const LeafArray<float>& u() const noexcept { return field_.values; }
     [[nodiscard]] BandValues values() const { return {field_.values, band_, domain_}; }
     [[nodiscard]] std::int64_t active_count() const noexcept { return active_count_; }
 

@@ -177,8 +177,7 @@ TEST_CASE("track_free_surface: the surface stays in place, and the band contains
 TEST_CASE("track_free_surface: no leaf of the band lies beyond a face of the domain between two leaves") {
     const FloatGridPtr u = over_cube([](double x) { return x - kPlane; }, "u");
     detail::track_free_surface(*u, kCube, {});
-    const openvdb::CoordBBox cube({kCube.min[0], kCube.min[1], kCube.min[2]},
-                                  {kCube.max[0], kCube.max[1], kCube.max[2]});
+    const openvdb::CoordBBox cube = detail::box_of(kCube);
     REQUIRE(u->tree().leafCount() > 0);
     for (auto leaf = u->tree().cbeginLeaf(); leaf; ++leaf) CHECK(cube.hasOverlap(leaf->getNodeBoundingBox()));
     for (auto voxel = u->cbeginValueOn(); voxel; ++voxel) CHECK(cube.isInside(voxel.getCoord()));

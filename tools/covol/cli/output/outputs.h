@@ -65,8 +65,8 @@ private:
     };
     struct Input : File {
         FileId folder;  ///< the folder that contains the file or, if the input is a folder, the input
-        std::optional<std::vector<File>>
-            refers_to;  ///< the files that it refers to; none until files_of() has read them
+        /// The files that it refers to; none until files_of() has read them.
+        std::optional<std::vector<File>> refers_to;
     };
 
     /// Checks that an existing folder is a Zarr store that contains no input, because it will be replaced.
