@@ -56,7 +56,7 @@ def main():
     every = ("blender", "imagej", "slicer")
     for name in options.plugins or every:
         if name not in every:
-            parser.error(f"{name}: expected {', '.join(every)}")
+            parser.error(f"{name}: expected one of {', '.join(every)}")
         print(f"pack: wrote {pack(name, options.output)}")
     return 0
 

@@ -70,7 +70,9 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
     using vdb_io::DelayedLoadMetadata;
     const auto begin = stream.tellg();
     const std::int64_t leaves = read<std::uint32_t>(stream);
-    if (leaves > file_bytes / kMinLeaf) throw std::runtime_error("more leaves than fit into the file");
+    if (leaves > file_bytes / kMinLeaf)
+        throw std::runtime_error("its metadata states " + std::to_string(leaves) +
+                                 " leaves, which do not fit into the file");
     for (const std::size_t width :
          {sizeof(DelayedLoadMetadata::MaskType), sizeof(DelayedLoadMetadata::CompressedSizeType)}) {
         const auto packed = read<std::uint32_t>(stream);
@@ -78,9 +80,11 @@ void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t f
         const std::int64_t bytes = leaves * std::int64_t(width), stored = packed > 0 ? packed : bytes;
         const auto at = stream.tellg();
         if (stored > length - (at - begin))
-            throw std::runtime_error("the data about its leaves is longer than the space for it");
+            throw std::runtime_error("expected at most " + std::to_string(length - (at - begin)) +
+                                     " bytes of metadata about leaves, got " + std::to_string(stored));
         if (packed > 0) {
-            if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
+            if (stored < BLOSC_MIN_HEADER_LENGTH)
+                throw std::runtime_error("a packed block is too short for its header");
             const auto header = read<std::array<std::uint32_t, 4>>(stream);
             // OpenVDB may pad a block that is smaller than kPadded bytes with zeros to this size before it packs the
             // block.
@@ -170,7 +174,7 @@ private:
         if (packed <= 0) {  // the block is not packed; its size is then stored as a negative number
             if (packed != -bytes)
                 throw std::runtime_error("expected a block of " + std::to_string(bytes) +
-                                         " uncompressed bytes, its length is stated as " + std::to_string(packed));
+                                         " uncompressed bytes, got a stated length of " + std::to_string(packed));
             return skip(bytes);
         }
         if (!blosc) return skip(packed);
@@ -204,7 +208,8 @@ void skip_vdb_metadata(std::istream& stream, std::int64_t file_bytes) {
         } else if (type != "string" && openvdb::Metadata::isRegisteredType(type)) {
             const openvdb::Metadata::Ptr value = openvdb::Metadata::createMetadata(type);
             if (value->size() != length)
-                throw std::runtime_error("a " + type + " of " + std::to_string(length) + " bytes");
+                throw std::runtime_error("expected " + std::to_string(value->size()) + " bytes for metadata of type " +
+                                         type + ", got " + std::to_string(length));
             if (type == openvdb::BoolMetadata::staticTypeName()) check_bool(read<std::uint8_t>(stream));
         }
         stream.seekg(begin + std::streamoff(length));

@@ -248,7 +248,9 @@ void check_indices(const TriangleMesh& mesh, const char* where) {
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
                 throw Error(Errc::InvalidInput, std::string(where) + ": a triangle refers to vertex " +
-                                                    std::to_string(v) + " of " + std::to_string(mesh.vertices.size()));
+                                                    std::to_string(v) +
+                                                    " (counted from 0), but the number of vertices is " +
+                                                    std::to_string(mesh.vertices.size()));
 }
 
 }  // namespace

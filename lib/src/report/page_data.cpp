@@ -38,7 +38,7 @@ struct SlicePlan {
 
 SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
     if (wanted.axis < 0 || wanted.axis > 2)
-        throw Error(Errc::InvalidOptions, "slice: expected an axis 0, 1 or 2, got " + std::to_string(wanted.axis));
+        throw Error(Errc::InvalidOptions, "slice: expected axis 0, 1 or 2, got " + std::to_string(wanted.axis));
     SlicePlan plan;
     plan.along = std::size_t(wanted.axis);
     plan.right = wanted.axis == 0 ? 1 : 0;

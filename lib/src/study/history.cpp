@@ -63,7 +63,7 @@ struct StudyHistory::Planning {
     void require_outline(const StudyOutline& outline) const {
         const std::size_t fewest = outline.closed ? 3 : 2;
         if (outline.world.size() < fewest)
-            refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
+            refuse("expected an outline of at least " + std::to_string(fewest) + " corners, got " +
                    std::to_string(outline.world.size()));
         if (outline.world.size() > kMaxCorners)
             refuse("expected an outline of at most " + std::to_string(kMaxCorners) + " corners, got " +

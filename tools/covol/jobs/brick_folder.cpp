@@ -100,7 +100,8 @@ Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
             throw std::out_of_range("bricks: expected boxes within that of the plan");
     const Json& neighbours = json.at("neighbours");
     if (!neighbours.is_array() || neighbours.size() >= bricks)
-        throw std::out_of_range("neighbours: expected a list of other bricks");
+        throw std::out_of_range("neighbours: expected a list of at most " + std::to_string(bricks - 1) +
+                                " other bricks");
     for (const Json& neighbour : neighbours)
         brick.neighbours.push_back(
             whole<std::size_t>(Json{{"neighbours", neighbour}}, "neighbours", 0, std::int64_t(bricks) - 1));
@@ -223,7 +224,8 @@ BrickPlan BrickFolder::read_plan() const {
         plan.domain = domain_of_plan(json);
         plan.edge = edge_of(json.at("edge"));
         const Json& bricks = json.at("bricks");
-        if (!bricks.is_array() || bricks.empty()) throw std::out_of_range("bricks: expected a list of them, got none");
+        if (!bricks.is_array() || bricks.empty())
+            throw std::out_of_range("bricks: expected a list of at least one brick");
         for (const Json& brick : bricks) plan.bricks.push_back(brick_of(brick, plan.domain, bricks.size()));
         if (const std::string why = why_invalid(plan.edge); !why.empty()) throw std::out_of_range(why);
     } catch (const Error& error) {

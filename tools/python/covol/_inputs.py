@@ -114,7 +114,7 @@ def marks(given, reading, like):
     known = ("points", "contours", "inside", "outside", "guess", "init", "exterior_seed", "painted", "normals")
     for key in given:
         if key not in known:
-            raise Error(f"marks: expected {', '.join(known[:-1])}, got {key!r}", "invalid_options", "marks")
+            raise Error(f"marks: expected one of {', '.join(known[:-1])}, got {key!r}", "invalid_options", "marks")
     values = {key: given.get(key) for key in known}
     normals = values.pop("normals")
     return {"points": points("points", values["points"], reading, normals=normals),

@@ -37,7 +37,7 @@ def list_options():
 def flag(name, value):
     """The flag for a keyword: `--tag-distance=3vx`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
-        raise Error(f"{name}: expected a number, got {value!r}", "invalid_options", name)
+        raise Error(f"{name}: expected a number or a string, got {value!r}", "invalid_options", name)
     return f"--{name.replace('_', '-')}={value if isinstance(value, str) else repr(float(value)) if isinstance(value, float) else value}"
 
 
@@ -214,7 +214,7 @@ class Points:
     def __init__(self, name, given, lines, space, order, scale, closed, normals):
         for word, choices, what in ((space, ("world", "index", "index1", "ras", "local"), "points_space"), (order, ("xyz", "zyx"), "points_order")):
             if word is not None and word not in choices:
-                raise Error(f"{what}: expected {', '.join(choices)}, got {word!r}", "invalid_options", what)
+                raise Error(f"{what}: expected one of {', '.join(choices)}, got {word!r}", "invalid_options", what)
         parts = [positions(name, part) for part in lines] if lines is not None else [positions(name, given)]
         turned = [part[:, ::-1] if order == "zyx" else part for part in parts]
         self._lines = lines is not None

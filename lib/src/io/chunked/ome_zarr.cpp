@@ -49,7 +49,8 @@ public:
         read_axes();
         const Json& datasets = member(json_, "datasets");
         if (!datasets.is_array() || datasets.empty() || datasets.size() > kMaxLevels)
-            throw wrong("expected a list of 1 to " + std::to_string(kMaxLevels) + " datasets in its multiscales");
+            throw wrong("expected a list of 1 to " + std::to_string(kMaxLevels) + " datasets in its multiscales, got " +
+                        count_of(datasets));
         for (const Json& dataset : datasets) {
             OmeLevel level;
             level.path = text_of(member(dataset, "path"));
@@ -66,13 +67,18 @@ private:
     [[nodiscard]] Error wrong(const std::string& what) const {
         return read_error(Errc::InvalidInput, image_.metadata, what);
     }
+    /// The number of elements of a list, for messages.
+    static std::string count_of(const Json& list) {
+        return list.is_array() ? std::to_string(list.size()) : std::string("no list");
+    }
 
     void read_axes() {
         const Json& axes = member(json_, "axes");
         if (axes.is_null())  // before OME-Zarr 0.3, no axes are stated
             for (const char* name : {"t", "c", "z", "y", "x"}) image_.axes.push_back({name, "", ""});
         else if (!axes.is_array() || axes.size() > kMaxAxes)
-            throw wrong("expected a list of axes in its multiscales");
+            throw wrong("expected a list of at most " + std::to_string(kMaxAxes) + " axes in its multiscales, got " +
+                        count_of(axes));
         for (const Json& axis : axes) {
             const std::string name = axis.is_string() ? text_of(axis) : text_of(member(axis, "name"));
             image_.axes.push_back(
@@ -96,7 +102,8 @@ private:
         bool translated = false;
         if (transformations.is_null()) return translated;
         if (!transformations.is_array() || transformations.size() > kMaxAxes)
-            throw wrong("expected a list of coordinateTransformations");
+            throw wrong("expected a list of at most " + std::to_string(kMaxAxes) + " coordinateTransformations, got " +
+                        count_of(transformations));
         for (const Json& transformation : transformations) {
             const std::string type = text_of(member(transformation, "type"));
             if (type == "identity") continue;

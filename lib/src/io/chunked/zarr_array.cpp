@@ -266,7 +266,7 @@ void ArrayReader::set_byte_order(const Json& codec, bool& big) const {
 
 void ArrayReader::read_codecs(const Json& codecs) {
     if (!codecs.is_array() || codecs.empty() || codecs.size() > kMaxDimensions)
-        throw wrong("expected a list of codecs");
+        throw wrong("expected a list of 1 to " + std::to_string(kMaxDimensions) + " codecs");
     std::vector<std::size_t> slowest_first(array_.shape.size());
     std::iota(slowest_first.begin(), slowest_first.end(), 0);
     bool has_bytes = false, is_transposed = false;

@@ -186,7 +186,8 @@ private:
         std::vector<std::uint32_t> corners;
         const auto corner = [&](std::uint64_t vertex) {
             if (vertex >= count)
-                source_.fail("a triangle refers to vertex " + std::to_string(vertex) + " of " + std::to_string(count));
+                source_.fail("a triangle refers to vertex " + std::to_string(vertex) +
+                             " (counted from 0), but the number of vertices is " + std::to_string(count));
             corners.push_back(std::uint32_t(first + vertex));
             if (corners.size() < 3) return;
             builder_.face(corners);

@@ -67,8 +67,8 @@ public:
 private:
     void check(std::uint32_t v) const {
         if (v >= vertex_count())
-            source_.fail("a face refers to vertex " + std::to_string(v) + " (from 0), the file has " +
-                         std::to_string(vertex_count()));
+            source_.fail("a face refers to vertex " + std::to_string(v) +
+                         " (counted from 0), but the number of vertices is " + std::to_string(vertex_count()));
     }
     void triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
         if (a != b && b != c && c != a) mesh_.triangles.push_back({a, b, c});

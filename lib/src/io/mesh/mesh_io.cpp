@@ -38,7 +38,8 @@ void check_references(const TriangleMesh& mesh) {
     for (const Face& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, "a triangle refers to vertex " + std::to_string(v) + " of " +
+                throw Error(Errc::InvalidInput, "a triangle refers to vertex " + std::to_string(v) +
+                                                    " (counted from 0), but the number of vertices is " +
                                                     std::to_string(mesh.vertices.size()));
 }
 

@@ -57,8 +57,12 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
     while (lines.next_words(line, words)) {
         const string_view key = words[0];
         const bool per_field = key == "SIZE" || key == "TYPE" || key == "COUNT";
-        if (words.size() < 2 || (per_field && words.size() != header.fields.size() + 1))
-            fail(path, lines.number(), "not a line of a PCD header: " + quote(line));
+        if (words.size() < 2)
+            fail(path, lines.number(), "expected a keyword of a PCD header and its values, got " + quote(line));
+        if (per_field && words.size() != header.fields.size() + 1)
+            fail(path, lines.number(),
+                 std::string(key) + ": expected one value for each field of the line FIELDS (" +
+                     std::to_string(header.fields.size()) + "), got " + std::to_string(words.size() - 1));
         if (key == "FIELDS" || key == "COLUMNS") {
             if (words.size() > kMaxFields)
                 fail(path, lines.number(),
@@ -92,7 +96,7 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
             for (std::size_t a = 0; a < 3; ++a) at[a] = to_coordinate(path, lines.number(), words[a + 1]);
             header.viewpoint = at;
         } else if (key != "VERSION" && key != "VIEWPOINT") {
-            fail(path, lines.number(), "not a line of a PCD header: " + quote(line));
+            fail(path, lines.number(), "expected a keyword of a PCD header, such as FIELDS or DATA, got " + quote(key));
         }
     }
     fail(path, "expected the line DATA, got the end; the file is truncated");

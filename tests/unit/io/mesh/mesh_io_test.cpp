@@ -413,7 +413,7 @@ TEST_CASE("GLB of other programs: interleaved and shared data is read, unsupport
     refused(R"("count":4)", R"("count":18446744073709551615)", "count: expected at most");
     refused(R"("byteOffset":64)", R"("byteOffset":-1)", "byteOffset: expected at most");
     refused(R"("byteStride":16)", R"("byteStride":0)", "beyond its data");
-    refused(R"("count":4)", R"("count":2)", "refers to vertex 2 of 2");
+    refused(R"("count":4)", R"("count":2)", "refers to vertex 2 (counted from 0), but the number of vertices is 2");
     refused(R"("POSITION":0)", R"("POSITION":9)", "there is no 9 among its accessors");
     refused(R"("mode":4)", R"("mode":1)", "not of triangles", Errc::Unsupported);
     refused(R"("mesh":0)", R"("mesh":0,"scale":[2,2,2])", "a node with a scale", Errc::Unsupported);

@@ -122,7 +122,8 @@ private:
                 ++at_;
             }
             if (peek() == ']') break;
-            if (peek() == '[' || peek() == '{') fail("expected a list of texts and numbers, got one within another");
+            if (peek() == '[' || peek() == '{')
+                fail("expected a list of texts and numbers, got a list or a table within it");
             list.push_back(peek() == '"' || peek() == '\'' ? quoted() : bare(" \t\r,]#"));
             skip_blanks();
             if (peek() == ',')

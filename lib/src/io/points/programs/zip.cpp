@@ -70,7 +70,7 @@ std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::
     if (entry.method != 0 && entry.method != 8)
         unsupported("neither stored nor deflated; create the archive again with one of these methods");
     if (entry.size == 0xFFFFFFFF || entry.packed == 0xFFFFFFFF)
-        unsupported("in the ZIP64 format, which is not supported");
+        unsupported("in the ZIP64 format, which is not supported; create the archive again without ZIP64");
     if (bytes.at<std::uint32_t>(entry.local) != kLocalSignature) fail(path, "the ZIP archive's directory is damaged");
     const std::uint64_t begin = entry.local + kLocalSize + bytes.at<std::uint16_t>(entry.local + 26) +
                                 bytes.at<std::uint16_t>(entry.local + 28);
