@@ -35,7 +35,7 @@ inline constexpr auto kOptions<GuidanceOptions> =
                Option{"error_slope", &GuidanceOptions::error_slope, kNotNegative},
                Option{"weight", &GuidanceOptions::weight, kFraction}};
 
-/// What guide() found and did. The defaults mean that nothing ran.
+/// What guide() found and did. The default values mean that guide() was not called.
 struct GuidanceReport {
     bool used = false;      ///< the image was used
     std::string reason;     ///< why the image was not used, as a message for the user
@@ -46,10 +46,11 @@ struct GuidanceReport {
     bool local = false;  ///< the intensity profile was estimated separately for different parts of the surface
     double gain = 0;     ///< mean increase, due to the image, of the log-likelihood of a held-out mark, nats
     /// Estimated root mean square distance between the border that the image alone gives and the true border, measured
-    /// at held-out marks. It is rather too large, because a standard error is added.
+    /// at held-out marks. It tends to be too large, because a standard error is added.
     double image_error = 0;
-    /// Estimated root mean square distance of the guess from the true border. It is rather too small: it is assumed to
-    /// grow with the distance from the marks, and a standard error is subtracted from the estimate of this growth.
+    /// Estimated root mean square distance of the guess from the true border. It tends to be too small, because it is
+    /// computed from the growth of the error with the distance from the marks, and a standard error is subtracted from
+    /// the estimate of this growth.
     double guess_error = 0;
     /// fraction of the area in which the image determines the result more than the guess does
     double confident_fraction = 0;

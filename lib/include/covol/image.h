@@ -58,9 +58,9 @@ struct VoxelBox {
 
 struct ReadImageOptions {
     std::optional<Vec3> spacing;  ///< world units, > 0; automatic: the spacing in the file
-    /// index of the channel to be read, from 0; automatic: the only one; several are an error
+    /// index of the channel to be read, from 0; automatic: the only channel, and an error if there are several
     std::optional<int> channel;
-    /// index of the time point to be read, from 0; automatic: the only one; several are an error
+    /// index of the time point to be read, from 0; automatic: the only time point, and an error if there are several
     std::optional<int> frame;
     /// Reads only the voxels that interpolation within this box needs: those in the box and one more on every side.
     std::optional<WorldBox> roi = {};

@@ -23,7 +23,7 @@ struct ExpectedDice {
     double low = 0, high = 0;  ///< interval that contains the true coefficient for 90 % of the results
 };
 
-/// What infer() found. The defaults mean that nothing ran.
+/// What infer() found. The default values mean that infer() was not called.
 struct InferenceReport {
     bool used = false;   ///< the result is the inferred body; false: the guess was kept
     std::string reason;  ///< why the body was used or not, as a message for the user

@@ -329,7 +329,8 @@ private:
 /// What is needed to convert a study's structures to marks.
 struct StudySite {
     ImageGeometry image;
-    /// Reads a guess and checks its digest (open_study_site()); empty: structures with a guess are an error.
+    /// Reads a guess and checks its digest (open_study_site()). If it is empty, marks_of() throws for structures
+    /// with a guess.
     std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess;
 };
 /// Converts a structure to the input of segment_structures().

@@ -40,7 +40,7 @@ struct StudyResult {
 class StudySolver {
 public:
     /// @param image  returns the image; called in the constructor and on the solver's thread
-    /// @param read_guess  as for StudySite; none: structures with a guess fail
+    /// @param read_guess  as in StudySite; if it is empty, structures with a guess fail
     /// @param on_result  called on the solver's thread, one result at a time; it must not call the solver
     COVOL_API StudySolver(std::function<Image()> image, SegmentOptions options,
                           std::function<void(const StudyResult&)> on_result, const RunContext& run = {},

@@ -186,7 +186,7 @@ Domain domain_of(const FloatGrid& grid) {
     const int margin = stated ? 0 : 8;
     for (int a = 0; a < 3; ++a) {
         const double first = box.min()[a], last = box.max()[a];
-        // an empty domain (last = first - 1) is allowed
+        // An empty domain (last = first - 1) is allowed.
         if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {
             std::ostringstream text;
             text << "grid '" << grid.getName() << "': expected voxels within 2^23 of voxel 0, got " << box;

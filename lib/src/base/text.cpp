@@ -100,7 +100,7 @@ Character first_of(std::string_view text) {
     const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[n]); };
     if (byte(0) < 0x80) return {byte(0), 1};
     const std::size_t length = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-    // minimum code by length in bytes: longer encodings than necessary are invalid
+    // Minimum code point for each length in bytes. Encodings that are longer than necessary are invalid.
     constexpr char32_t kMin[] = {0, 0, 0x80, 0x800, 0x10000};
     if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < length) return {};
     char32_t code = byte(0) & (0x7FU >> length);

@@ -30,7 +30,7 @@ constexpr double kCoarseVoxels = 400;  // maximum length of the marks' or the im
 constexpr double kMinFactor = 2;       // minimum size of a coarse voxel, in voxels of the result
 constexpr int kStateLayers = 8;        // layers of voxels around a brick's core that its state includes
 constexpr int kSurfaceLayers = 8;      // layers around a core from which the distance to its surface is computed
-// maximum number of leaves of the coarse band at which the image is sampled to choose the parameters of g
+// Maximum number of leaves of the coarse band at which the image is sampled to choose the parameters of g.
 constexpr std::size_t kEdgeSamples = 64;
 
 void require_supported(const Problem& problem, const Resolved& resolved) {

@@ -40,7 +40,7 @@ public:
             for (const int axis : longest_first(begin, end)) {
                 std::nth_element(begin, begin + (end - begin) / 2, end,
                                  [axis](const Place& p, const Place& q) { return p[axis] < q[axis]; });
-                // index of the first leaf of the upper part along the axis
+                // Index of the first leaf of the upper part along the axis.
                 const std::int32_t first = (begin + (end - begin) / 2)->at(axis);
                 const auto upper = std::partition(begin, end, [&](const Place& p) { return p[axis] < first; });
                 if (upper == begin || upper == end) continue;

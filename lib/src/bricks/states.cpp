@@ -14,9 +14,10 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-// outermost layers that are held fixed: the scheme reads two of them, redistancing a third; one more is spare
+// Number of outermost layers of voxels that are held fixed. The scheme reads two of them, and redistancing reads one
+// more; the fourth is a margin.
 constexpr int kFrameLayers = 4;
-// voxels by which the states of bricks extend beyond their cores, and over which they are blended
+// [voxels] Width by which the state of a brick extends beyond its core, and over which adjacent states are blended.
 constexpr int kBlend = 8;
 constexpr int kSeamLayers = 3;  // layers of a brick, next to another one, in which their surfaces are compared
 // [voxels] Where the level set may move, the bounds of a Frame are this far below and above 0, so that they have no

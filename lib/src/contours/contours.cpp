@@ -213,11 +213,11 @@ bool Densifier::choose_tilted_plane() {
     return true;
 }
 
-/// Chooses the axis with the largest number of marks on lines perpendicular to it alone; closed lines count twice.
+/// Chooses the axis whose slices contain the largest number of marks on lines; marks of closed lines count twice.
 void Densifier::choose_plane() {
     std::array<std::size_t, 3> votes{0, 0, 0};
     for (const Line& line : lines_) {
-        if (std::count(line.constant.begin(), line.constant.end(), true) != 1) continue;
+        if (std::count(line.constant.begin(), line.constant.end(), true) != 1) continue;  // oblique, or along an axis
         for (int a = 0; a < 3; ++a)
             if (line.constant[a]) votes[a] += line.index.size() * (line.closed ? 2 : 1);
     }

@@ -344,8 +344,9 @@ bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, con
     return both > 0 && 2 * both >= all;
 }
 
-/// Reads the templates of the new image along the normals of the surface, moved by the present translation and offsets.
-/// Their intensities are mapped linearly to those of the previous image; both_ receives the statistics of both images.
+/// Reads a template for each patch: the intensities of the new image along the patch's normal, after the patch has been
+/// moved by the current translation and its offset. The intensities are mapped linearly to those of the previous image.
+/// both_ receives the means, deviations and correlation of the intensities of both images.
 std::vector<Template> Motion::read_now() {
     std::vector<Template> now(patches_.size());
     std::vector<Moments> best(now.size());

@@ -47,7 +47,7 @@ bool XmlTags::next(XmlTag& tag) {
 }
 
 std::string XmlTags::text() const {
-    // at_ is the position of the last character of the tag
+    // at_ is the position of the last character of the tag.
     const std::size_t begin = at_ < text_.size() ? at_ + 1 : at_;
     return decode_entities(text_.substr(begin, std::min(text_.find('<', begin), text_.size()) - begin));
 }

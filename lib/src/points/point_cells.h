@@ -15,7 +15,8 @@ public:
     };
 
     /// @param points  at most 2^32 - 1
-    /// @param edge  edge of a cell, > 0; increased if the points' box would have more than 2^20 cells along an axis
+    /// @param edge  edge length of a cell, > 0; increased if the points' box would have more than 2^20 cells along an
+    /// axis
     PointCells(const std::vector<Vec3>& points, double edge);
 
     /// For each position in the sorted order, the index of the point in the input.

@@ -65,7 +65,7 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
     load_star_from(distance(leaf), across, out);
 }
 
-// Solves the eikonal equation leaf by leaf. Leaves have two colours like the fields of a chessboard, and those of one
+// Solves the eikonal equation leaf by leaf. Leaves have two colours, like the squares of a chessboard, and those of one
 // colour are visited in parallel. A leaf is visited again, in the rows next to the changes, if a leaf across one of its
 // faces has changed since.
 void LocalDistance::spread() {

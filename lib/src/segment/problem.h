@@ -48,7 +48,8 @@ struct Problem {
     /// The limits of a solid regardless of the marks: the image's box, rotated like the image, and the region of
     /// interest.
     [[nodiscard]] Clip clip() const;
-    /// Whether the image's axes differ from those of the world, so that its domain contains positions outside of it.
+    /// Whether the image is rotated or sheared against the axes of the world. Its domain, a box along these axes, then
+    /// contains positions outside the image.
     [[nodiscard]] bool is_turned() const;
 
 private:

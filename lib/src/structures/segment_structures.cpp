@@ -26,7 +26,8 @@ constexpr double kAccuracyVoxels = 0.25;  // [voxels of the image] accuracy with
 constexpr double kWeakLine = 0.93;        // weak_edge for lines: 1 - g at 1.2 times the brightness of the band's median
 constexpr double kLargeOverlap = 0.02;    // overlaps above this fraction of the smaller structure's volume are reported
 constexpr double kMinCorrelation = 0.5;   // minimum correlation of the intensities along a surface from frame to frame
-// [voxels] Width of the region beside the surface's band in which the usual slopes of the image are measured, too.
+// [voxels] Width by which the surface's band is dilated, so that the slopes of the image beside the edges also
+// contribute to the contrast of g.
 constexpr int kBesideBand = 5;
 
 /// The region in which edges are computed for a surface that was found without them.

@@ -27,7 +27,7 @@ class EventQueue {
 public:
     void put(Event event) {
         const std::lock_guard lock(mutex_);
-        // only the latest progress of a stage is kept
+        // Only the latest progress of a stage is kept.
         if (event.is_progress && !events_.empty() && events_.back().is_progress && events_.back().text == event.text)
             events_.back() = std::move(event);
         else

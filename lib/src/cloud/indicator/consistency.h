@@ -31,8 +31,8 @@ public:
     /// @throws Error Cancelled
     [[nodiscard]] std::vector<double> off(std::vector<Vec3>& normals);
 
-    /// Adopts the normals of another orientation in those patches that become more consistent by it, if the sum of all
-    /// deviations decreases. A patch is a set of connected cells in which most normals of the two orientations are
+    /// Adopts the normals of another orientation in those patches that become more consistent with them, if the sum of
+    /// all deviations decreases. A patch is a set of connected cells in which most normals of the two orientations are
     /// opposite.
     /// @param own      normals; in/out
     /// @param own_off  off(own); in/out

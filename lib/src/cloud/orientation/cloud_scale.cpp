@@ -18,7 +18,7 @@
 namespace covol {
 namespace {
 
-constexpr double kCellRadii = 2;      // edge of the cells that sort the points, relative to the smallest radius
+constexpr double kCellRadii = 2;      // edge length of the cells that sort the points, relative to the smallest radius
 constexpr std::size_t kNearest = 12;  // points in a group of nearest ones: twice a quadric's coefficients
 
 /// Standard deviation of points from the best-fitting quadric over the plane of the second and third axes.

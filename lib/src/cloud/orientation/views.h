@@ -7,7 +7,7 @@ namespace covol::cloud {
 
 /// For each point, the mean of its free directions, those in which the view from its cell is not blocked by another
 /// cell with points (the ray votes of Mullen et al., Signing the unsigned, SGP 2010); 0 if no direction is free.
-/// @param cell  edge of the cells, wide enough for a sheet of points to have no holes
+/// @param cell  edge length of the cells, wide enough for a sheet of points to have no holes
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 
 /// For each point of a scan of one side, the direction from which it was seen: the common direction in which more

@@ -19,7 +19,7 @@ struct OrientedCloud {
     [[nodiscard]] std::size_t size() const { return points.size(); }
 };
 
-/// The means of the points in each cell of the given edge, separately for the two sides of a sheet.
+/// The means of the points in each cell of the given edge length, separately for the two sides of a sheet.
 [[nodiscard]] OrientedCloud thinned(const OrientedCloud& cloud, double edge);
 
 /// A sheet, or several sheets that meet, fitted to a neighbourhood. If there are several, the base class Sheet is the
@@ -29,7 +29,7 @@ struct Quadric : Sheet {
     double radius = 0;                     ///< radius of the neighbourhood of the fit; 0: no fit
     double min_radius = 0;                 ///< radius of the smallest neighbourhood with enough points
     double noise = 0;                      ///< standard deviation of the points along its normal
-    double apart = 0;                      ///< edge of the cells from which the nodes were taken
+    double apart = 0;                      ///< edge length of the cells in which points were averaged to nodes
     std::shared_ptr<const Crease> crease;  ///< null: a single sheet
     [[nodiscard]] double distance(const Vec3& world) const {
         return crease ? crease->distance(world) : Sheet::distance(world);
@@ -49,8 +49,8 @@ struct Quadric : Sheet {
 [[nodiscard]] std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
                                                 const RunContext& run);
 
-/// Quadrics for a whole cloud, as by fit_quadrics(). The nodes are taken from cells of the given edge, or of two, four
-/// or eight times that edge if the neighbourhoods are so wide that more nodes are not needed.
+/// Quadrics for a whole cloud, as by fit_quadrics(). The nodes are taken from cells of the given edge length, or of
+/// two, four or eight times that length if the neighbourhoods are so wide that more nodes are not needed.
 /// @param places  the cloud's points, moved close to the surface; the nodes are means of them
 /// @param spacing as in fit_quadrics()
 /// @param noise   approximate standard deviation of the points along each axis, which determines the radius of the

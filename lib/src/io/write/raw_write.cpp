@@ -107,7 +107,7 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     return text + "ElementType = " + names_of(source.type()).meta + "\nElementDataFile = LOCAL\n";
 }
 
-/// The parts b, c and d of the unit quaternion a + bi + cj + dk of a rotation, with a >= 0.
+/// The components b, c and d of the unit quaternion a + bi + cj + dk of a rotation, with a >= 0.
 /// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
 std::array<double, 3> quaternion(const Matrix3& r) {
     const double trace = 1 + r[0][0] + r[1][1] + r[2][2];
@@ -143,7 +143,7 @@ bool is_sheared(const Matrix3& direction) {
 /// Whether the stated transform of the input (the sform if it has a code, otherwise the qform) describes the same
 /// lattice as the new header.
 bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
-    // Tolerance of positions relative to the spacing, and of the parts of quaternions.
+    // Tolerance of positions relative to the spacing, and of the components of quaternions.
     constexpr double kRounding = 1e-3;
     const auto own = [&](std::size_t at, std::size_t n) {
         float value = 0;

@@ -170,8 +170,8 @@ Solution flow(const Problem& problem, StartSurface start, const EdgeOptions& edg
 
 bool has_lost(const Solution& solution, const FloatGrid& start) {
     if (solution.has_vanished()) return true;
-    if (solution.start.origin == StartOrigin::Grown)
-        return 2 * inside_volume(*solution.u) < inside_volume(start);  // lost more than half of its volume
+    // A grown start counts as lost if more than half of its volume has vanished.
+    if (solution.start.origin == StartOrigin::Grown) return 2 * inside_volume(*solution.u) < inside_volume(start);
     const std::vector<Vec3>& trusted = solution.start.marks.trusted;
     return mean_distance(trusted, *solution.u) >
            mean_distance(trusted, start) + kAutomatic.noticeable_voxels * solution.h();

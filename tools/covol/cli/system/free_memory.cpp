@@ -73,7 +73,7 @@ std::vector<Hierarchy> hierarchies(const std::string& root) {
     std::ifstream file(root + "/proc/self/mountinfo");
     std::string line;
     while (std::getline(file, line)) {
-        // fields of a line of mountinfo: id parent device top mount options... - type source options
+        // The fields of a line of mountinfo are: id parent device top mount options... - type source options
         std::istringstream words(line);
         std::string id, parent, device, top, mount, word, type, source, options;
         words >> id >> parent >> device >> top >> mount;
@@ -91,7 +91,7 @@ std::string own_group(const std::string& root, bool is_v2) {
     std::ifstream file(root + "/proc/self/cgroup");
     std::string line;
     while (std::getline(file, line)) {
-        // format of a line: number:controllers:group
+        // The format of a line is number:controllers:group.
         const std::size_t first = line.find(':'), second = line.find(':', first + 1);
         if (second == std::string::npos) continue;
         const std::string controllers = line.substr(first + 1, second - first - 1);
