@@ -52,6 +52,8 @@ SHAPES = {
     # Two balls with a gap of 2 spacings of the points.
     "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),
     "ball": ball((0, 0, 0), 1),
+    # Two walls with a gap of 1.5 spacings of 3,000 points.
+    "shell": lambda p: np.abs(np.linalg.norm(p, axis=1) - 0.95) - 0.06,
 }
 
 
@@ -123,6 +125,7 @@ def make_clouds(folder):
     normals = np.random.default_rng(18).normal(size=normals.shape)
     write_points(folder / "normals_random.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
+    write_points(folder / "shell.csv", draw("shell", 20)[0])
     write_points(folder / "few.csv", draw("torus", 16, 0.1, count=700)[0])
 
 
@@ -252,6 +255,12 @@ def doubt_error(out, kind):
     return warnings if kind == "right" else 10 * (warnings == 0)
 
 
+def moved_within(marks, shift, last):
+    """Marks that are moved along each axis in the direction in which there is more space, but not beyond the image."""
+    forward = last - marks.max(0) >= marks.min(0)
+    return np.clip(marks + np.where(forward, shift, -shift), 0, last)
+
+
 def make_real(folder):
     """Marks and truths; options that a job needs for its image are added to JOBS."""
     import annotator
@@ -264,16 +273,18 @@ def make_real(folder):
                 name = real_name(structure.name, count)
                 np.savetxt(folder / f"{name}.csv", annotator.marks_of(structure, count, REAL_DRAW), "%.5f", ",", header="x,y,z", comments="")
                 arguments = ["segment", str(structure.image), *structure.options, "--points", f"../in/{name}.csv", "--points-space", "index",
-                             "-o", "s.vdb", "--mask", "m.tif"]
+                             "-o", "s.vdb", "--mask", "m.nrrd"]
                 JOBS[name] = (shlex.join(arguments), "real", structure.name)
+                JOBS[f"{name} expected"] = (shlex.join([*arguments, "--json", "r.json"]), "expected", structure.name)
                 JOBS[f"{name} alone"] = (shlex.join([*arguments, "--rho", "0"]), "real", structure.name)
                 if count == DOUBT_COUNT:
-                    astray = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
-                    astray[::10] += ASTRAY * np.ptp(astray, 0)  # a tenth of the marks is wrong
+                    marks = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
+                    last = np.array(structure.truth.shape[::-1]) - 1
+                    astray = marks.copy()
+                    astray[::10] = moved_within(marks[::10], ASTRAY * np.ptp(marks, 0), last)  # a tenth of the marks is wrong
                     np.savetxt(folder / f"{name}_astray.csv", astray, "%.5f", ",", header="x,y,z", comments="")
                     JOBS[f"{name} astray"] = (shlex.join(arguments).replace(f"{name}.csv", f"{name}_astray.csv"), "real", structure.name)
-                    moved = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
-                    moved += DOUBT_SHIFT * np.ptp(moved, 0)
+                    moved = moved_within(marks, DOUBT_SHIFT * np.ptp(marks, 0), last)
                     np.savetxt(folder / f"{name}_wrong.csv", moved, "%.5f", ",", header="x,y,z", comments="")
                     for kind, marks in (("right", name), ("wrong", f"{name}_wrong")):
                         with_report = [*arguments, "--json", "r.json"]
@@ -283,9 +294,15 @@ def make_real(folder):
 
 def real_error(folder, out, structure):
     """1 - Dice, in %."""
-    import tifffile
     import truth
-    return 100 * (1 - truth.dice(tifffile.imread(out / "m.tif") > 0, np.load(folder / f"{structure}.npy")))
+    return 100 * (1 - truth.dice(read_nrrd(out / "m.nrrd")[0] > 0, np.load(folder / f"{structure}.npy")))
+
+
+def expected_error(folder, out, structure):
+    """The interval score (Gneiting and Raftery 2007, eq. 43) of the expected 1 - Dice, whose interval has a probability of 90 %, in octaves: the width of the interval, and 20 times the distance of the actual value from the interval."""
+    expected = json.loads((out / "r.json").read_text())["expected_dice"]
+    low, high, actual = np.log2([1 - expected["high"], 1 - expected["low"], real_error(folder, out, structure) / 100])
+    return float(high - low + 20 * max(0, low - actual, actual - high))
 
 
 # ---- jobs ----------------------------------------------------------------------------------------------------------
@@ -315,6 +332,9 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "spikes tag": (RECONSTRUCT.format("spikes1.csv").replace("cloud", "tag"), "cloud", "spikes"),
     "twins tag": (RECONSTRUCT.format("twins7.csv").replace("cloud", "tag"), "cloud", "twins"),
     "few": (RECONSTRUCT.format("few.csv").replace("--init cloud ", ""), "cloud", "torus"),
+    "plate right": (RECONSTRUCT.format("plate5.csv") + " --json r.json", "doubt", "right"),
+    "torus right": (RECONSTRUCT.format("torus4.csv") + " --json r.json", "doubt", "right"),
+    "shell wrong": (RECONSTRUCT.format("shell.csv") + " --json r.json", "doubt", "wrong"),
     "cleaned": (RECONSTRUCT.format("spikes2.csv") + " --remove-outliers --smooth wlop", "cloud", "spikes"),
     "relaxed": ("mesh ../in/spikes.vdb -o s.ply --target-edge 2vx", "cloud", "spikes"),
     "adaptive": ("mesh ../in/spikes.vdb -o s.ply --adaptive 0.2vx", "cloud", "spikes"),
@@ -346,9 +366,9 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m line tag": ("segment ../in/p_line.nrrd --points ../in/p_dense.csv --init tag -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m scribbles": ("segment ../in/p_torus.nrrd --painted ../in/s_scribbles.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m grow torus": ("segment ../in/p_torus.nrrd --theta 0 --inside 0.75,0,0 -o s.vdb --mask m.nrrd", "mask", "torus"),
-    "m grow round": ("segment ../in/p_round.nrrd --theta 0 --inside 0,0,0 -o s.vdb --mask m.nrrd", "mask", "round"),
+    "m grow two": ("segment ../in/p_two.nrrd --theta 0 --inside -0.55,0,0 -o s.vdb --mask m.nrrd", "mask", "two"),
     "m grow wide": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,1.15 -o s.vdb --mask m.nrrd", "mask", "sphere"),
-    "m grow slit": ("segment ../in/p_slit.nrrd --theta 0 --inside 0.3,0.3,0.3 -o s.vdb --mask m.nrrd", "mask", "slit"),
+    "m grow many": ("segment ../in/p_many.nrrd --theta 0 --inside 0,0.75,0 -o s.vdb --mask m.nrrd", "mask", "many"),
     **{f"m lapse {name}": (f"segment ../in/p_{name}.nrrd ../in/p_{name}_moved.nrrd --points ../in/p_{name}.csv -o s.vdb --mask m.nrrd", "lapse", f"{name}_moved")
        for name in MOVED},
     "m contours sphere": ("segment ../in/p_sphere.nrrd --contours ../in/contours_sphere.csv -o s.vdb --mask m.nrrd", "mask", "sphere"),
@@ -367,7 +387,7 @@ ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours
 GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
 CONTOURS = ["m contours", "m contours alone", "m painted", "m scribbles", "m line", "m painted box", "m contours sphere", "m painted round"]
 CORRECTED = ["m guess", "m guess large", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
-GROWN = ["m grow", "m grow box", "m grow torus", "m grow round", "m grow wide", "m grow slit"]
+GROWN = ["m grow", "m grow box", "m grow torus", "m grow two", "m grow wide", "m grow many"]
 LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
 LINES = ["m line", "m line marks", "m line tag"]
@@ -376,14 +396,15 @@ REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] i
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
 REAL_ALONE = [f"{real_name(name, 20)} alone" for name in ("spinal cord", "left atrium", "thalamus")] if REAL_JOBS else []
 REAL_ASTRAY = [f"{real_name(name, DOUBT_COUNT)} astray" for name in REAL[::4]] if REAL_JOBS else []
-DOUBTED = [doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else []
+DOUBTED = ["plate right", "shell wrong", "torus right", *([doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else [])]
+REAL_EXPECTED = [f"{name} expected" for name in REAL_FEW]
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     "orientation": [*CLOUDS, "normals random"], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "marks_surface", "isolated"), [*ALONE, *REAL_ALONE]), "correction": CORRECTED,
-    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY], "doubts": DOUBTED,
+    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY, *REAL_EXPECTED], "doubts": DOUBTED,
     **dict.fromkeys(("contours", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
     **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, *LINES, "m contours"]),
     "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
@@ -405,12 +426,17 @@ def arguments_of(job):
 
 
 def output_of(job, out):
-    return out / {"mask": "m.nrrd", "lapse": "m_t001.nrrd", "real": "m.tif", "doubt": "m.tif"}.get(JOBS[job][1], "s.ply")
+    return out / {"mask": "m.nrrd", "lapse": "m_t001.nrrd", "real": "m.nrrd", "doubt": "r.json", "expected": "r.json"}.get(JOBS[job][1], "s.ply")
 
 
-def warnings_of(job, out):
-    """Part of the result of jobs that are about warnings."""
-    return json.dumps(json.loads((out / "r.json").read_text()).get("warnings", [])).encode() if JOBS[job][1] == "doubt" else b""
+def content_of(job, out):
+    """The bytes of the result that the error depends on."""
+    path = output_of(job, out)
+    if path.suffix != ".json":
+        return path.read_bytes()
+    report = json.loads(path.read_text())
+    content = json.dumps([report.get("warnings"), report.get("expected_dice")]).encode()
+    return content if JOBS[job][1] == "doubt" else content + (out / "m.nrrd").read_bytes()
 
 
 def error_of(job, folder, out):
@@ -419,6 +445,8 @@ def error_of(job, folder, out):
         return mask_error(folder, output_of(job, out), shape)
     if kind == "doubt":
         return doubt_error(out, shape)
+    if kind == "expected":
+        return expected_error(folder, out, shape)
     if kind == "real":
         return real_error(folder, out, shape)
     return cloud_error(folder, out, shape, np.genfromtxt(folder / more[0], delimiter=",", skip_header=1)[:, :3] if kind == "open" else None)

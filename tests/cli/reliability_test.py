@@ -318,7 +318,7 @@ class WrongInSilence(Case):
 
     def test_noise(self):
         warnings, support = self.warnings(self.noise, self.marks)
-        self.assertIn("hardly predicts", " ".join(warnings))
+        self.assertIn("does not show a border at the marks", " ".join(warnings))
         self.assertLess(abs(support - 0.5), 0.1)
 
     def test_marks_of_another_place_or_size(self):

@@ -155,17 +155,11 @@ private:
             *problem_.image, at.places, at.normals, h_,
             is_line(feature) ? detail::BorderKind::Line : detail::BorderKind::Slope, problem_.run);
         report_.image_border = {border.at, border.fraction, border.errors};
-        const char* const look = ": check whether the marks belong to this image, channel and coordinate system";
-        if (support.fraction + kDoubts.support_errors * support.error < kDoubts.image_support)
-            warn("the image varies more five voxels away from the marks than at the marks (in " +
-                 number(std::round(100 * (1 - support.fraction))) + " of 100 pairs)" + look);
-        else if (guidance.used && guidance.gain < kDoubts.min_gain && support.fraction < kDoubts.clear_support)
-            warn("the image at some marks hardly predicts where the others lie (a gain of " + number(guidance.gain) +
-                 " nats per mark)" + look);
-        else if (border.fraction < kDoubts.border_fraction && border.errors > kCommon.errors)
-            warn("on average, borders in the image are steeper " + std::to_string(std::abs(border.at)) + " voxels " +
-                 (border.at < 0 ? "inside" : "outside") + " of the marks than at the marks (where they have " +
-                 number(std::round(100 * border.fraction)) + " % of that steepness)" + look + ", and have its scale");
+        if (support.fraction < kDoubts.image_support)
+            warn("the image does not show a border at the marks: it varies more there than five voxels away in only " +
+                 number(std::round(100 * support.fraction)) +
+                 " of 100 pairs, with 50 by chance; check whether the marks belong to this image, channel and "
+                 "coordinate system, and have its scale");
     }
 
     void find_silent_image() {
