@@ -52,8 +52,6 @@ SHAPES = {
     # Two balls with a gap of 2 spacings of the points.
     "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),
     "ball": ball((0, 0, 0), 1),
-    # Two walls with a gap of 1.5 spacings of 3,000 points.
-    "shell": lambda p: np.abs(np.linalg.norm(p, axis=1) - 0.95) - 0.06,
 }
 
 
@@ -125,7 +123,11 @@ def make_clouds(folder):
     normals = np.random.default_rng(18).normal(size=normals.shape)
     write_points(folder / "normals_random.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
-    write_points(folder / "shell.csv", draw("shell", 20)[0])
+    # Folds of a ball: those with 30 waves are mistaken for noise, those with 12 are resolved.
+    for waves, depth in ((30, 0.2), (12, 0.3)):
+        directions = np.random.default_rng(20).normal(size=(10000, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        write_points(folder / f"folds{waves}.csv", directions * (1 + depth * np.cos(waves * directions).prod(1, keepdims=True)))
     write_points(folder / "few.csv", draw("torus", 16, 0.1, count=700)[0])
 
 
@@ -204,6 +206,9 @@ def make_phantoms(folder, covol):
         if name == "torus":
             write_torus_lines(folder, raw)
         points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
+        if name == "many":  # with three accidental marks near corners of the image
+            corners = np.array([[1.2, 1.2, 1.2], [-1.2, 1.2, -1.2], [1.2, -1.2, -1.1]])
+            np.savetxt(folder / "p_strays.csv", np.concatenate([points, corners]), "%.6f", ",", header="x,y,z", comments="")
         np.savetxt(folder / f"ten_{name}.csv", points[::max(1, len(points) // 10)], "%.6f", ",", header="x,y,z", comments="")
     rows = []
     for k in range(8, 37, 4):  # contours on slices of the torus with radii 0.75 and 0.3; the voxel size is 2.6 / 44
@@ -233,6 +238,7 @@ REAL = ("spinal cord", "ventricle", "left atrium", "hippocampus", "worm nucleus 
         "caudate, right", "vertebra", "hippocampus, posterior", "mouse nucleus 395", "hippocampus 2", "thalamus")
 REAL_COUNTS = (60, 20)
 REAL_DRAW = 11
+OUTLINED, OUTLINED_STEP = ("spinal cord", "caudate, right", "hippocampus 2", "thalamus"), 4  # contours on every fourth slice
 
 
 # For the jobs that compare right with wrong marks: number of marks, and shift of the wrong marks along each axis as a
@@ -264,11 +270,17 @@ def moved_within(marks, shift, last):
 def make_real(folder):
     """Marks and truths; options that a job needs for its image are added to JOBS."""
     import annotator
+    import common
     import truth
     data = os.environ["COVOL_DATA"]
     for structure in [*truth.structures(data), *truth.more_structures(data)]:
         if structure.name in REAL:
             np.save(folder / f"{structure.name}.npy", structure.truth)
+            if structure.name in OUTLINED:
+                common.write_contours(folder / f"{structure.name} outlines.csv", annotator.contours_of(structure, OUTLINED_STEP, REAL_DRAW))
+                arguments = ["segment", str(structure.image), *structure.options, "--contours", f"../in/{structure.name} outlines.csv",
+                             "--points-space", "index", "-o", "s.vdb", "--mask", "m.nrrd"]
+                JOBS[f"{structure.name} outlines"] = (shlex.join(arguments), "real", structure.name)
             for count in REAL_COUNTS:
                 name = real_name(structure.name, count)
                 np.savetxt(folder / f"{name}.csv", annotator.marks_of(structure, count, REAL_DRAW), "%.5f", ",", header="x,y,z", comments="")
@@ -334,7 +346,9 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "few": (RECONSTRUCT.format("few.csv").replace("--init cloud ", ""), "cloud", "torus"),
     "plate right": (RECONSTRUCT.format("plate5.csv") + " --json r.json", "doubt", "right"),
     "torus right": (RECONSTRUCT.format("torus4.csv") + " --json r.json", "doubt", "right"),
-    "shell wrong": (RECONSTRUCT.format("shell.csv") + " --json r.json", "doubt", "wrong"),
+    "folds right": (RECONSTRUCT.format("folds12.csv") + " --json r.json", "doubt", "right"),
+    "folds wrong": (RECONSTRUCT.format("folds30.csv") + " --json r.json", "doubt", "wrong"),
+    "few tag": (RECONSTRUCT.format("few.csv").replace("cloud", "tag"), "cloud", "torus"),
     "cleaned": (RECONSTRUCT.format("spikes2.csv") + " --remove-outliers --smooth wlop", "cloud", "spikes"),
     "relaxed": ("mesh ../in/spikes.vdb -o s.ply --target-edge 2vx", "cloud", "spikes"),
     "adaptive": ("mesh ../in/spikes.vdb -o s.ply --adaptive 0.2vx", "cloud", "spikes"),
@@ -344,6 +358,8 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m box": (MARKS.format("box"), "mask", "box"),
     "m many": (MARKS.format("many"), "mask", "many"),
     "m many alone": (MARKS.format("many") + " --rho 0", "mask", "many"),
+    "m strays": (MARKS.format("many").replace("p_many.csv", "p_strays.csv"), "mask", "many"),
+    "m strays alone": (MARKS.format("many").replace("p_many.csv", "p_strays.csv") + " --rho 0", "mask", "many"),
     "m torus alone": (MARKS.format("torus") + " --rho 0", "mask", "torus"),
     "m sides": (MARKS.format("two") + " --inside -0.55,0,0 --inside 0.55,0.1,0.05 --outside 0,0.9,0", "mask", "two"),
     "m tag": (MARKS.format("dense") + " --init tag", "mask", "dense"),
@@ -392,22 +408,23 @@ LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
 LINES = ["m line", "m line marks", "m line tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
+REAL_OUTLINES = [f"{name} outlines" for name in OUTLINED] if os.environ.get("COVOL_DATA") else []
 REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
 REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
 REAL_ALONE = [f"{real_name(name, 20)} alone" for name in ("spinal cord", "left atrium", "thalamus")] if REAL_JOBS else []
 REAL_ASTRAY = [f"{real_name(name, DOUBT_COUNT)} astray" for name in REAL[::4]] if REAL_JOBS else []
-DOUBTED = ["plate right", "shell wrong", "torus right", *([doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else [])]
+DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", *([doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else [])]
 REAL_EXPECTED = [f"{name} expected" for name in REAL_FEW]
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     "orientation": [*CLOUDS, "normals random"], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface", "isolated"), [*ALONE, *REAL_ALONE]), "correction": CORRECTED,
+    **dict.fromkeys(("guess", "marks_surface"), [*ALONE, *REAL_ALONE]), "isolated": ["m strays", "m strays alone", *ALONE[:4], *REAL_ALONE[:1], *REAL_ASTRAY[:1]], "correction": CORRECTED,
     "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY, *REAL_EXPECTED], "doubts": DOUBTED,
-    **dict.fromkeys(("contours", "outline"), CONTOURS), "grow": GROWN, "time_lapse": LAPSES,
-    **dict.fromkeys(("edge", "evolve", "motion", "flow"), [*FLOWS, *LINES, "m contours"]),
-    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
+    **dict.fromkeys(("contours", "outline"), [*CONTOURS, *REAL_OUTLINES[:1]]), "grow": GROWN, "time_lapse": LAPSES,
+    **dict.fromkeys(("edge", "evolve", "motion"), [*FLOWS, *LINES, "m contours"]), "flow": [*FLOWS[:3], "m line", "m contours sphere", *REAL_OUTLINES],
+    "automatic": ["spikes noisy", "few", "few tag", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
     **dict.fromkeys(("holes", "cut", "relax", "decimate"), MESHES),
 }
 
