@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/geometry.h"
+#include "base/heuristics.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/guess.h"
@@ -237,7 +238,7 @@ Solid min_body(const Scene& scene, const Field& odds, const RunContext& run) {
     return solve_body(lattice, weight, cost, std::move(u), run);
 }
 
-/// Drops each part of the solid with less than the fraction kInference.wrong of those of the solid's nodes that are
+/// Drops each part of the solid with less than the fraction kCommon.minority of those of the solid's nodes that are
 /// near marks. The solid becomes empty if no node, or every node, is inside.
 void keep_marked_parts(const Scene& scene, Solid& solid) {
     const Parts parts = label_parts(solid.lattice, solid.inside);
@@ -250,7 +251,7 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     }
     std::size_t inside = 0;
     for (std::size_t n = 0; n < solid.inside.size(); ++n) {
-        if (marked[std::size_t(parts.number[n])] < kInference.wrong * std::max(all, 1.0)) solid.inside[n] = 0;
+        if (marked[std::size_t(parts.number[n])] < kCommon.minority * std::max(all, 1.0)) solid.inside[n] = 0;
         inside += std::size_t(solid.inside[n] != 0);
     }
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();

@@ -30,8 +30,6 @@ struct InferenceHeuristics {
     /// [of the marks] Maximum fraction that may lie off a body; with more, the body is rejected. It is also the maximum
     /// fraction that is left out as wrong.
     double max_off = heuristic("inference.max_off", 0.2);
-    /// [of the marks] Fraction that is expected to be wrong. Parts of a body near a smaller fraction are dropped.
-    double wrong = heuristic("inference.wrong", 0.05);
     /// [voxels] Distance up to which misses of a guess are measured: margin of the box around the missed marks in which
     /// the distances from its surface are computed.
     double farthest_miss = limit("inference.farthest_miss", 30);

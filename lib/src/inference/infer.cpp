@@ -149,7 +149,7 @@ Solid Inference::refined() const {
 
 bool Inference::leave_out_wrong(const HeldOut& held) {
     // At least two wrong marks have to be expected, because a single suspect may lie on a part that the body lacks.
-    if (kInference.wrong * double(held.marks.size()) < 2) return false;
+    if (kCommon.minority * double(held.marks.size()) < 2) return false;
     const Field level = coarse_body_.level();
     double anywhere = 0;
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "inference/heuristics.h"
+#include "base/heuristics.h"
 
 namespace covol::inference {
 
 std::vector<double> probability_wrong(const std::vector<double>& off, double anywhere, double smallest) {
     constexpr int kSteps = 50;
     std::vector<double> wrong(off.size(), 0.0);
-    double fraction = kInference.wrong, usual = smallest;
+    double fraction = kCommon.minority, usual = smallest;
     for (int step = 0; step < kSteps; ++step) {
         double sum = 0, off_if_right = 0;
         for (std::size_t n = 0; n < off.size(); ++n) {

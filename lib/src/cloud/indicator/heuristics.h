@@ -19,9 +19,6 @@ struct CloudHeuristics {
     /// [fraction of the points] Fraction below which points that were reversed or removed, contradict the indicator of
     /// all points, or form a separate piece, count as exceptions.
     double few = heuristic("cloud.few", 0.002);
-    /// [fraction of the points, or of the area] Fraction above which points that a surface misses, that contradict an
-    /// orientation, or that are visible from one side only, are not attributed to noise.
-    double some = heuristic("cloud.some", 0.02);
     /// [rounds] Number of updates of indicator and normals after normals were reversed, until both agree again. Also
     /// the maximum number of rounds that reverse single normals or remove stray points.
     int settling = heuristic("cloud.settling", 3);

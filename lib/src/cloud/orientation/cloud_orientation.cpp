@@ -35,7 +35,7 @@ double bare_fraction(const CloudOrientation& cloud) {
 bool does_enclose(const CloudOrientation& cloud) {
     // Measured for closed shapes and for scans of one side: the doubt is at most 0.013 for the former and 0.026 to 0.19
     // for the latter; the bare fraction is at most 0.04 for the former and at least 0.14 for the latter.
-    return doubt(cloud.orientation) < kCloud.some || bare_fraction(cloud) < kCommon.minority;
+    return doubt(cloud.orientation) < kCommon.negligible || bare_fraction(cloud) < kCommon.minority;
 }
 /// Recomputes the indicator with smaller cells if its cells are too large for the detail of the normals, or if the
 /// orientation is not settled and the surface misses many points.
@@ -49,7 +49,7 @@ void refine(CloudOrientation& cloud, double first_cell, const RunContext& run) {
     const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && is_clean(cloud.scale) &&
-        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kCloud.some)
+        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kCommon.negligible)
         o.indicator = cloud::indicator_of(cloud.points, o, first / kCommon.growth, run);
 }
 
@@ -87,7 +87,7 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
     // Normals are unstable in the folds of a closed surface as well, but there the surface from views misses most
     // points. The number of points missed by the current surface, divided by that of the surface from views, was
     // measured as 0.06 to 0.21 for closed shapes and shells open at one end, and 0.83 to 0.97 for scans of one side.
-    cloud.encloses = (!mostly_bare || passed < kCloud.some) &&
+    cloud.encloses = (!mostly_bare || passed < kCommon.negligible) &&
                      kCommon.clear_ratio * passed < fraction_missed(*seen.indicator, cloud.points, reach);
     if (cloud.encloses) return;
     cloud.orientation = std::move(seen);
@@ -132,7 +132,8 @@ void choose_orientation(CloudOrientation& cloud, double part, PointHints hints, 
         // Walls inside a solid can be identified only by given normals, and some points of such walls may remain.
         // Therefore given normals are not overruled if they have identified enclosed points.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&
-            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kCloud.some &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
+                kCommon.negligible &&
             // In narrow folds, the computed normals may be wrong; their surface then misses more points than that of
             // the given normals, which are kept.
             fraction_missed(*cloud.orientation.indicator, cloud.points, reach) <=

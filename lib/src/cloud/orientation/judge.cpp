@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/heuristics.h"
 #include "cloud/indicator/heuristics.h"
 #include "cloud/indicator/indicator.h"
 #include "cloud/orientation/heuristics.h"
@@ -33,7 +34,7 @@ double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noi
 double coarse_cell(const CloudScale& scale) { return kCloud.coarse * apart(scale); }
 double miss_reach(const CloudScale& scale) { return kOrientation.passed_reach * apart(scale); }
 
-double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kCloud.some); }
+double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kCommon.negligible); }
 bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }
 
 double fraction_missed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {

@@ -36,7 +36,7 @@ std::vector<Vec3> directions() {
 /// The results of free_directions(), scaled to length 1; 0 where nearly as many directions are free on one side of the
 /// point as on the other.
 std::vector<Vec3> normalized_or_zero(std::vector<Vec3> free) {
-    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kCloud.some ? unit(way) : Vec3{0, 0, 0};
+    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kCommon.negligible ? unit(way) : Vec3{0, 0, 0};
     return free;
 }
 
@@ -128,7 +128,7 @@ std::vector<Vec3> towards_sky(const std::vector<Vec3>& points, const CloudScale&
     // In a scan with a common direction of view, which is called the sky here, more points are seen from there than
     // from the opposite side.
     Vec3 sky{0, 0, 0};
-    if (*std::max_element(seen.begin(), seen.end()) > kCloud.some * double(points.size())) {
+    if (*std::max_element(seen.begin(), seen.end()) > kCommon.negligible * double(points.size())) {
         for (std::size_t r = 0; r < rays.size(); ++r) sky = plus(sky, times(seen[r], rays[r]));
         sky = unit(sky);
     }

@@ -103,7 +103,7 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     const Orientation& orientation = cloud.orientation;
     // Noise creates spurious pieces with few points, which are removed. If the points enclose nothing, a separate piece
     // is not a thin part of a solid, so it must have more points to be kept.
-    const double fraction = cloud.encloses ? kCloud.few : kCloud.some, noises = report.noise / report.spacing;
+    const double fraction = cloud.encloses ? kCloud.few : kCommon.negligible, noises = report.noise / report.spacing;
     const auto minimum = std::size_t(
         std::max({double(kCommon.quadric), fraction * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, minimum);

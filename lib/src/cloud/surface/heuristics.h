@@ -31,8 +31,6 @@ struct LocalFitHeuristics {
     /// [fraction of the weights] Added to the diagonal of the equations for the curvatures, which would be singular for
     /// points on a line.
     double ridge = heuristic("local_fit.ridge", 1e-4);
-    /// [radii] Distance from the tangent plane above which points may belong to another sheet.
-    double sheet_height = heuristic("local_fit.sheet_height", 0.15);
     /// [radii] Minimum standard deviation of the points along any tangential direction; it is 0.35 if they fill the
     /// disc.
     double min_spread = heuristic("local_fit.min_spread", 0.16);

@@ -12,6 +12,7 @@
 #include "base/geometry.h"
 #include "base/heuristics.h"
 #include "base/median.h"
+#include "cloud/indicator/heuristics.h"
 #include "cloud/surface/crease.h"
 #include "cloud/surface/fit_kernel.h"
 #include "cloud/surface/heuristics.h"
@@ -113,7 +114,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
 /// 1 if most points around `origin` on its sheet have normals on the side of `normal`, 0 if not; -1: too few points.
 int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
                    const std::vector<PointCells::Range>& ranges) {
-    const double r2 = level.radius * level.radius, height = kFit.sheet_height * level.radius;
+    const double r2 = level.radius * level.radius, height = kCloud.flat * level.radius;
     double same = 0, opposite = 0;
     for (const PointCells::Range& range : ranges)
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
