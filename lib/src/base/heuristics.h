@@ -66,7 +66,7 @@ struct CommonHeuristics {
     /// [standard errors] Deviation of a measured value above which it is not attributed to chance.
     double errors = heuristic("common.errors", 4.0);
     /// [rounds] Maximum number of repetitions of a step that is repeated until it changes nothing: a repair, a
-    /// reweighted fit, the computation of a body from marks and image, the movement of a body between contours.
+    /// reweighted fit, the computation of a body from marks and image.
     int rounds = heuristic("common.rounds", 4);
     /// [ratio] Factor between successive lengths in the search for a suitable scale: sqrt(2), so that areas double.
     double growth = heuristic("common.growth", 1.4142135623730951);

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "base/heuristics.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
@@ -351,7 +350,7 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
     found.line = line / count;
     found.step = step / count;
     const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
-    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kCommon.errors * error)
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kEdge.standard_errors * error)
         found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
     return found;
 }

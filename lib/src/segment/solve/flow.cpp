@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "base/heuristics.h"
 #include "covol/error.h"
 #include "grid/levels_at.h"
 #include "inference/heuristics.h"
@@ -97,7 +96,7 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
     // Between contours the start may be far off: if guidance reduces the error, its result is a better start for the
     // next pass.
-    const int passes = start.origin == StartOrigin::Contours ? kCommon.rounds : 1;
+    const int passes = start.origin == StartOrigin::Contours ? kFlow.contour_passes : 1;
     for (int pass = 1; pass < passes && guided.report.used; ++pass) {
         if (!(guided.report.image_error < guided.report.guess_error)) break;
         Guided again = guide(*guided.u, marks, *problem.image, options, problem.run);
